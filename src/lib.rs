@@ -62,6 +62,7 @@
 //! cpu      frames and casts without Vulkan, fast
 //! engine   a device or the CPU: chooses the methods that the user leaves open, renders, casts
 //! output   picture -> file
+//! merge    files of parts -> picture
 //! bench    all of it, timed
 //! view     all of it, in a window
 //!
@@ -106,6 +107,8 @@ pub mod cast;
 pub mod engine;
 
 pub mod output;
+
+pub mod merge;
 
 #[cfg(feature = "bench")]
 #[doc(hidden)]

@@ -9,7 +9,7 @@ use std::{
 };
 
 use serde_json::Value;
-use support::command::{cornell, fail, kdray, names, stderr, stdout, succeed};
+use support::command::{cornell, fail, kdray, names, pixels, stderr, stdout, succeed};
 use tempfile::TempDir;
 
 #[test]
@@ -244,7 +244,7 @@ fn cameras_and_scenes_are_chosen() {
     let picture = |camera: &[&str]| {
         let render = ["render", "s.toml", "--cpu", "-q", "--size", "32x24", "-o", "x.png"];
         succeed(directory.path(), &[&render, camera].concat());
-        fs::read(directory.path().join("x.png")).unwrap()
+        pixels(&directory.path().join("x.png"))
     };
     let [first, second] = [picture(&["--camera", "left"]), picture(&["--camera", "1"])];
     assert!(first == picture(&[]) && first != second && second == picture(&["--camera", "right"]));
@@ -263,7 +263,7 @@ fn convert_writes_a_scene_file() {
     for (file, picture) in [("m.obj", "a.exr"), ("c.toml", "b.exr")] {
         succeed(directory.path(), &["render", file, "--cpu", "-q", "--size", "32x24", "-o", picture]);
     }
-    assert_eq!(fs::read(path("a.exr")).unwrap(), fs::read(path("b.exr")).unwrap());
+    assert!(pixels(&path("a.exr")) == pixels(&path("b.exr")));
     let written = fs::read(path("c.toml")).unwrap();
     fail(directory.path(), &["convert", "m.obj", "c.toml"], 2, "`c.toml` exists: --force replaces it");
     fail(directory.path(), &["convert", "m.obj", "c.txt"], 2, "must end in .toml");
@@ -302,7 +302,7 @@ fn render_takes_grids() {
             let files = &files[..files.len() - more.len()];
             let text = stdout(&render_small(directory.path(), &[files, &["--accel", accel], more].concat()));
             let json: Value = serde_json::from_slice(&fs::read(directory.path().join("x.json")).unwrap()).unwrap();
-            (fs::read(directory.path().join("x.png")).unwrap(), text, json)
+            (pixels(&directory.path().join("x.png")), text, json)
         };
         let (expected, _, tree) = picture("kdtree");
         assert!(tree["choices"]["traversal"].is_object() && tree["choices"]["accel"] == "kdtree");

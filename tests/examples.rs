@@ -4,7 +4,7 @@ mod support;
 
 use std::{path::PathBuf, process::Command};
 
-use support::command::{shipped, succeed};
+use support::command::{pixels, shipped, succeed};
 use tempfile::TempDir;
 
 /// Runs an example and returns what it prints. `cargo test` builds the examples, unless it runs only certain tests.
@@ -22,8 +22,8 @@ fn render_writes_the_picture_that_the_command_writes() {
     let printed = run("render", &[&shipped("cornell.toml"), &path("example.png")]);
     assert!(printed.starts_with(&path("example.png")), "{printed}");
     succeed(directory.path(), &["render", &shipped("cornell.toml"), "-q", "-o", "command.png"]);
-    let bytes = |name: &str| std::fs::read(path(name)).unwrap();
-    assert!(bytes("example.png") == bytes("command.png"));
+    let pixels = |name: &str| pixels(path(name).as_ref());
+    assert!(pixels("example.png") == pixels("command.png"));
 }
 
 /// The box is open in front. Its five walls fill the picture but for the corners.

@@ -99,7 +99,12 @@ fn features_that_contradict_the_size_are_an_error() {
     let path = directory.path().join("x.exr");
     for n in [0, 3, 5] {
         let features = vec![Feature::default(); n];
-        let error = output::write_layers(&path, &picture(2, 2), &[Aov::Depth], &features).unwrap_err();
+        let error = output::write_layers(
+            &path,
+            &picture(2, 2),
+            &output::Layers { aovs: &[Aov::Depth], features: &features, ..Default::default() },
+        )
+        .unwrap_err();
         assert!(matches!(error, OutputError::Encode { .. }), "{error}");
     }
     assert!(names(directory.path()).is_empty());

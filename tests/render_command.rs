@@ -50,6 +50,29 @@ fn a_crop_is_a_part_of_the_picture() {
     refused(path, 2, &["--crop", "0,0,4294967295,1"], "beyond the picture");
 }
 
+/// A picture that ends by the clock has some samples, and is that of as many samples.
+#[test]
+fn a_time_is_filled_with_samples() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    let paths = ["--integrator", "path", "--max-depth", "2"];
+    for integrator in [&paths[..], &["--integrator", "whitted"]] {
+        let output =
+            render(path, &[integrator, &["--time", "700ms", "-o", "timed.exr", "--profile", "x.json"]].concat());
+        let json: serde_json::Value = serde_json::from_slice(&fs::read(path.join("x.json")).unwrap()).unwrap();
+        let n_samples = json["samples"].as_u64().unwrap();
+        assert!(n_samples > 1 && stdout(&output).contains(&format!("{n_samples} samples a pixel")), "{n_samples}");
+        render(path, &[integrator, &["--spp", &n_samples.to_string(), "-o", "counted.exr"]].concat());
+        assert_eq!(channels(&path.join("timed.exr")), channels(&path.join("counted.exr")));
+        render(path, &[integrator, &["--time", "1ms", "-o", "one.exr"]].concat());
+        render(path, &[integrator, &["--spp", "1", "-o", "counted.exr"]].concat());
+        assert_eq!(channels(&path.join("one.exr")), channels(&path.join("counted.exr")));
+    }
+    refused(path, 2, &["--time", "0s"], "expected a time above 0");
+    refused(path, 2, &["--time", "30"], "expected a number with a unit");
+    refused(path, 2, &["--time", "1s", "--spp", "4"], "--spp");
+}
+
 #[test]
 fn curves_change_what_is_shown_and_not_what_is() {
     let directory = TempDir::new().unwrap();
@@ -59,7 +82,7 @@ fn curves_change_what_is_shown_and_not_what_is() {
         render(path, &["-o", &format!("{curve}.exr"), "--tonemap", curve]);
     }
     render(path, &["-o", "default.png"]);
-    let read = |name: &str| fs::read(path.join(name)).unwrap();
+    let read = |name: &str| support::command::pixels(&path.join(name));
     assert!(read("default.png") == read("linear.png"));
     assert!(read("agx.png") != read("linear.png") && read("agx.png") != read("aces.png"));
     assert!(read("agx.exr") == read("linear.exr") && read("aces.exr") == read("linear.exr"));
@@ -172,6 +195,29 @@ const PATH: &str = "
     eye = [1, 3, 9]
     target = [0, 2.75, 0]
 ";
+
+/// Only the pictures that are missing are rendered, and files that exist stay as they are.
+#[test]
+fn existing_pictures_are_left_out() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    fs::write(path.join("path.toml"), PATH).unwrap();
+    fs::write(path.join("f.1.png"), "old").unwrap();
+    let film = ["--path", "path.toml", "-o", "f.#.png", "--skip-existing"];
+    let output = render(path, &film);
+    assert!(stderr(&output).contains("note: 1 picture exists already\n"), "{}", stderr(&output));
+    assert_eq!(names(path), ["f.0.png", "f.1.png", "f.2.png", "path.toml"]);
+    assert_eq!(fs::read(path.join("f.1.png")).unwrap(), b"old");
+    // Nothing is left to do, so the scene is not even loaded.
+    let none = ["render", "none.toml", "--cpu", "--skip-existing", "-o"];
+    succeed(path, &[&none[..], &["f.1.png"]].concat());
+    let output = succeed(path, &[&none[..], &["f.#.png", "--path", "path.toml"]].concat());
+    assert!(stderr(&output).contains("note: 3 pictures exist already\n") && output.stdout.is_empty());
+    // A picture without its layers is not complete.
+    fail(path, &[&none[..], &["f.1.png", "--aov", "depth"]].concat(), 3, "none.toml");
+    render(path, &["--path", "path.toml", "--frames", "0-2x2", "-o", "g.#.png"]);
+    assert_eq!(names(path), ["f.0.png", "f.1.png", "f.2.png", "g.0.png", "g.2.png", "path.toml"]);
+}
 
 #[test]
 fn a_path_makes_a_picture_a_frame() {

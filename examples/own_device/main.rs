@@ -13,7 +13,7 @@ use std::{env, error::Error, path::PathBuf};
 use ash::vk;
 use kdray::{
     engine::{Built, Engine, choices::Workload},
-    frame::RenderOptions,
+    frame::{Goal, RenderOptions},
     gpu::{Context, GivenImage, TimelinePoint},
     scene::Scene,
 };
@@ -71,7 +71,7 @@ unsafe fn render(
     let Built { world, .. } = engine.build(scene, &workload)?;
     let options = engine.methods(&world, &workload)?.apply(options);
     let mut renderer = engine.renderer(&world, &options)?;
-    renderer.draw(&world.scene().camera, 1, || ())?;
+    renderer.draw(&world.scene().camera, Goal::Samples(1), || ())?;
     renderer.copy_picture_to(&image, Some(cleared), Some(written))?;
     Ok(())
 }

@@ -25,11 +25,12 @@ const float DEVIATIONS = 8.0;
 const float DEVIATIONS_POWER = -0.4;
 // The factor on these deviations for perfectly glossy surfaces. What they reflect differs from pixel to pixel.
 const float GLOSSY_DEVIATIONS = 0.25;
-// The variance of another pixel counts up to this multiple of the pixel's own, which is 1 for perfectly glossy
+// The variance of another pixel counts up to this multiple of the pixel's own. The multiple is 1 for perfectly glossy
 // surfaces.
 const float MOST_OF_OTHER = 4.0;
-// A luminance that is less than any noise of interest. It keeps quotients finite where there is no noise at all.
-const float LEAST_DEVIATION = 1.0e-8;
+// A variance that is less than any noise of interest. It keeps quotients finite where there is no noise at all, and
+// drivers' square roots away from numbers that are not normalized.
+const float LEAST_VARIANCE = 1.0e-16;
 // The weights of the five pixels in a row: a B-spline.
 const float SPLINE[3] = float[3](0.375, 0.25, 0.0625);
 
@@ -74,13 +75,14 @@ vec4 mean_around(ivec2 pixel, Guide guide, vec4 light) {
             if (!is_in_window(other)) continue;
             vec4 found = pixel_filtered[source_begin() + index_of(other)];
             float weight = SPLINE[abs(x)] * SPLINE[abs(y)] * surface_weight(guide, pixel_guides[index_of(other)]);
-            float tolerance = deviations * sqrt(variance + min(most, found.w)) + LEAST_DEVIATION;
+            float tolerance = deviations * sqrt(variance + min(most, found.w) + LEAST_VARIANCE);
             weight *= exp(-abs(luminance_of(found.xyz) - luminance) / tolerance);
             weights += weight;
             sum += vec4(weight * found.xyz, weight * weight * found.w);
         }
     }
-    return weights > 0.0 ? sum / vec4(vec3(weights), weights * weights) : light;
+    // The square of a small weight can be 0.
+    return weights > 0.0 ? vec4(sum.xyz, sum.w / weights) / weights : light;
 }
 
 void main() {

@@ -30,5 +30,5 @@ void main() {
     }
     pixel_accumulated[n_sums * stride + pixel_ix] = sum;
     for (; n_sums > 0u; --n_sums) sum = pixel_accumulated[(n_sums - 1u) * stride + pixel_ix] + sum;
-    pixel_radiance[pixel_ix] = sum / float(frame.n_samples);
+    pixel_radiance[pixel_ix] = sum * frame.samples_reciprocal;
 }

@@ -664,6 +664,7 @@ struct Hit {
 //   the most light that a path adds to its pixel after its first hit, in any colour (radiance; infinity: any amount).
 //   `aperture`: radius of the lens (world units; 0: everything is sharp). `focus`: distance of what is sharp from the
 //   eye, along `forward` (world units). `focuses_on_target`: 1 if that is the distance of the camera's target.
+//   `samples_reciprocal`: 1 / `n_samples`. The host divides, because devices round quotients in different ways.
 struct Frame {
     mat4 clip_from_world;
     vec3 eye;
@@ -699,7 +700,7 @@ struct Frame {
     float focus;
     uint focuses_on_target;
     uint range_begin;
-    uint reserved0;
+    float samples_reciprocal;
 };
 
 // The rays of one bounce of one batch, 80 bytes. The host writes the row of a batch's first bounce, and in all rows

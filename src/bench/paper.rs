@@ -14,7 +14,7 @@ use crate::{
     accel::kdtree::Traversal,
     cpu,
     engine::choices::{Request, primary_by_rule},
-    frame::{BounceStats, Profile, RenderOptions},
+    frame::{BounceStats, Goal, Profile, RenderOptions},
     gpu::{Context, GpuError},
     render::BandedRenderer,
     world::{FlatScene, World},
@@ -71,7 +71,7 @@ pub fn draw_on_gpu(
     let primary = primary_by_rule(Some(context), scene.triangles.len(), (options.width, options.height));
     let options = &RenderOptions { primary, ..options.clone() };
     let mut renderer = BandedRenderer::new(Arc::clone(context), world, options)?;
-    let mut draw = || renderer.draw(1, || ()).map(|drawn| drawn.profile);
+    let mut draw = || renderer.draw(Goal::Samples(1), &mut || ()).map(|drawn| drawn.profile);
     warm_up(|| draw().map(drop))?;
     (0..n_frames).map(|_| draw()).collect()
 }

@@ -66,6 +66,7 @@ pub fn knot(n_triangles: u32) -> Scene {
         ground: None,
         background: Vec3::ZERO,
         environment: None,
+        sky: None,
         defaults: RenderDefaults::default(),
     }
 }

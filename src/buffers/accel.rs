@@ -50,6 +50,8 @@ pub struct AccelBuffers {
     pub stalls: Stalls,
     access: SceneAccess,
     structure: Structure,
+    /// Whether `arrays` have the emitters, which only paths read.
+    has_emitters: bool,
     /// Whether rays pass through some of the triangles.
     filters: bool,
     surface_kinds: SurfaceKinds,
@@ -79,7 +81,26 @@ impl AccelBuffers {
         made.add_materials(context, &scene.triangle_materials)?;
         made.add_words(context, &words)?;
         made.surface_kinds = SurfaceKinds::of(scene);
+        made.has_emitters = of_paths;
         Ok(made)
+    }
+
+    /// Returns buffers of the same scene for the other integrator. They share all arrays that serve both.
+    ///
+    /// # Errors
+    /// A buffer is beyond the device's limits, or memory runs out.
+    pub(super) fn for_integrator(
+        &self,
+        context: &Arc<Context>,
+        world: &World,
+        of_paths: bool,
+    ) -> Result<Self, GpuError> {
+        let mut next = self.clone();
+        if of_paths && !self.has_emitters {
+            next.add_words(context, &TextureWords::new(&world.scene().textures, world.emitters()))?;
+            next.has_emitters = true;
+        }
+        Ok(next)
     }
 
     /// Uploads triangles and their structure. `n_texture_words`: the length that `texture_words` will have.
@@ -188,6 +209,7 @@ impl AccelBuffers {
             arrays,
             stalls: Stalls::new(context)?,
             access,
+            has_emitters: false,
             filters: false,
             surface_kinds: SurfaceKinds::default(),
             structure,

@@ -8,7 +8,7 @@ use super::{
     vertex_indices::{has_indices, vertex_indices},
 };
 use crate::{
-    accel::Accel,
+    accel::{Accel, kdtree::Traversal},
     frame::{Integrator, RenderOptions},
     gpu::{Access, Binding, BindingLayout, BindingSet, Buffer, BufferUse, Commands, Context, Dispatch, GpuError},
     layout::{self, Batch, Bounce, COUNTER_COPIES, COUNTER_STRIDE, Counters, Frame, Light, Material},
@@ -101,12 +101,37 @@ impl Resources {
     /// # Errors
     /// There are too many triangles for brute force, a buffer is beyond the device's limits, or memory runs out.
     pub fn new(context: &Arc<Context>, world: &World, needs: &Needs) -> Result<Self, GpuError> {
+        let is_of_paths = needs.options.integrator == Integrator::Path;
+        let mut accel = AccelBuffers::of_world(context, world, is_of_paths)?;
+        accel.add_links(context, world.accel(), needs.options.traversal)?;
+        Self::with_accel(context, world, needs, accel)
+    }
+
+    /// Makes the buffers and images of a frame of the same scene by another integrator. The scene's arrays are shared.
+    /// `traversal`: that of these resources. `world`: that of these resources.
+    ///
+    /// # Errors
+    /// Fails as [`Resources::new`] does.
+    pub fn for_integrator(
+        &self,
+        context: &Arc<Context>,
+        (world, traversal): (&World, Traversal),
+        needs: &Needs,
+    ) -> Result<Self, GpuError> {
+        let is_of_paths = needs.options.integrator == Integrator::Path;
+        let mut accel = self.accel.for_integrator(context, world, is_of_paths)?;
+        if needs.options.traversal != traversal {
+            accel.add_links(context, world.accel(), needs.options.traversal)?;
+        }
+        Self::with_accel(context, world, needs, accel)
+    }
+
+    /// Makes the buffers and images that a frame needs beside the scene's arrays.
+    fn with_accel(context: &Arc<Context>, world: &World, needs: &Needs, accel: AccelBuffers) -> Result<Self, GpuError> {
         let scene = world.scene();
         let storage = BufferUse::Storage;
         let &Needs { constants, options, n_bounces } = needs;
         let is_of_paths = options.integrator == Integrator::Path;
-        let mut accel = AccelBuffers::of_world(context, world, is_of_paths)?;
-        accel.add_links(context, world.accel(), options.traversal)?;
         let more = if is_of_paths { &BINDINGS_OF_PATHS[..] } else { &BINDINGS_OF_WHITTED };
         let own = OWN_BINDINGS.iter().chain(more).copied();
         let kinds: Vec<_> = own.chain(accel::bindings()).map(binding).collect();

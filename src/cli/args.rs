@@ -1,14 +1,13 @@
 //! The arguments of the subcommands, and the defaults of those that are left out.
 
-use std::{path::PathBuf, str::FromStr};
+use std::{path::PathBuf, str::FromStr, time::Duration};
 
 use clap::{Parser, Subcommand, value_parser};
 use kdray::{
     accel::{AccelKind, Query, kdtree::Traversal},
     engine::choices::{BuildPolicy, Request},
-    frame::{Aov, Crop, Denoise, Integrator, RenderOptions},
+    frame::{Aov, Crop, Denoise, Integrator, RenderOptions, SampleRange},
     gpu::DeviceSelector,
-    layout::MOST_SAMPLES_LOG2,
     scene::Scene,
 };
 
@@ -32,9 +31,8 @@ const AOV: &str = "Layers of each pixel to write into an .exr, separated by comm
 /// Ray tracing by depth-first kd-tree traversal, in Vulkan compute.
 #[derive(Parser)]
 #[command(name = "kdray", version, arg_required_else_help = false)]
-#[command(
-    after_help = "Exit codes: 0 success, 2 usage, 3 scene or rays, 4 device, 5 output, 128 + n ended by signal n."
-)]
+#[command(after_help = "Exit codes: 0 success, 2 usage, 3 scene, rays or parts, 4 device, 5 output, 128 + n ended by \
+                  signal n.")]
 pub struct Args {
     #[command(subcommand)]
     pub command: Command,
@@ -49,6 +47,8 @@ pub enum Command {
     View(ViewArgs),
     /// Cast rays from a file into a scene or mesh, and write their hits
     Cast(CastArgs),
+    /// Join the parts of a picture that were rendered with --crop, --tile or --samples
+    Merge(MergeArgs),
     /// List the Vulkan devices
     Devices,
     /// Describe a scene and its acceleration structure
@@ -72,21 +72,33 @@ pub struct RenderArgs {
     /// Move the camera along the keyframes of this TOML file, and write one picture per frame
     #[arg(long, value_name = "FILE", conflicts_with = "repeat")]
     pub path: Option<PathBuf>,
-    /// Frames of the path to render, both ends included, for example 0-99 or 7 [default: from the first keyframe to
-    /// the last]
-    #[arg(long, value_name = "A-B", requires = "path")]
+    /// Frames of the path to render, both ends included, for example 0-99, 7, or 0-99x4 for every fourth [default: from
+    /// the first keyframe to the last]
+    #[arg(long, value_name = "A-BxS", requires = "path")]
     pub frames: Option<Frames>,
+    /// Leave out pictures whose files exist already, whatever they show, so that a film that was interrupted goes on
+    /// where it ended
+    #[arg(long, conflicts_with_all = ["repeat", "profile", "trace"])]
+    pub skip_existing: bool,
     /// Render only the pixels x0 <= x < x1, y0 <= y < y1, counted from the picture's upper left corner
     #[arg(long, value_name = "x0,y0,x1,y1")]
     pub crop: Option<Crop>,
+    /// Render only the tile I of N, for example 1/4: N tiles of rows make up the picture, and the first is tile 1
+    #[arg(long, value_name = "I/N", conflicts_with = "crop")]
+    pub tile: Option<Tile>,
     /// Samples per pixel, 1 to 65536: the first sample is at the pixel's centre, further ones smooth edges [default:
     /// the scene file's, else 1; 4 for a mesh file; 1 with --trace]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=65_536))]
     pub spp: Option<u32>,
-    /// The samples of each pixel to render, of which the first is 0 and the last is not included, for example 0-64 or
-    /// 64-128, both multiples of 16; the picture is their mean, and the mean of the pictures of several ranges of one
-    /// length is that of all their samples; for --integrator path [default: 0 to the number of samples]
-    #[arg(long, value_name = "A-B", conflicts_with_all = ["spp", "trace"])]
+    /// Draw as many samples of each pixel as fit into this time, at least one, for example 30s or 5m; loading and
+    /// building do not count
+    #[arg(long, value_name = "TIME", value_parser = time)]
+    #[arg(conflicts_with_all = ["spp", "samples", "repeat", "trace", "path", "tile"])]
+    pub time: Option<Duration>,
+    /// Render only some of the samples of each pixel to an .exr file, from A on up to but without B, for example 0-32;
+    /// both are multiples of 16, or B is the number of all samples; `kdray merge` joins such files; for --integrator
+    /// path, without a noise filter
+    #[arg(long, value_name = "A-B", conflicts_with_all = ["trace", "repeat"])]
     pub samples: Option<SampleRange>,
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     #[arg(help = with_words(AOV, None, &Aov::words()), long_help = listed(AOV, "none", &Aov::descriptions()))]
@@ -209,6 +221,19 @@ pub struct ConvertArgs {
     pub quiet: bool,
 }
 
+#[derive(clap::Args)]
+pub struct MergeArgs {
+    /// Parts of one picture, in any order: .exr files that `kdray render` wrote
+    #[arg(required = true, value_name = "PART")]
+    pub parts: Vec<PathBuf>,
+    /// Picture to write: .png, or .exr for linear radiance
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Print errors only
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
 impl RenderArgs {
     /// Refuses arguments that contradict each other.
     pub fn check(&self) -> Result<(), CliError> {
@@ -218,16 +243,45 @@ impl RenderArgs {
                 "--trace cannot be combined with --spp or --path: it shows a single sample".into(),
             ));
         }
+        let is_exr = |path: &PathBuf| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("exr"));
+        if self.samples.is_some() && !self.output.as_ref().is_some_and(is_exr) {
+            return Err(CliError::Usage("--samples needs --output FILE.exr: `kdray merge` joins .exr files".into()));
+        }
         Ok(())
     }
 
-    /// Returns the number of samples per pixel: the user's, else the scene's.
+    /// Returns the number of samples per pixel of the whole picture: the user's, else the scene's.
     pub fn samples(&self, scene: &Scene) -> u32 {
-        if let Some(SampleRange { first, end }) = self.samples {
-            return end - first;
-        }
         let defaults = scene.defaults.for_integrator(self.picture.integrator);
         self.spp.unwrap_or(if self.trace.is_some() { 1 } else { defaults.samples })
+    }
+
+    /// Returns the samples to render if they are not all samples of the picture. Refuses samples that the picture does
+    /// not have, and pictures whose samples cannot be joined.
+    pub fn some_samples(&self, scene: &Scene, options: &RenderOptions) -> Result<Option<SampleRange>, CliError> {
+        let Some(range) = self.samples else { return Ok(None) };
+        if options.integrator != Integrator::Path {
+            return Err(CliError::Usage(
+                "--samples needs --integrator path: only the path tracer's samples can be joined".into(),
+            ));
+        }
+        if options.denoise != Denoise::Off {
+            return Err(CliError::Usage(
+                "--samples needs --denoise off: the noise filter would mix pixels before all samples are joined".into(),
+            ));
+        }
+        let n_samples = self.samples(scene);
+        if range.end > n_samples {
+            return Err(CliError::Usage(format!(
+                "--samples {range} reaches beyond the picture's {n_samples} samples, whose number --spp sets"
+            )));
+        }
+        if !range.is_part_of(n_samples) {
+            return Err(CliError::Usage(format!(
+                "--samples {range}: both numbers must be multiples of 16, or the second one the picture's {n_samples}"
+            )));
+        }
+        Ok((range != SampleRange::whole(n_samples)).then_some(range))
     }
 
     /// Returns the render options: the user's, and the scene's own where the user gave none. Refuses a crop beyond
@@ -235,19 +289,14 @@ impl RenderArgs {
     pub fn options(&self, scene: &Scene) -> Result<RenderOptions, CliError> {
         let options = self.picture.options(&scene.defaults);
         let RenderOptions { width, height, .. } = options;
-        if let Some(crop) = self.crop.filter(|crop| crop.x1 > width || crop.y1 > height) {
+        let crop = match self.tile {
+            Some(tile) => Some(tile.crop(width, height)?),
+            None => self.crop,
+        };
+        if let Some(crop) = crop.filter(|crop| crop.x1 > width || crop.y1 > height) {
             return Err(CliError::Usage(format!(
                 "--crop {crop} reaches beyond the picture of {width}x{height} pixels"
             )));
-        }
-        let mut paths = options.paths;
-        if let Some(SampleRange { first, .. }) = self.samples {
-            if options.integrator != Integrator::Path {
-                return Err(CliError::Usage(
-                    "--samples needs --integrator path: whitted's samples are no ranges that can be joined".into(),
-                ));
-            }
-            paths.first_sample = first;
         }
         if options.denoise == Denoise::Edge && options.integrator != Integrator::Path {
             return Err(CliError::Usage(
@@ -259,7 +308,7 @@ impl RenderArgs {
         }
         // Passes are timed only if some output shows the times.
         let profile = !self.quiet || self.profile.is_some() || self.trace.is_some();
-        Ok(RenderOptions { crop: self.crop, features: !self.aov.is_empty(), profile, paths, ..options })
+        Ok(RenderOptions { crop, features: !self.aov.is_empty(), profile, ..options })
     }
 }
 
@@ -313,6 +362,8 @@ impl FromStr for Size {
 pub struct Frames {
     pub first: u32,
     pub last: u32,
+    /// Distance between the frames that are rendered, at least 1.
+    pub step: u32,
 }
 
 impl FromStr for Frames {
@@ -320,34 +371,59 @@ impl FromStr for Frames {
 
     fn from_str(word: &str) -> Result<Self, Self::Err> {
         let number = |digits: &str| digits.parse().ok().filter(|frame| *frame <= 1_000_000);
-        let (first, last) = word.split_once('-').unwrap_or((word, word));
-        match (number(first), number(last)) {
-            (Some(first), Some(last)) if first <= last => Ok(Self { first, last }),
-            (Some(_), Some(_)) => Err("the first frame comes after the last"),
-            _ => Err("expected A-B or A, whole numbers up to 1000000"),
+        let (ends, step) = word.split_once('x').unwrap_or((word, "1"));
+        let (first, last) = ends.split_once('-').unwrap_or((ends, ends));
+        match (number(first), number(last), number(step)) {
+            (Some(first), Some(last), Some(step)) if first <= last && step > 0 => Ok(Self { first, last, step }),
+            (Some(first), Some(last), Some(_)) if first > last => Err("the first frame comes after the last"),
+            _ => Err("expected A, A-B or A-BxS, whole numbers up to 1000000, S above 0"),
         }
     }
 }
 
-/// Range of samples; the end is not included. Both are multiples of the samples that a frame of paths draws.
+/// A tile of a picture: the rows of one of `n` parts of about the same height.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SampleRange {
-    pub first: u32,
-    pub end: u32,
+pub struct Tile {
+    /// Index of the tile from 0 on.
+    pub ix: u32,
+    /// Number of tiles.
+    pub n: u32,
 }
 
-impl FromStr for SampleRange {
-    type Err = String;
+impl Tile {
+    /// Returns the tile's pixels in a picture of this size. Refuses more tiles than the picture has rows.
+    fn crop(self, width: u32, height: u32) -> Result<Crop, CliError> {
+        let Self { ix, n } = self;
+        if n > height {
+            return Err(CliError::Usage(format!(
+                "--tile {}/{n}: the picture has {height} rows, fewer than tiles",
+                ix + 1
+            )));
+        }
+        let row = |ix: u32| (u64::from(ix) * u64::from(height) / u64::from(n)) as u32;
+        Ok(Crop { x0: 0, y0: row(ix), x1: width, y1: row(ix + 1) })
+    }
+}
+
+impl FromStr for Tile {
+    type Err = &'static str;
 
     fn from_str(word: &str) -> Result<Self, Self::Err> {
-        let size = 1 << MOST_SAMPLES_LOG2;
-        let number = |digits: &str| digits.parse().ok().filter(|n: &u32| *n <= 1 << 24 && n.is_multiple_of(size));
-        let ends = word.split_once('-').and_then(|(first, end)| Some((number(first)?, number(end)?)));
-        match ends {
-            Some((first, end)) if first < end => Ok(Self { first, end }),
-            Some(_) => Err("the range is empty".to_owned()),
-            None => Err(format!("expected A-B, multiples of {size} up to {}", 1 << 24)),
+        let numbers = word.split_once('/').and_then(|(ix, n)| Some((ix.parse().ok()?, n.parse().ok()?)));
+        match numbers {
+            Some((ix, n)) if (1..=n).contains(&ix) => Ok(Self { ix: ix - 1, n }),
+            _ => Err("expected I/N, where I is 1 to N"),
         }
+    }
+}
+
+/// Parses a time above 0, such as `30s` or `1m 30s`.
+fn time(word: &str) -> Result<Duration, String> {
+    match humantime::parse_duration(word) {
+        Ok(Duration::ZERO) => Err("expected a time above 0".to_owned()),
+        Ok(time) if time > Duration::from_secs(30 * 24 * 3600) => Err("expected at most 30 days".to_owned()),
+        Ok(time) => Ok(time),
+        Err(_) => Err("expected a number with a unit, such as 30s, 5m or 1h".to_owned()),
     }
 }
 
@@ -380,18 +456,12 @@ mod tests {
     }
 
     #[test]
-    fn sample_ranges() {
-        assert_eq!("16-64".parse(), Ok(SampleRange { first: 16, end: 64 }));
-        for word in ["", "-", "16", "0-0", "32-16", "0-15", "8-16", "-16-32", "0-16777232", "a-b"] {
-            assert!(word.parse::<SampleRange>().is_err(), "{word}");
-        }
-    }
-
-    #[test]
     fn frames() {
-        assert_eq!("3-17".parse(), Ok(Frames { first: 3, last: 17 }));
-        assert_eq!("0".parse(), Ok(Frames { first: 0, last: 0 }));
-        for word in ["", "-", "3-", "-3", "4-3", "1-2-3", "1.5-2", "0-1000001", "a-b"] {
+        assert_eq!("3-17".parse(), Ok(Frames { first: 3, last: 17, step: 1 }));
+        assert_eq!("0".parse(), Ok(Frames { first: 0, last: 0, step: 1 }));
+        assert_eq!("0-9x4".parse(), Ok(Frames { first: 0, last: 9, step: 4 }));
+        for word in ["", "0-9x0", "0-9x", "x2", "0-9x1x1", "-", "3-", "-3", "4-3", "1-2-3", "1.5-2", "0-1000001", "a-b"]
+        {
             assert!(word.parse::<Frames>().is_err(), "{word}");
         }
     }

@@ -3,8 +3,8 @@
 use std::io;
 
 use kdray::{
-    cast::RayFileError, gpu::GpuError, output::OutputError, scene::SceneError, util::memory::OutOfMemory,
-    view::ViewError,
+    cast::RayFileError, gpu::GpuError, merge::MergeError, output::OutputError, scene::SceneError,
+    util::memory::OutOfMemory, view::ViewError,
 };
 
 /// The reason why a command failed. It displays as one line.
@@ -16,6 +16,8 @@ pub enum CliError {
     Scene(#[from] SceneError),
     #[error(transparent)]
     Rays(#[from] RayFileError),
+    #[error(transparent)]
+    Merge(#[from] MergeError),
     #[error(transparent)]
     Device(#[from] GpuError),
     #[error(transparent)]
@@ -35,12 +37,12 @@ pub enum CliError {
 }
 
 impl CliError {
-    /// Returns the exit code: 2 for usage; 3 for scene or rays, also if they need more memory than there is; 4 for
-    /// the device; 5 for output.
+    /// Returns the exit code: 2 for usage; 3 for scene, rays or parts, also if they need more memory than there is; 4
+    /// for the device; 5 for output.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) | Self::Output(OutputError::UnknownEnding { .. }) => 2,
-            Self::Scene(_) | Self::Rays(_) | Self::Memory(_) => 3,
+            Self::Scene(_) | Self::Rays(_) | Self::Merge(_) | Self::Memory(_) => 3,
             Self::Device(_) | Self::DeviceMemory(_) | Self::Window(_) | Self::Validation(_) | Self::WrongHits(_) => 4,
             Self::Output(_) | Self::Stdout(_) => 5,
         }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use glam::Vec3;
-use kdray::scene::{LightChoice, Look, MaterialChoice, Preset, Scene, Up};
+use kdray::scene::{LightChoice, Look, MaterialChoice, Preset, Scene, Sky, SkyChoice, Up};
 
 use super::{
     or_auto::OrAuto,
@@ -32,6 +32,12 @@ pub struct LookArgs {
     /// Replace all lights by one directional light that travels along this vector, or by none; ambient light stays
     #[arg(long, value_name = "X,Y,Z|none", allow_hyphen_values = true, value_parser = light)]
     pub light: Option<LightChoice>,
+    /// Replace all light by a sky whose sun is ELEVATION degrees above the horizon, for --integrator path. AZIMUTH is
+    /// clockwise from -z, or from +y if +z points up [default: over the viewer's left shoulder]. TURBIDITY is the
+    /// haziness of the air, 2 to 10 [default: 3]
+    #[arg(long, value_name = "ELEVATION[,AZIMUTH[,TURBIDITY]]", allow_hyphen_values = true, value_parser = sky)]
+    #[arg(conflicts_with_all = ["light", "background"])]
+    pub sky: Option<SkyChoice>,
     #[arg(long = "material", value_name = "[NAME=]PRESET", help = MATERIAL, long_help = material_long_help())]
     pub materials: Vec<MaterialChoice>,
     /// Background, linear red, green and blue, each at least 0 [default: the scene's]
@@ -42,9 +48,9 @@ pub struct LookArgs {
 impl LookArgs {
     /// Returns the user's choices.
     pub fn look(&self) -> Look {
-        let &Self { up, eye, target, fov, light, background, ref materials } = self;
+        let &Self { up, eye, target, fov, light, sky, background, ref materials } = self;
         let materials = materials.clone();
-        Look { up: up.pinned(), eye, target, vertical_fov_degrees: fov, light, background, materials }
+        Look { up: up.pinned(), eye, target, vertical_fov_degrees: fov, light, sky, background, materials }
     }
 
     /// Returns a note that says which axis of an STL file points up, if the user has not stated it.
@@ -98,6 +104,18 @@ fn light(word: &str) -> Result<LightChoice, String> {
     }
 }
 
+/// Parses the place of the sun and the turbidity.
+fn sky(word: &str) -> Result<SkyChoice, String> {
+    let expected =
+        "expected an elevation, or up to three numbers with commas between them: elevation, azimuth, turbidity";
+    let numbers: Option<Vec<f32>> = word.split(',').map(|number| number.trim().parse().ok()).collect();
+    let numbers = numbers.filter(|numbers| numbers.len() <= 3).ok_or(expected)?;
+    let (azimuth, turbidity) = (numbers.get(1).copied(), numbers.get(2).copied().unwrap_or(Sky::TURBIDITY));
+    // The sky of these numbers is made later, for the axis that points up.
+    Sky::new([numbers[0], azimuth.unwrap_or(0.0)], Up::Y)?.with_turbidity(turbidity)?;
+    Ok(SkyChoice { elevation: numbers[0], azimuth, turbidity })
+}
+
 fn colour(word: &str) -> Result<Vec3, String> {
     vector(word).and_then(|colour| match colour.min_element() >= 0.0 {
         true => Ok(colour),
@@ -118,6 +136,13 @@ mod tests {
         assert_eq!(light("none"), Ok(LightChoice::None));
         assert_eq!(light("0,-1,0"), Ok(LightChoice::Along(Vec3::NEG_Y)));
         assert!(light("0,0,0").is_err() && light("None").is_err());
+        let choice = |azimuth, turbidity| Ok(SkyChoice { elevation: 40.0, azimuth, turbidity });
+        assert_eq!(sky("40"), choice(None, 3.0));
+        assert_eq!(sky("40,-120"), choice(Some(-120.0), 3.0));
+        assert_eq!(sky("40, 120, 6"), choice(Some(120.0), 6.0));
+        for word in ["", "x", "40,", "1,2,3,4", "-1", "91", "nan", "40,inf", "40,0,1.9", "40,0,10.1"] {
+            assert!(sky(word).is_err(), "{word}");
+        }
         assert!(colour("0,0,0").is_ok() && colour("0,-0.1,0").is_err());
         assert!(fov("0.1").is_ok() && fov("171").is_err() && fov("nan").is_err());
     }

@@ -16,6 +16,7 @@ mod inspect;
 mod load_args;
 mod log;
 mod look_args;
+mod merge;
 mod or_auto;
 mod picture_args;
 mod progress;
@@ -72,6 +73,7 @@ fn run(args: Args) -> Result<(), CliError> {
         #[cfg(feature = "view")]
         Command::View(args) => view::run(&args),
         Command::Cast(args) => cast::run(&args),
+        Command::Merge(args) => merge::run(&args),
         Command::Devices => devices::run(),
         Command::Inspect(args) => inspect::run(&args),
         Command::Convert(args) => convert::run(&args),

@@ -85,7 +85,7 @@ pub fn listed(what: &str, default: &str, descriptions: &str) -> String {
 
 const INTEGRATOR: &str = "How light is computed";
 const INTEGRATOR_DEFAULT: &str =
-    "the scene's; if its file states none, path if surfaces or an environment give off light, else whitted";
+    "the scene's; if its file states none, path if surfaces, an environment or a sky give off light, else whitted";
 const FILTER: &str = "How samples are spread around the centre of their pixel, for --integrator path";
 const TONEMAP: &str = "Tone curve from radiance to what a display shows";
 const ACCEL: &str = "Acceleration structure that leads rays to triangles";

@@ -144,6 +144,8 @@ pub struct StepProgress<'a> {
     message: String,
     n_done: u32,
     n_steps: u32,
+    /// Time after which the stage ends, if it has no number of steps.
+    ends_after: Option<Duration>,
     /// Finished share of the current step, 0 to 1.
     part: f32,
     /// Whether the user sees progress within a step.
@@ -164,12 +166,18 @@ impl Progress {
             message,
             n_done: 0,
             n_steps,
+            ends_after: None,
             part: 0.0,
             shows_parts,
             begin,
             start,
             last_line: start,
         }
+    }
+
+    /// Returns a counter of steps for a stage that ends after a time.
+    pub fn steps_until(&self, message: &str, time: Duration) -> StepProgress<'_> {
+        StepProgress { ends_after: Some(time), ..self.steps(message, u32::MAX) }
     }
 }
 
@@ -209,12 +217,21 @@ impl StepProgress<'_> {
 
     /// Returns the finished share of the stage, 0 to 1.
     fn share(&self) -> f64 {
+        if let Some(time) = self.ends_after {
+            return (self.start.elapsed().as_secs_f64() / time.as_secs_f64()).min(1.0);
+        }
         (f64::from(self.n_done) + f64::from(self.part)) / f64::from(self.n_steps)
     }
 
     fn text(&self) -> String {
-        let left = left_text(time_left(self.start.elapsed(), self.share()));
+        let elapsed = self.start.elapsed();
+        let left = match self.ends_after {
+            Some(time) => time.saturating_sub(elapsed),
+            None => time_left(elapsed, self.share()),
+        };
+        let left = left_text(left);
         let done = match self.n_steps {
+            _ if self.ends_after.is_some() => format!("{} samples", self.n_done),
             1 => format!("{:.0} %", 100.0 * self.share()),
             n_steps => format!("{} of {n_steps}", self.n_done),
         };
@@ -254,6 +271,9 @@ mod tests {
         let mut steps = progress.steps("rendering", 3);
         steps.step();
         assert!(steps.text().starts_with("rendering: 1 of 3, ") && steps.text().ends_with(" left"), "{}", steps.text());
+        let mut steps = progress.steps_until("rendering", Duration::from_secs(1000));
+        steps.step();
+        assert_eq!(steps.text(), "rendering: 1 samples, 17 min left");
     }
 
     #[test]

@@ -45,7 +45,15 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
     let processor = loaded.load_options.processor;
     let max_samples = n_samples(args, tour.is_some());
     let vsync = args.vsync == Switch::On;
-    let settings = Settings { options, max_samples, budget_ms: args.budget_ms, vsync, view: View::Picture, gain: 1.0 };
+    let settings = Settings {
+        options,
+        in_motion: args.in_motion,
+        max_samples,
+        budget_ms: args.budget_ms,
+        vsync,
+        view: View::Picture,
+        gain: 1.0,
+    };
     let scene_name = loaded.scene().name.clone();
     let report = display.view(
         loaded,

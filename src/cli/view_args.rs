@@ -3,14 +3,16 @@
 use std::path::PathBuf;
 
 use clap::{ValueEnum, value_parser};
-use kdray::gpu::DeviceSelector;
+use kdray::{gpu::DeviceSelector, view::InMotion};
 
 use super::{
     args::device,
     load_args::LoadArgs,
     look_args::LookArgs,
-    picture_args::{PictureArgs, positive},
+    picture_args::{PictureArgs, listed, positive, with_words},
 };
+
+const IN_MOTION: &str = "Picture while the camera moves, for --integrator path";
 
 #[derive(clap::Args)]
 #[group(skip)]
@@ -28,6 +30,10 @@ pub struct ViewArgs {
     /// Samples per pixel while the camera rests, 1 to 65536 [default: 256; 1 with --frames or --path]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=65_536))]
     pub spp: Option<u32>,
+    #[arg(long, value_name = "PICTURE", default_value = "whitted", hide_default_value = true)]
+    #[arg(help = with_words(IN_MOTION, Some("whitted"), &InMotion::words()))]
+    #[arg(long_help = listed(IN_MOTION, "whitted", &InMotion::descriptions()))]
+    pub in_motion: InMotion,
     /// Time budget per frame while the camera moves, in milliseconds; the picture is drawn at a lower resolution to
     /// keep within it
     #[arg(long, value_name = "MS", default_value_t = 16.0, value_parser = milliseconds)]

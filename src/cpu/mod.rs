@@ -34,9 +34,19 @@ pub use self::{
     trace::{cast, shadow, trace, visibility},
 };
 use crate::{
-    frame::{Picture, Profile, RenderOptions},
+    frame::{Picture, Profile, RenderOptions, Tonemap},
+    layout::Frame,
+    reference,
     world::World,
 };
+
+/// Returns what a display shows of a picture's radiance: sRGB-encoded RGBA pixels. Kernels may round a few of them to
+/// the next value.
+pub fn display(radiance: &[[f32; 4]], exposure: f32, tonemap: Tonemap) -> Vec<[u8; 4]> {
+    let mut display = vec![[0; 4]; radiance.len()];
+    reference::tonemap::tonemap(&Frame { exposure, ..Frame::default() }, tonemap, radiance, &mut display);
+    display
+}
 
 /// Renders a frame of one sample a pixel on the current rayon pool.
 pub fn render(world: &World, options: &RenderOptions) -> (Picture, Profile) {

@@ -178,6 +178,14 @@ impl Renderer {
         self.n_samples
     }
 
+    /// Sets the index of the picture's first sample, a multiple of `2^MOST_SAMPLES_LOG2`. Only frames of paths know it.
+    /// The next sample is the first of a new picture.
+    pub fn set_first_sample(&mut self, first_sample: u32) {
+        self.options.paths.first_sample = first_sample;
+        self.frame.set_options(&self.options);
+        self.reset_samples();
+    }
+
     /// Moves the camera. The next sample is the first of a new picture.
     pub fn set_camera(&mut self, camera: &Camera) {
         self.camera = *camera;

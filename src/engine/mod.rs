@@ -20,7 +20,7 @@ pub use self::{
 use crate::{
     accel::{Query, kdtree::Traversal},
     cast::{Hit, Ray},
-    frame::RenderOptions,
+    frame::{Goal, RenderOptions},
     gpu::{Context, ContextOptions, GpuError},
     scene::Scene,
     util::progress::Progress,
@@ -159,7 +159,7 @@ impl Engine {
         let workload = Workload::of_pictures(options, scene.lights.len(), 1).with_cameras([&scene.camera].into_iter());
         let options = self.methods(world, &workload)?.apply(options);
         let mut renderer = self.renderer(world, &options)?;
-        let drawn = renderer.draw(&scene.camera, 1, || ())?;
+        let drawn = renderer.draw(&scene.camera, Goal::Samples(1), || ())?;
         Ok(Rendered { picture: renderer.picture()?.into_owned(), drawn })
     }
 

@@ -6,7 +6,7 @@ use tracing::info_span;
 
 use crate::{
     cpu::{self, Batching},
-    frame::{Drawn, Integrator, Picture, RenderOptions, Watcher, sampling::samples_log2},
+    frame::{Drawn, Goal, Integrator, Pacer, Picture, RenderOptions, SampleRange, SampleSums, Watcher},
     gpu::{Context, GivenImage, GpuError, TimelinePoint},
     render::BandedRenderer,
     scene::Camera,
@@ -51,20 +51,55 @@ impl Renderer {
         }
     }
 
-    /// Draws what a camera sees with `n_samples` samples per pixel, at least one. The watcher is notified of each
+    /// Draws what a camera sees. The watcher is notified of each
     /// sample of each band. If it uses [`Watcher::part`], it is also notified of the progress within a sample.
     ///
     /// # Errors
     /// A call fails, one pixel alone makes more rays than a queue holds, or memory runs out.
-    pub fn draw(&mut self, camera: &Camera, n_samples: u32, mut watcher: impl Watcher) -> Result<Drawn, GpuError> {
+    pub fn draw(&mut self, camera: &Camera, goal: Goal, mut watcher: impl Watcher) -> Result<Drawn, GpuError> {
+        self.draw_watched(camera, goal, &mut watcher)
+    }
+
+    /// Draws the samples of a range with the path tracer, one aligned block after the other. Returns their sums, from
+    /// which [`SampleSums::mean`] makes the picture. The features are those of the first block, with the noise of all.
+    ///
+    /// # Errors
+    /// Fails as [`Renderer::draw`] does.
+    pub fn draw_range(
+        &mut self,
+        camera: &Camera,
+        samples: SampleRange,
+        mut watcher: impl Watcher,
+    ) -> Result<(Drawn, SampleSums), GpuError> {
+        let (mut drawn, mut sums) = (None::<Drawn>, SampleSums::default());
+        for block in samples.blocks() {
+            match &mut self.0 {
+                Backend::Device(renderer) => renderer.set_first_sample(block.first)?,
+                Backend::Cpu(renderer) => renderer.set_first_sample(block.first),
+            }
+            let next = self.draw_watched(camera, Goal::Samples(block.len()), &mut watcher)?;
+            sums.push_mean(block, &self.picture()?.radiance);
+            match &mut drawn {
+                None => drawn = Some(next),
+                Some(all) => {
+                    all.profile.add(&next.profile);
+                    all.n_samples += next.n_samples;
+                    all.features.iter_mut().zip(&next.features).for_each(|(all, next)| all.join_noise(next));
+                }
+            }
+        }
+        Ok((drawn.unwrap_or_default(), sums))
+    }
+
+    fn draw_watched(&mut self, camera: &Camera, goal: Goal, watcher: &mut impl Watcher) -> Result<Drawn, GpuError> {
         match &mut self.0 {
             Backend::Device(renderer) => {
                 renderer.set_camera(camera);
-                renderer.draw(n_samples, watcher)
+                renderer.draw(goal, watcher)
             }
             Backend::Cpu(renderer) => {
                 renderer.set_camera(camera);
-                Ok(draw_on_cpu(renderer, n_samples, &mut watcher))
+                Ok(draw_on_cpu(renderer, goal, watcher))
             }
         }
     }
@@ -102,23 +137,27 @@ impl Renderer {
     }
 }
 
-fn draw_on_cpu(renderer: &mut cpu::Renderer, n_samples: u32, watcher: &mut impl Watcher) -> Drawn {
-    let mut frame = |renderer: &mut cpu::Renderer| {
-        let n_before = renderer.n_samples();
-        if renderer.options().integrator == Integrator::Path {
-            renderer.set_samples_per_frame(samples_log2(n_before, n_samples));
+fn draw_on_cpu(renderer: &mut cpu::Renderer, goal: Goal, watcher: &mut impl Watcher) -> Drawn {
+    let integrator = renderer.options().integrator;
+    let (mut pacer, mut drawn) = (Pacer::new(goal, integrator), Drawn::default());
+    while let Some(log2) = pacer.next(renderer.n_samples()) {
+        if integrator == Integrator::Path {
+            renderer.set_samples_per_frame(log2);
         }
         let profile = info_span!("render").in_scope(|| renderer.draw_sample_with(|share| watcher.part(share)));
-        (n_before..renderer.n_samples()).for_each(|_| watcher.sample());
-        profile
-    };
-    let mut profile = frame(renderer);
-    let mut features = if renderer.options().features { renderer.features() } else { Vec::new() };
-    while renderer.n_samples() < n_samples {
-        profile.add(&frame(renderer));
+        (drawn.n_samples..renderer.n_samples()).for_each(|_| watcher.sample());
+        if drawn.n_samples > 0 {
+            drawn.profile.add(&profile);
+        } else {
+            drawn.profile = profile;
+            if renderer.options().features {
+                drawn.features = renderer.features();
+            }
+        }
+        drawn.n_samples = renderer.n_samples();
     }
-    if renderer.options().integrator == Integrator::Path {
-        renderer.note_noise(&mut features);
+    if integrator == Integrator::Path {
+        renderer.note_noise(&mut drawn.features);
     }
-    Drawn { features, profile }
+    drawn
 }

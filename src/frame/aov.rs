@@ -1,6 +1,7 @@
 //! AOVs (arbitrary output variables): what a pixel shows and costs, beside its colour. Users see the names of this
 //! file.
 
+use super::variance_of_joined;
 use crate::{layout::Feature, reference::noise};
 
 /// An output variable, in world space and world units.
@@ -66,6 +67,13 @@ impl Feature {
     pub(crate) fn set_noise(&mut self, mean: [f32; 4], n_samples: u32) {
         self.variance = noise::variance_of_mean(mean, n_samples);
         self.n_samples = n_samples;
+    }
+
+    /// Adds the noise of further samples of the pixel.
+    pub(crate) fn join_noise(&mut self, next: &Self) {
+        let ranges = [&*self, next].map(|feature| (feature.n_samples, feature.variance));
+        self.variance = variance_of_joined(ranges.into_iter());
+        self.n_samples += next.n_samples;
     }
 }
 

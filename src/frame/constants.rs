@@ -76,6 +76,7 @@ impl Frame {
         [self.sample_x, self.sample_y] = (offset + 0.5).as_vec2().to_array();
         self.first_sample = self.range_begin + sample_ix;
         self.n_samples = sample_ix + (1 << self.samples_log2);
+        self.samples_reciprocal = 1.0 / self.n_samples as f32;
         if self.focuses_on_target == 1 {
             self.focus = eye.distance(camera.target);
         }

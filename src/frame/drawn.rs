@@ -11,6 +11,8 @@ pub struct Drawn {
     pub features: Vec<Feature>,
     /// Times and counts of all samples of all bands.
     pub profile: Profile,
+    /// Number of samples of each pixel.
+    pub n_samples: u32,
 }
 
 /// Follows the progress of a drawing.

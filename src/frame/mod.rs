@@ -4,6 +4,8 @@
 //! ```text
 //! options    RenderOptions, crop: what to render, and by which methods
 //! constants  the uniform buffer of the kernels; sampling: the positions of samples in their pixels
+//! goal       the end of a picture: a number of samples, or a time
+//! sample_range  parts of a picture's samples, and their sums
 //! plan       the order of passes and the barriers between them
 //!   pass       what each pass does, reads and writes
 //!   resource   the buffers and images that passes write
@@ -17,10 +19,12 @@ mod constants;
 pub(crate) mod counts;
 mod crop;
 mod drawn;
+mod goal;
 mod pass;
 pub mod plan;
 mod profile;
 mod resource;
+mod sample_range;
 pub mod sampling;
 mod view;
 
@@ -28,10 +32,12 @@ pub use self::{
     aov::{Aov, Channel, Samples},
     crop::Crop,
     drawn::{Drawn, Watcher},
+    goal::{Goal, Pacer},
     pass::{Pass, Role, Scope},
     plan::{FrameKind, Plan, Section, Step, Touch},
     profile::{BounceStats, PassTime, Profile},
     resource::Resource,
+    sample_range::{BlockSum, SampleRange, SampleSums, variance_of_joined},
     view::View,
 };
 use crate::{accel::kdtree::Traversal, layout};
@@ -64,6 +70,9 @@ pub struct RenderOptions {
     pub profile: bool,
     /// Whether the features of each pixel are written: what its primary ray hits, and what all its rays cost.
     pub features: bool,
+    /// Whether [`Integrator::Whitted`] shows ambient light in place of light that only paths show: of an environment,
+    /// of lights with an area and of surfaces that shine.
+    pub stands_in: bool,
     /// What only paths have: filters, lens, bounds.
     pub paths: PathOptions,
 }
@@ -126,6 +135,7 @@ impl Default for RenderOptions {
             primary: Primary::Raster,
             profile: true,
             features: false,
+            stands_in: false,
             paths: PathOptions::default(),
         }
     }

@@ -1,47 +1,110 @@
-//! Pictures with outputs beside colour (AOVs), as one OpenEXR file of many channels.
+//! Pictures as OpenEXR files of many channels: radiance, outputs beside it (AOVs), sums of samples, and the record.
 
 use std::{io::Cursor, path::Path};
 
 use exr::prelude::{
-    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, LineOrder, SmallVec, WritableImage,
+    AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, IntegerBounds, Layer, LayerAttributes,
+    LineOrder, SmallVec, Text, Vec2, WritableImage,
 };
 
 use tracing::info_span;
 
-use super::{OutputError, dimension_mismatch, write};
+use super::{OutputError, RECORD_ATTRIBUTE, Record, dimension_mismatch, write};
 use crate::{
-    frame::{Aov, Channel, Picture, Samples},
+    frame::{Aov, BlockSum, Channel, Crop, Picture, Samples},
     layout::Feature,
 };
 
-/// Writes an OpenEXR file with the radiance as R, G and B and with the channels of each AOV. The file is written
-/// whole or not at all. Counts and indices are 32-bit integers, all other values are 32-bit floats. `features` has an
-/// entry for each pixel; without AOVs it may be empty.
+/// What an OpenEXR file has beside the radiance. The default is nothing.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Layers<'a> {
+    /// Output variables, made from `features`.
+    pub aovs: &'a [Aov],
+    /// An entry for each pixel; may be empty without AOVs.
+    pub features: &'a [Feature],
+    /// Sums of blocks of samples, for parts of a picture whose means do not tell the sums.
+    pub sums: &'a [BlockSum],
+    /// What the picture shows. It places a crop in the whole picture.
+    pub record: Option<&'a Record>,
+}
+
+/// The three channels of a colour, each with its index.
+const COLOUR: [(&str, usize); 3] = [("R", 0), ("G", 1), ("B", 2)];
+
+/// Writes an OpenEXR file with the radiance as R, G and B, and with further layers. The file is written whole or not
+/// at all. Counts and indices are 32-bit integers, all other values are 32-bit floats. With a record, the file's data
+/// window is the crop, and its display window is the whole picture.
 ///
 /// # Errors
 /// Fails as [`write()`] does, or if the pixels cannot be encoded.
-pub fn write_layers(path: &Path, picture: &Picture, aovs: &[Aov], features: &[Feature]) -> Result<(), OutputError> {
-    let n_pixels = picture.width as usize * picture.height as usize;
-    if picture.radiance.len() != n_pixels || (!aovs.is_empty() && features.len() != n_pixels) {
+pub fn write_layers(path: &Path, picture: &Picture, layers: &Layers) -> Result<(), OutputError> {
+    write_channels(path, (picture.width, picture.height), channels(picture, layers), layers.record)
+}
+
+/// Writes an OpenEXR file with the radiance and further channels, as [`write_layers`] does.
+///
+/// # Errors
+/// Fails as [`write_layers`] does.
+pub fn write_with_channels(
+    path: &Path,
+    picture: &Picture,
+    further: Vec<Channel>,
+    record: &Record,
+) -> Result<(), OutputError> {
+    let mut channels = channels(picture, &Layers::default());
+    channels.extend(further);
+    write_channels(path, (picture.width, picture.height), channels, Some(record))
+}
+
+fn write_channels(
+    path: &Path,
+    size: (u32, u32),
+    channels: Vec<Channel>,
+    record: Option<&Record>,
+) -> Result<(), OutputError> {
+    let n_pixels = size.0 as usize * size.1 as usize;
+    let len = |channel: &Channel| match &channel.samples {
+        Samples::Float(samples) => samples.len(),
+        Samples::Uint(samples) => samples.len(),
+    };
+    if channels.iter().any(|channel| len(channel) != n_pixels) {
         return Err(OutputError::encode(path, dimension_mismatch()));
     }
-    let colour = |name: &str, component: usize| Channel {
-        name: name.to_owned(),
-        samples: Samples::Float(picture.radiance.iter().map(|pixel| pixel[component]).collect()),
-    };
-    let mut channels = vec![colour("R", 0), colour("G", 1), colour("B", 2)];
-    for (i, aov) in aovs.iter().enumerate() {
-        if !aovs[..i].contains(aov) {
-            channels.extend(aov.channels(features));
-        }
-    }
-    let size = (picture.width as usize, picture.height as usize);
-    let bytes = info_span!("encode picture").in_scope(|| encode(size, channels));
+    let bytes = info_span!("encode picture").in_scope(|| encode(size, channels, record));
     let _writing = info_span!("write picture").entered();
     write(path, &bytes.map_err(|source| OutputError::encode(path, source))?)
 }
 
-fn encode(size: (usize, usize), channels: Vec<Channel>) -> Result<Vec<u8>, exr::error::Error> {
+fn channels(picture: &Picture, layers: &Layers) -> Vec<Channel> {
+    let colour = |(name, ix): (&str, usize)| Channel {
+        name: name.to_owned(),
+        samples: Samples::Float(picture.radiance.iter().map(|pixel| pixel[ix]).collect()),
+    };
+    let sum = |block: &BlockSum, (name, ix): (&str, usize)| Channel {
+        name: format!("{}.{name}", sums_name(block)),
+        samples: Samples::Float(block.sums.iter().map(|sum| sum[ix]).collect()),
+    };
+    let mut channels: Vec<_> = COLOUR.into_iter().map(colour).collect();
+    channels.extend(layers.sums.iter().flat_map(|block| COLOUR.map(|component| sum(block, component))));
+    for (i, aov) in layers.aovs.iter().enumerate() {
+        if !layers.aovs[..i].contains(aov) {
+            channels.extend(aov.channels(layers.features));
+        }
+    }
+    channels
+}
+
+/// Returns the name of the layer with the sums of a block of samples.
+fn sums_name(block: &BlockSum) -> String {
+    format!("sum {}", block.samples)
+}
+
+fn encode(
+    (width, height): (u32, u32),
+    channels: Vec<Channel>,
+    record: Option<&Record>,
+) -> Result<Vec<u8>, exr::error::Error> {
+    let json = record.map(|record| record.sealed(&channels).json());
     let channels: SmallVec<_> = channels
         .into_iter()
         .map(|channel| {
@@ -55,8 +118,22 @@ fn encode(size: (usize, usize), channels: Vec<Channel>) -> Result<Vec<u8>, exr::
     // Blocks are compressed in parallel. They are written in order, so that the same picture always gives the same
     // file.
     let encoding = Encoding { line_order: LineOrder::Increasing, ..Encoding::FAST_LOSSLESS };
-    let layer = Layer::new(size, LayerAttributes::default(), encoding, AnyChannels::sort(channels));
+    let size = Vec2(width as usize, height as usize);
+    let (mut attributes, mut whole) = (LayerAttributes::default(), IntegerBounds::from_dimensions(size));
+    if let Some(record) = record {
+        let Crop { x0, y0, .. } = record.crop;
+        attributes.layer_position = Vec2(x0 as i32, y0 as i32);
+        attributes.software_name = Text::new_or_none(concat!("kdray ", env!("CARGO_PKG_VERSION")));
+        whole = IntegerBounds::from_dimensions(Vec2(record.whole.width as usize, record.whole.height as usize));
+    }
+    if let Some(json) = json {
+        // Several attributes of our own would be written in a random order.
+        attributes.other.insert(Text::from(RECORD_ATTRIBUTE), AttributeValue::Text(Text::from(json.as_str())));
+    }
+    let layer = Layer::new(size, attributes, encoding, AnyChannels::sort(channels));
+    let mut image = Image::from_layer(layer);
+    image.attributes.display_window = whole;
     let mut file = Cursor::new(Vec::new());
-    Image::from_layer(layer).write().to_buffered(&mut file)?;
+    image.write().to_buffered(&mut file)?;
     Ok(file.into_inner())
 }

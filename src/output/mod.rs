@@ -8,24 +8,31 @@
 use std::{
     error::Error,
     fs::{self, File, OpenOptions},
-    io::{self, Cursor, Seek, Write},
+    io::{self, Seek, Write},
     path::{Path, PathBuf},
 };
 
 use image::{
-    EncodableLayout, ImageBuffer, ImageError, ImageFormat, PixelWithColorType, Primitive, Rgb,
+    ImageError,
     error::{ParameterError, ParameterErrorKind},
 };
 use tempfile::SpooledTempFile;
 use tracing::info_span;
 
 use self::{destination::Destination, temporary::Temporary};
-pub use self::{destination::regular_file, heat_map::HeatMap, layers::write_layers, temporary::remove_temporaries};
+pub use self::{
+    destination::regular_file,
+    heat_map::HeatMap,
+    layers::{Layers, write_layers, write_with_channels},
+    record::{PathRecord, RECORD_ATTRIBUTE, Record, WholeRecord},
+    temporary::remove_temporaries,
+};
 use crate::frame::Picture;
 
 mod destination;
 mod heat_map;
 mod layers;
+mod record;
 mod temporary;
 
 /// Size beyond which a spool goes to disk, bytes.
@@ -127,10 +134,15 @@ pub fn check(path: &Path) -> Result<(), OutputError> {
 
 /// Writes a picture in the format that the file's ending names. Both formats hold exactly the picture's RGB values.
 pub fn write_picture(path: &Path, picture: &Picture) -> Result<(), OutputError> {
+    write_recorded(path, picture, None)
+}
+
+/// Writes a picture as [`write_picture`] does, with its record.
+pub fn write_recorded(path: &Path, picture: &Picture, record: Option<&Record>) -> Result<(), OutputError> {
     if Format::of(path)? == Format::Exr {
-        return write_layers(path, picture, &[], &[]);
+        return write_layers(path, picture, &Layers { record, ..Layers::default() });
     }
-    let bytes = info_span!("encode picture").in_scope(|| encode(picture, rgb(&picture.display), ImageFormat::Png));
+    let bytes = info_span!("encode picture").in_scope(|| encode_png(picture, record));
     let _writing = info_span!("write picture").entered();
     write(path, &bytes.map_err(|source| OutputError::encode(path, source))?)
 }
@@ -197,18 +209,20 @@ fn rgb<T: Copy>(rgba: &[[T; 4]]) -> Vec<T> {
     rgba.iter().flat_map(|&[r, g, b, _]| [r, g, b]).collect()
 }
 
-/// Encodes a picture's RGB values, three a pixel.
-fn encode<T>(picture: &Picture, rgb: Vec<T>, format: ImageFormat) -> Result<Vec<u8>, ImageError>
-where
-    Rgb<T>: PixelWithColorType<Subpixel = T>,
-    [T]: EncodableLayout,
-    T: Primitive,
-{
-    let image =
-        ImageBuffer::<Rgb<T>, _>::from_raw(picture.width, picture.height, rgb).ok_or_else(dimension_mismatch)?;
-    let mut file = Cursor::new(Vec::new());
-    image.write_to(&mut file, format)?;
-    Ok(file.into_inner())
+/// Encodes what a display shows of a picture, with its record as text.
+fn encode_png(picture: &Picture, record: Option<&Record>) -> Result<Vec<u8>, png::EncodingError> {
+    let mut file = Vec::new();
+    let mut encoder = png::Encoder::new(&mut file, picture.width, picture.height);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_compression(png::Compression::Fast);
+    if let Some(record) = record {
+        encoder.add_text_chunk("Software".to_owned(), concat!("kdray ", env!("CARGO_PKG_VERSION")).to_owned())?;
+        encoder.add_text_chunk(RECORD_ATTRIBUTE.to_owned(), record.json())?;
+    }
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(&rgb(&picture.display))?;
+    writer.finish()?;
+    Ok(file)
 }
 
 /// Returns the error that a picture does not have as many pixels as its size says.

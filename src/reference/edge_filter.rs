@@ -17,8 +17,8 @@ const GLOSSY_DEVIATIONS: f32 = 0.25;
 /// The variance of another pixel counts up to this multiple of the pixel's own, which is 1 for perfectly glossy
 /// surfaces.
 const MOST_OF_OTHER: f32 = 4.0;
-/// A luminance that is less than any noise of interest. It keeps quotients finite where there is no noise at all.
-const LEAST_DEVIATION: f32 = 1e-8;
+/// A variance that is less than any noise of interest. It keeps quotients finite where there is no noise at all.
+const LEAST_VARIANCE: f32 = 1e-16;
 /// The weights of the five pixels in a row: a B-spline.
 const SPLINE: [f32; 3] = [0.375, 0.25, 0.0625];
 
@@ -98,11 +98,11 @@ impl Source<'_> {
             let found = Vec4::from(self.light[other_ix]);
             let spline = SPLINE[dx.unsigned_abs() as usize] * SPLINE[dy.unsigned_abs() as usize];
             let mut weight = spline * surface_weight(guide, &self.guides[other_ix]);
-            let tolerance = deviations * (variance + most.min(found.w)).sqrt() + LEAST_DEVIATION;
+            let tolerance = deviations * (variance + most.min(found.w) + LEAST_VARIANCE).sqrt();
             weight *= (-(luminance_of(found.xyz()) - luminance).abs() / tolerance).exp();
             weights += weight;
             sum += (weight * found.xyz()).extend(weight * weight * found.w);
         }
-        if weights > 0.0 { sum / Vec4::new(weights, weights, weights, weights * weights) } else { light }
+        if weights > 0.0 { sum.with_w(sum.w / weights) / weights } else { light }
     }
 }

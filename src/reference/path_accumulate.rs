@@ -23,6 +23,6 @@ pub fn path_accumulate(frame: &Frame, pixel_radiance: &mut [[f32; 4]], sums: &mu
         for place in (0..n_kept).rev() {
             sum += Vec4::from_array(sums[place * stride + pixel_ix]);
         }
-        *radiance = (sum / frame.n_samples as f32).to_array();
+        *radiance = (sum * frame.samples_reciprocal).to_array();
     }
 }

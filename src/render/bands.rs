@@ -10,7 +10,7 @@ use std::{
 use super::Renderer;
 use crate::{
     buffers::Pixels,
-    frame::{Crop, Drawn, Integrator, Picture, Profile, RenderOptions, Watcher, sampling::samples_log2},
+    frame::{Crop, Drawn, Goal, Integrator, Pacer, PathOptions, Picture, Profile, RenderOptions, Watcher},
     gpu::{Context, GivenImage, GpuError, Limits, TimelinePoint},
     layout::Feature,
     scene::Camera,
@@ -63,23 +63,41 @@ impl BandedRenderer {
         self.renderer.set_camera(camera);
     }
 
-    /// Draws a new picture of `n_samples` samples a pixel, at least one, and reports its progress to the watcher.
+    /// Sets the index of the next picture's first sample, a multiple of `2^MOST_SAMPLES_LOG2`. Only frames of paths
+    /// know it.
+    ///
+    /// # Errors
+    /// A Vulkan call fails.
+    pub fn set_first_sample(&mut self, first_sample: u32) -> Result<(), GpuError> {
+        let options = self.renderer.options();
+        let paths = PathOptions { first_sample, ..options.paths };
+        self.renderer.set_options(&RenderOptions { paths, ..options.clone() })
+    }
+
+    /// Draws a new picture and reports its progress to the watcher. If the goal is a time and there are several bands,
+    /// the first band gets its share of the time, and the others as many samples as the first one.
     ///
     /// # Errors
     /// A Vulkan call fails; one pixel alone makes more rays than the queue holds; out of memory.
-    pub fn draw(&mut self, n_samples: u32, mut watcher: impl Watcher) -> Result<Drawn, GpuError> {
+    pub fn draw(&mut self, goal: Goal, watcher: &mut impl Watcher) -> Result<Drawn, GpuError> {
         if let [_] = self.bands[..] {
-            return self.draw_band(n_samples, &mut watcher);
+            return self.draw_band(goal, watcher);
         }
-        let mut all = Drawn { features: Vec::new(), profile: Profile::default() };
+        let mut all = Drawn::default();
         let mut joined = self.room_for_all(&mut all.features)?;
+        let mut goal = match goal {
+            Goal::Time(time) => Goal::Time(time / self.n_bands()),
+            samples => samples,
+        };
         for (band_ix, &band) in self.bands.clone().iter().enumerate() {
             self.renderer.set_crop(band)?;
-            let drawn = self.draw_band(n_samples, &mut watcher)?;
+            let drawn = self.draw_band(goal, watcher)?;
+            goal = Goal::Samples(drawn.n_samples);
             let picture = self.renderer.picture()?;
             joined.radiance.extend(picture.radiance);
             joined.display.extend(picture.display);
             all.features.extend(drawn.features);
+            all.n_samples = drawn.n_samples;
             if band_ix == 0 {
                 all.profile = drawn.profile;
             } else {
@@ -119,25 +137,35 @@ impl BandedRenderer {
         self.renderer.copy_picture_to(image, after, then)
     }
 
-    fn draw_band(&mut self, n_samples: u32, watcher: &mut impl Watcher) -> Result<Drawn, GpuError> {
+    fn draw_band(&mut self, goal: Goal, watcher: &mut impl Watcher) -> Result<Drawn, GpuError> {
         self.renderer.reset_samples();
-        let mut profile = self.draw_frame(n_samples, watcher)?;
-        let mut features = if self.renderer.options().features { self.renderer.features()? } else { Vec::new() };
-        while self.renderer.n_samples() < n_samples {
-            profile.add(&self.draw_frame(n_samples, watcher)?);
+        let integrator = self.renderer.options().integrator;
+        let mut pacer = Pacer::new(goal, integrator);
+        let mut drawn = Drawn::default();
+        while let Some(log2) = pacer.next(self.renderer.n_samples()) {
+            let profile = self.draw_frame(log2, watcher)?;
+            if drawn.n_samples > 0 {
+                drawn.profile.add(&profile);
+            } else {
+                drawn.profile = profile;
+                if self.renderer.options().features {
+                    drawn.features = self.renderer.features()?;
+                }
+            }
+            drawn.n_samples = self.renderer.n_samples();
         }
-        if !features.is_empty() && self.renderer.options().integrator == Integrator::Path {
-            self.renderer.note_noise(&mut features)?;
+        if !drawn.features.is_empty() && integrator == Integrator::Path {
+            self.renderer.note_noise(&mut drawn.features)?;
         }
-        Ok(Drawn { features, profile })
+        Ok(drawn)
     }
 
-    /// Draws the next sample of `n_samples`, or the next samples if the frame traces paths, part by part if it is
-    /// expected to be slow and the watcher sees parts.
-    fn draw_frame(&mut self, n_samples: u32, watcher: &mut impl Watcher) -> Result<Profile, GpuError> {
+    /// Draws the next sample, or the next `2^log2` samples if the frame traces paths, part by part if it is expected to
+    /// be slow and the watcher sees parts.
+    fn draw_frame(&mut self, log2: u32, watcher: &mut impl Watcher) -> Result<Profile, GpuError> {
         let n_before = self.renderer.n_samples();
         if self.renderer.options().integrator == Integrator::Path {
-            self.renderer.set_samples_per_frame(samples_log2(n_before, n_samples));
+            self.renderer.set_samples_per_frame(log2);
         }
         let begin = Instant::now();
         let profile = if self.is_slow && watcher.sees_parts() {

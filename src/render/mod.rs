@@ -78,7 +78,19 @@ impl Renderer {
     /// The scene or the picture exceeds the device's limits or memory, the device lacks 64-bit atomics for
     /// [`Primary::SoftwareRaster`], or the driver refuses a shader.
     pub fn new(context: Arc<Context>, world: &World, options: &RenderOptions) -> Result<Self, GpuError> {
-        Self::with_capacity(context, world, options, None)
+        Self::with_capacity((context, world), options, None, None)
+    }
+
+    /// Makes a second renderer of the same scene, for either integrator. Both share the arrays of the scene on the
+    /// device.
+    ///
+    /// # Errors
+    /// Fails as [`Renderer::new`] does.
+    pub fn sharing(&self, options: &RenderOptions) -> Result<Self, GpuError> {
+        let scene = (self.context.clone(), &self.world);
+        let mut next = Self::with_capacity(scene, options, self.budget.fixed_capacity, Some(self))?;
+        next.set_camera(&self.camera);
+        Ok(next)
     }
 
     /// Does what [`Renderer::new`] does, with a ray queue of `capacity` rays. A frame that makes more rays is split
@@ -92,14 +104,15 @@ impl Renderer {
         options: &RenderOptions,
         capacity: u32,
     ) -> Result<Self, GpuError> {
-        Self::with_capacity(context, world, options, Some(capacity))
+        Self::with_capacity((context, world), options, Some(capacity), None)
     }
 
+    /// `shared`: a renderer of the same world, whose arrays of the scene are taken.
     fn with_capacity(
-        context: Arc<Context>,
-        world: &World,
+        (context, world): (Arc<Context>, &World),
         options: &RenderOptions,
         fixed_capacity: Option<u32>,
+        shared: Option<&Self>,
     ) -> Result<Self, GpuError> {
         let scene = world.scene();
         let (asked, options) = (options.clone(), &in_use(options));
@@ -114,7 +127,12 @@ impl Renderer {
         let schedule = Schedule::new(&context, &constants, spans, options)?;
         let uploading = info_span!("upload scene").entered();
         let needs = Needs { constants: &constants, options, n_bounces: schedule.n_rows() };
-        let resources = Resources::new(&context, world, &needs)?;
+        let resources = match shared {
+            Some(Self { resources, in_use, .. }) => {
+                resources.for_integrator(&context, (world, in_use.traversal), &needs)?
+            }
+            None => Resources::new(&context, world, &needs)?,
+        };
         drop(uploading);
         let passes =
             info_span!("make pipelines").in_scope(|| FramePasses::new(&context, &resources.bindings, options))?;

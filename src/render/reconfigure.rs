@@ -117,13 +117,11 @@ impl Renderer {
         Ok(())
     }
 
-    /// Becomes a new renderer of the same world, for another integrator.
+    /// Becomes another renderer of the same world, for another integrator.
     fn replace(&mut self, options: &RenderOptions) -> Result<(), GpuError> {
-        let capacity = self.budget.fixed_capacity;
-        let mut next = Self::with_capacity(self.context.clone(), &self.world, options, capacity)?;
+        let mut next = self.sharing(options)?;
         next.false_color = self.false_color;
         next.needs_primary_rays_only = self.needs_primary_rays_only;
-        next.set_camera(&self.camera);
         *self = next;
         Ok(())
     }

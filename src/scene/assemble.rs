@@ -12,11 +12,11 @@ use toml::Spanned;
 
 use super::{
     Camera, Environment, Ground, Light, LoadOptions, Material, MaterialChoice, PathDefaults, Projection,
-    RenderDefaults, Scene,
+    RenderDefaults, Scene, Sky,
     camera::{FOV_DEGREES, HEIGHTS},
     description::{
         AmbientSpec, CameraSpec, Description, EnvironmentSpec, HemispheresSpec, LightSpec, MeshSpec, RenderSpec,
-        SceneDenoise,
+        SceneDenoise, SkySpec,
     },
     error::{Checked, SceneError},
     extent,
@@ -31,6 +31,7 @@ use super::{
     placed::{MeshTable, Placer},
     preset,
     read::{read_bytes, read_utf8},
+    sky::above_horizon,
     standard::Lacks,
     transform::finite,
 };
@@ -87,11 +88,12 @@ impl File<'_> {
 
 /// `options`: they name the materials that the user replaces beside those that the file does.
 fn assemble(file: &File, description: Description, options: &LoadOptions) -> Result<(Scene, Lacks), SceneError> {
+    let has_beyond = description.environment.is_some() || description.sky.is_some();
     let lacks = Lacks {
         up: Up::Y,
         camera: description.camera.is_none() && description.cameras.is_empty(),
-        light: description.light.is_empty() && description.ambient.is_none() && description.environment.is_none(),
-        background: description.background.is_none() && description.environment.is_none(),
+        light: description.light.is_empty() && description.ambient.is_none() && !has_beyond,
+        background: description.background.is_none() && !has_beyond,
         integrator: description.render.as_ref().is_none_or(|render| render.as_ref().integrator.is_none()),
     };
     let mut scene = Scene::empty(file.path);
@@ -112,6 +114,12 @@ fn assemble(file: &File, description: Description, options: &LoadOptions) -> Res
     if let Some(spec) = &description.environment {
         scene.environment = Some(file.check("environment", spec, |spec| environment(file, spec))?);
     }
+    if let Some(spec) = &description.sky {
+        scene.sky = Some(file.check("sky", spec, sky)?);
+        if description.environment.is_some() {
+            return Err(file.at(&spec.span(), "sky: the scene has an `environment`, too; only one of them is possible"));
+        }
+    }
     if let Some(spec) = &description.render {
         scene.defaults = file.check("render", spec, render_defaults)?;
     }
@@ -124,6 +132,7 @@ fn assemble(file: &File, description: Description, options: &LoadOptions) -> Res
     }
     let materials = NamedMaterials::new(&description.materials, indices);
     let mut placer = Placer::new(file, (scene, images), materials, &tables);
+    placer.read_together(&tables);
     for table in &tables {
         placer.add(table)?;
     }
@@ -213,8 +222,8 @@ fn choices(words: &[String]) -> Checked<Vec<MaterialChoice>> {
 fn ambient(spec: &AmbientSpec) -> Checked<(Vec3, Option<Ground>)> {
     match spec {
         AmbientSpec::Even(rgb) => Ok((colour("ambient", Some(*rgb), Vec3::ZERO)?, None)),
-        AmbientSpec::Hemispheres(HemispheresSpec { sky, ground, up }) => {
-            let up = up.as_ref().map_or(Ok(Up::Y), |word| word.parse()).map_err(|error| format!("up: {error}"))?;
+        AmbientSpec::Hemispheres(HemispheresSpec { sky, ground, up: word }) => {
+            let up = up(word.as_ref())?;
             let ambient = colour("ground", Some(*ground), Vec3::ZERO)?;
             Ok((colour("sky", Some(*sky), Vec3::ZERO)?, Some(Ground { ambient, up })))
         }
@@ -307,6 +316,32 @@ fn environment(file: &File, spec: &EnvironmentSpec) -> Checked<Environment> {
         tracing::warn!("{}: environment `{}` {message}", file.path.display(), spec.file);
     }
     Ok(environment)
+}
+
+/// Returns the sky of its keys.
+fn sky(spec: &SkySpec) -> Checked<Sky> {
+    let up = up(spec.up.as_ref())?;
+    let placed = match (spec.elevation, spec.direction) {
+        (Some(elevation), None) => Sky::new([elevation, spec.azimuth.unwrap_or(0.0)], up)?,
+        (None, Some(direction)) if spec.azimuth.is_none() => {
+            let towards_sun = above_horizon(-unit("direction", direction)?, up)?;
+            Sky { towards_sun, ..Sky::new([0.0; 2], up)? }
+        }
+        (None, None) => return Err("needs `elevation` or `direction` for the place of the sun".to_owned()),
+        _ => return Err("has `direction` beside `elevation` or `azimuth`".to_owned()),
+    };
+    let placed = placed.with_turbidity(spec.turbidity.unwrap_or(Sky::TURBIDITY))?;
+    let ground_albedo = colour("ground_albedo", spec.ground_albedo, placed.ground_albedo)?;
+    if ground_albedo.max_element() > 1.0 {
+        return Err(format!("ground_albedo = {:?} reflects more than all light", ground_albedo.to_array()));
+    }
+    let strength = within("strength", spec.strength.unwrap_or(1.0), 0.0, 1e6)?;
+    Ok(Sky { ground_albedo, strength, has_sun: spec.sun.unwrap_or(true), ..placed })
+}
+
+/// Returns the axis that points up, +y where the key is absent.
+fn up(word: Option<&String>) -> Checked<Up> {
+    word.map_or(Ok(Up::Y), |word| word.parse()).map_err(|error| format!("up: {error}"))
 }
 
 /// Returns a vector's direction as a unit vector.

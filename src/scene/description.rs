@@ -30,6 +30,8 @@ pub(super) struct Description {
     pub background: Option<Spanned<[f32; 3]>>,
     /// Image of what rays see that leave the scene, for `path`.
     pub environment: Option<Spanned<EnvironmentSpec>>,
+    /// The sky and its sun, for `path`, in place of `environment`.
+    pub sky: Option<Spanned<SkySpec>>,
     /// Presets in place of materials, as `--material` takes them.
     pub replace: Option<Spanned<Vec<String>>>,
     #[serde(default)]
@@ -127,6 +129,26 @@ pub(super) struct EnvironmentSpec {
     pub rotation: Option<f32>,
     /// Factor on the image's radiance; 1 where absent.
     pub strength: Option<f32>,
+}
+
+/// The sky. The place of its sun is stated as `elevation` and perhaps `azimuth`, or as `direction`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SkySpec {
+    /// Angle of the sun above the horizon, degrees.
+    pub elevation: Option<f32>,
+    /// Degrees from -z clockwise as seen from above, or from +y if `up` is `z`; 0 where absent.
+    pub azimuth: Option<f32>,
+    /// Direction in which the sun's light travels.
+    pub direction: Option<[f32; 3]>,
+    pub turbidity: Option<f32>,
+    pub ground_albedo: Option<[f32; 3]>,
+    /// Factor on all radiance; 1 where absent.
+    pub strength: Option<f32>,
+    /// Whether the sun shines; true where absent.
+    pub sun: Option<bool>,
+    /// `y` or `z`; `y` where absent.
+    pub up: Option<String>,
 }
 
 /// Options of rendering, which the command line may override.

@@ -8,10 +8,15 @@ use super::{Light, Scene};
 use crate::frame::Integrator;
 
 impl Scene {
-    /// Returns whether the scene has light that only paths show: surfaces that shine, lights with an area, or an
-    /// environment.
+    /// Returns whether the scene has light that only paths show: surfaces that shine, lights with an area, an
+    /// environment, or a sky.
     pub fn needs_path(&self) -> bool {
-        self.has_shining_surfaces() || self.environment.is_some() || self.lights.iter().any(Light::has_area)
+        self.has_shining_surfaces() || self.has_light_beyond() || self.lights.iter().any(Light::has_area)
+    }
+
+    /// Returns whether light comes from an environment or a sky.
+    fn has_light_beyond(&self) -> bool {
+        self.environment.is_some() || self.sky.is_some()
     }
 
     /// Returns whether some surfaces give off light. Only paths show it on other surfaces.
@@ -31,7 +36,8 @@ impl Scene {
         let is_whitted = integrator == Integrator::Whitted;
         let hidden: Vec<_> = [
             (self.lights.iter().any(Light::has_area), "lights with an area"),
-            (self.environment.is_some(), "the environment's image"),
+            (self.environment.is_some() && self.sky.is_none(), "the environment's image"),
+            (self.sky.is_some(), "the sky, but for its sun's light"),
         ]
         .into_iter()
         .filter_map(|(is_there, what)| (is_there && is_whitted).then_some(what))
@@ -42,8 +48,9 @@ impl Scene {
         let shows = |light: &Light| !(light.is_black() || is_whitted && light.has_area());
         let is_lit = self.ambient != Vec3::ZERO
             || self.ground.is_some_and(|ground| ground.ambient != Vec3::ZERO)
+            || self.sky.is_some_and(|sky| sky.has_sun && !sky.sun().is_black())
             || self.lights.iter().any(shows);
-        let shines = self.has_shining_surfaces() || self.environment.is_some() || self.background != Vec3::ZERO;
+        let shines = self.has_shining_surfaces() || self.has_light_beyond() || self.background != Vec3::ZERO;
         if is_lit || (!is_whitted && shines) {
             return;
         }

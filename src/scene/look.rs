@@ -3,7 +3,8 @@
 use glam::Vec3;
 
 use super::{
-    Camera, Light, Projection, Scene, camera::FOV_DEGREES, error::Checked, mesh::MAX_COORDINATE, preset::MaterialChoice,
+    Camera, Light, Projection, Scene, Sky, camera::FOV_DEGREES, error::Checked, mesh::MAX_COORDINATE,
+    preset::MaterialChoice,
 };
 
 /// The axis of the world that points up.
@@ -40,6 +41,17 @@ pub enum LightChoice {
     Along(Vec3),
 }
 
+/// The user's choice of a sky.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SkyChoice {
+    /// Angle of the sun above the horizon, 0 to 90 degrees.
+    pub elevation: f32,
+    /// Azimuth of the sun as of [`Sky::new`], degrees. Where absent, the sun is over the viewer's left shoulder.
+    pub azimuth: Option<f32>,
+    /// Haziness of the air, 2 to 10.
+    pub turbidity: f32,
+}
+
 /// The user's choices. Absent ones leave the scene as it is.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Look {
@@ -53,6 +65,8 @@ pub struct Look {
     pub vertical_fov_degrees: Option<f32>,
     /// The light, which replaces all lights of the scene. Its ambient light stays.
     pub light: Option<LightChoice>,
+    /// The sky, which replaces all lights, the ambient light and the environment of the scene.
+    pub sky: Option<SkyChoice>,
     /// Radiance of rays that leave the scene, linear RGB, at least 0.
     pub background: Option<Vec3>,
     /// Materials in place of the scene's own. Of several for a material the last one counts.
@@ -108,6 +122,19 @@ impl Look {
         Ok(())
     }
 
+    /// Puts the chosen sky in place of a scene's light. `up` points to the zenith, and `azimuth` is that of the sun if
+    /// the user leaves it out, degrees.
+    pub(super) fn set_sky(&self, scene: &mut Scene, up: Up, azimuth: f32) -> Checked<()> {
+        let Some(choice) = self.sky else { return Ok(()) };
+        let sky = Sky::new([choice.elevation, choice.azimuth.unwrap_or(azimuth)], up)?;
+        scene.sky = Some(sky.with_turbidity(choice.turbidity)?);
+        scene.lights = Vec::new();
+        (scene.ambient, scene.ground, scene.background) = (Vec3::ZERO, None, Vec3::ZERO);
+        scene.environment = None;
+        scene.defaults.is_metered = false;
+        Ok(())
+    }
+
     /// Changes a scene's lights and its background.
     pub(super) fn set_light(&self, scene: &mut Scene) {
         if let Some(light) = self.light {
@@ -118,6 +145,9 @@ impl Look {
                     vec![Light::Directional { towards, irradiance: Vec3::splat(IRRADIANCE) }]
                 }
             };
+            if let Some(sky) = &mut scene.sky {
+                sky.has_sun = false;
+            }
             // The lights that had physical units are gone.
             scene.defaults.is_metered = false;
         }

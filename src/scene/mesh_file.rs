@@ -13,11 +13,12 @@ use super::{
     needs::{require_for_bytes, require_for_text},
     obj::parse_obj,
     outside::Access,
-    ply::parse_ply,
+    ply::{PlyMesh, ply_mesh},
     read::{lossy_text, read_bytes},
     smooth::Shading,
     stl::{is_binary_stl, is_stl_text, parse_stl},
 };
+use crate::util::progress::Progress;
 
 /// Format of a mesh file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -96,16 +97,50 @@ pub(super) struct Loaded {
     pub uses_crease: bool,
 }
 
+/// The mesh of a file whose materials are not needed to make it. Several can be made at the same time.
+pub(super) enum Shape {
+    Ply(PlyMesh),
+    Stl(Mesh),
+}
+
+impl Shape {
+    /// Makes the mesh of a PLY or STL file. `n_loaded`: the number of triangles that the scene has already.
+    pub fn parse(
+        path: &Path,
+        bytes: Vec<u8>,
+        place: (Shading, DVec3),
+        (n_loaded, progress): (usize, &Progress),
+    ) -> Result<Self, SceneError> {
+        let made = match MeshFormat::of(path, &bytes) {
+            MeshFormat::Ply => ply_mesh(&bytes, place, n_loaded, progress).map(Self::Ply),
+            _ => parse_stl(bytes, place, n_loaded).map(Self::Stl),
+        };
+        made.map_err(|what| SceneError::file(path, what))
+    }
+
+    /// Reads the materials.
+    pub fn loaded(self, path: &Path, loading: &mut Loading) -> Result<Loaded, SceneError> {
+        let loaded = match self {
+            Self::Ply(ply) => ply.with_materials(path, loading.access, loading.images),
+            Self::Stl(mesh) => Loaded { mesh, materials: Vec::new(), uses_crease: loading.shading.smooth },
+        };
+        match loaded.mesh.faces.is_empty() {
+            true => Err(SceneError::file(path, "has no triangles")),
+            false => Ok(loaded),
+        }
+    }
+}
+
 /// Makes a mesh from the content of a file that is not glTF, and reads the materials that it names.
 pub(super) fn parse_mesh(path: &Path, bytes: Vec<u8>, loading: &mut Loading) -> Result<Loaded, SceneError> {
     let failed = |what: String| SceneError::file(path, what);
+    let place = (loading.shading, loading.origin);
     let loaded = match MeshFormat::of(path, &bytes) {
         MeshFormat::Obj => parse_obj(path, &lossy_text(bytes), loading)?,
-        MeshFormat::Ply => parse_ply(path, &bytes, loading).map_err(failed)?,
         MeshFormat::Gltf => return Err(failed("is glTF, which is a whole scene".to_owned())),
-        MeshFormat::Stl => {
-            let mesh = parse_stl(bytes, (loading.shading, loading.origin), loading.n_loaded).map_err(failed)?;
-            Loaded { mesh, materials: Vec::new(), uses_crease: loading.shading.smooth }
+        MeshFormat::Ply | MeshFormat::Stl => {
+            let progress = loading.images.progress().clone();
+            return Shape::parse(path, bytes, place, (loading.n_loaded, &progress))?.loaded(path, loading);
         }
     };
     if loaded.mesh.faces.is_empty() {

@@ -35,6 +35,7 @@ mod ply;
 mod polygon;
 mod preset;
 mod read;
+mod sky;
 mod smooth;
 mod sources;
 mod standard;
@@ -58,11 +59,12 @@ pub use self::{
     error::SceneError,
     extent::MIN_EXTENT,
     light::{Ground, Light},
-    look::{LightChoice, Look, Up},
+    look::{LightChoice, Look, SkyChoice, Up},
     material::{Alpha, Clearcoat, Conductor, Lobes, Maps, Material, Microfacet, Sheen},
     mesh::Mesh,
     path::CameraPath,
     preset::{MaterialChoice, Preset},
+    sky::Sky,
     sources::{source_files, source_files_with},
     terms::{Term, TermValue},
     texture::{Channel, Encoding, Image, Pixels, Texture, Wrap},
@@ -95,6 +97,8 @@ pub struct Scene {
     pub lights: Vec<Light>,
     /// The image of what is seen beyond the scene; without one, that is `background`. Only the path tracer knows it.
     pub environment: Option<Environment>,
+    /// The sky and its sun. The path tracer knows both, in place of `environment`, and otherwise only the sun is known.
+    pub sky: Option<Sky>,
     /// The camera that renders the scene unless another one is set.
     pub camera: Camera,
     /// The cameras of the scene's file with their names, possibly none.
@@ -255,6 +259,7 @@ impl Scene {
             ground: None,
             background: Vec3::ZERO,
             environment: None,
+            sky: None,
             defaults: RenderDefaults::default(),
         }
     }

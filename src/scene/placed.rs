@@ -3,11 +3,13 @@
 
 use std::{
     collections::{HashMap, HashSet},
+    fs,
     ops::Range,
     path::PathBuf,
 };
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
+use rayon::prelude::*;
 
 use super::{
     Instance, LoadOptions, Look, Material, Scene, SceneError, Transform,
@@ -18,10 +20,14 @@ use super::{
     gltf,
     image_files::Images,
     mesh::Mesh,
-    mesh_file::{Loaded, Loading, MeshFormat, parse_mesh, read_mesh},
+    mesh_file::{Loaded, Loading, MeshFormat, Shape, parse_mesh, read_mesh},
     needs::{MeshSize, require_for_mesh},
     overrides::NamedMaterials,
     smooth::{DEFAULT_CREASE, Shading},
+};
+use crate::util::{
+    memory::require,
+    progress::{Progress, Work},
 };
 
 /// A `[[mesh]]` table.
@@ -60,6 +66,17 @@ struct Read {
     uses_crease: bool,
 }
 
+/// What a file that was read together with others has become.
+enum Content {
+    /// A mesh.
+    Shape(Box<Result<Shape, SceneError>>),
+    /// Bytes, since their format is not the one that the file's name tells.
+    Bytes(Vec<u8>),
+}
+
+/// Bytes of memory that reading a byte of a PLY or STL file takes.
+const READING_BYTES: u64 = 10;
+
 /// Adds the meshes of a scene file to its scene.
 pub(super) struct Placer<'a> {
     pub file: &'a File<'a>,
@@ -69,6 +86,8 @@ pub(super) struct Placer<'a> {
     /// Number of triangles that generators have made.
     n_generated: u64,
     read: HashMap<Reading, Read>,
+    /// Files that have been read together, and are not in the scene yet.
+    shapes: HashMap<Reading, Result<Content, SceneError>>,
     /// The readings whose materials some table shows.
     with_materials: HashSet<Reading>,
 }
@@ -85,7 +104,41 @@ impl<'a> Placer<'a> {
             |table: &&MeshTable| table.spec.common.material.is_none() && table.spec.common.materials.is_empty();
         let with_materials = tables.iter().filter(has_own).filter_map(|table| Reading::of(file, &table.spec).ok()?);
         let with_materials = with_materials.collect();
-        Self { file, scene, materials, images, n_generated: 0, read: HashMap::new(), with_materials }
+        Self {
+            file,
+            scene,
+            materials,
+            images,
+            n_generated: 0,
+            read: HashMap::new(),
+            shapes: HashMap::new(),
+            with_materials,
+        }
+    }
+
+    /// Reads the PLY and STL files of all tables at the same time, if there are several and there is memory for them.
+    /// Errors are kept until the table of the file is added, so that the first table with an error decides.
+    pub fn read_together(&mut self, tables: &[MeshTable]) {
+        let readings = tables.iter().filter_map(|table| Reading::of(self.file, &table.spec).ok()?);
+        let is_shape = |it: &Reading| matches!(MeshFormat::of_name(&it.path), Some(MeshFormat::Ply | MeshFormat::Stl));
+        let mut seen = HashSet::new();
+        let readings: Vec<Reading> =
+            readings.filter(|it| is_shape(it) && it.scene.is_none()).filter(|it| seen.insert(it.clone())).collect();
+        let n_bytes: u64 = readings.iter().map(|it| fs::metadata(&it.path).map_or(0, |metadata| metadata.len())).sum();
+        if readings.len() < 2 || require("reading files", n_bytes.saturating_mul(READING_BYTES)).is_err() {
+            return;
+        }
+        let meter = self.images.progress().begin(Work::Reading, n_bytes);
+        let content = |reading: Reading| {
+            let read = read_mesh(&reading.path).map(|bytes| {
+                let n_bytes = bytes.len() as u64;
+                let content = reading.content(bytes);
+                meter.add(n_bytes);
+                content
+            });
+            (reading, read)
+        };
+        self.shapes = readings.into_par_iter().map(content).collect::<Vec<_>>().into_iter().collect();
     }
 
     /// Adds the meshes of a table.
@@ -141,12 +194,15 @@ impl<'a> Placer<'a> {
         let failed = |what: String| self.file.at(&table.span, format!("mesh {}: {what}", table.number));
         // The scene file may misspell the name, so the error names the line in the scene file.
         let path = &reading.path;
-        let bytes = read_mesh(path).map_err(|error| failed(error.to_string()))?;
+        let content = self.shapes.remove(reading).unwrap_or_else(|| read_mesh(path).map(Content::Bytes));
+        let content = content.map_err(|error| failed(error.to_string()))?;
         let n_loaded = self.scene.n_triangles();
         let first_mesh = self.scene.meshes.len();
         let uv_scale = table.spec.common.uv_scale;
         let origin = reading.origin.map(|bits| DVec3::from_array(bits.map(f64::from_bits)));
-        if MeshFormat::of(path, &bytes) == MeshFormat::Gltf {
+        if let Content::Bytes(bytes) = &content
+            && MeshFormat::of(path, bytes) == MeshFormat::Gltf
+        {
             if origin.is_some() {
                 return Err(failed("has `origin`, but coordinates of glTF files are of single precision".to_owned()));
             }
@@ -156,6 +212,7 @@ impl<'a> Placer<'a> {
             let options = LoadOptions { scene, allow_outside, look, progress, ..LoadOptions::default() };
             let has_materials = self.with_materials.contains(reading);
             let before = gltf::LoadedBefore { n_triangles: n_loaded as u64, n_pixels: self.images.n_pixels() };
+            let Content::Bytes(bytes) = content else { unreachable!("glTF files are bytes") };
             let mut model = gltf::load_meshes(path, bytes, &options, has_materials, before)?;
             for mesh in &mut model.meshes {
                 if !reading.is_smooth {
@@ -176,10 +233,13 @@ impl<'a> Placer<'a> {
         if let Some(name) = &reading.scene {
             return Err(failed(format!("there is no scene `{name}`: only glTF files name scenes")));
         }
-        let shading = Shading { smooth: reading.is_smooth, crease: f32::from_bits(reading.crease) };
-        let origin = origin.unwrap_or_default();
+        let (shading, origin) = reading.shape_options();
         let mut loading = Loading { shading, origin, n_loaded, access: self.file.access, images: &mut self.images };
-        let Loaded { mut mesh, materials, uses_crease } = parse_mesh(path, bytes, &mut loading)?;
+        let loaded = match content {
+            Content::Shape(shape) => (*shape)?.loaded(path, &mut loading),
+            Content::Bytes(bytes) => parse_mesh(path, bytes, &mut loading),
+        };
+        let Loaded { mut mesh, materials, uses_crease } = loaded?;
         scale_uvs(&mut mesh, uv_scale).map_err(failed)?;
         self.scene.meshes.push(mesh);
         let materials: Vec<_> = materials.into_iter().map(Some).chain([None]).collect();
@@ -238,6 +298,23 @@ impl Reading {
             uv_scale: spec.common.uv_scale.map(|scale| scale.map(f32::to_bits)),
             origin: origin.map(|origin| origin.map(f64::to_bits)),
         }))
+    }
+
+    /// Returns how normals are computed, and the point of the file that becomes the mesh's origin.
+    fn shape_options(&self) -> (Shading, DVec3) {
+        let shading = Shading { smooth: self.is_smooth, crease: f32::from_bits(self.crease) };
+        (shading, self.origin.map_or(DVec3::ZERO, |bits| DVec3::from_array(bits.map(f64::from_bits))))
+    }
+
+    /// Makes the mesh of a file's content, if it is a PLY or an STL file.
+    fn content(&self, bytes: Vec<u8>) -> Content {
+        match MeshFormat::of(&self.path, &bytes) {
+            MeshFormat::Ply | MeshFormat::Stl => {
+                let made = Shape::parse(&self.path, bytes, self.shape_options(), (0, &Progress::default()));
+                Content::Shape(Box::new(made))
+            }
+            MeshFormat::Gltf | MeshFormat::Obj => Content::Bytes(bytes),
+        }
     }
 }
 

@@ -12,6 +12,10 @@ use rayon::prelude::*;
 /// for example the middle of a fan. Comparing all its pairs would take quadratic time, so a hub's normal is the
 /// average of all its faces, whatever their angles.
 const MAX_PAIRED_FACES: usize = 256;
+/// Number of positions whose map takes about 400 KB, at 20 bytes each.
+const WELDED_TOGETHER: usize = 1 << 14;
+/// Greatest number of bits of a part's index.
+const MAX_PART_BITS: u32 = 12;
 /// Deviation (1 - cosine; 0.08 degrees) below which a normal counts as the normal of the face's plane.
 const FLAT_TOLERANCE: f32 = 1e-6;
 /// Margin of the cosine of half the crease angle. With a margin of m, the cosine between two normals that keep it
@@ -127,13 +131,50 @@ impl<'a> CornerNormals<'a> {
 }
 
 /// Returns for each position the index of the first position at the same place.
+///
+/// Positions are first sorted into parts by their places, so that the map of a part fits into a processor's cache.
 fn weld(positions: &[Vec3]) -> Vec<u32> {
-    let mut first_at = HashMap::with_capacity(positions.len());
-    let place = |(ix, p): (usize, &Vec3)| {
-        // Adding 0 turns -0 into 0.
-        *first_at.entry((*p + Vec3::ZERO).to_array().map(f32::to_bits)).or_insert(ix as u32)
+    let n_bits = positions.len().div_ceil(WELDED_TOGETHER).next_power_of_two().ilog2().min(MAX_PART_BITS);
+    if n_bits == 0 {
+        let mut first_at = HashMap::with_capacity(positions.len());
+        let first = |(ix, p): (usize, &Vec3)| *first_at.entry(place(*p)).or_insert(ix as u32);
+        return positions.iter().enumerate().map(first).collect();
+    }
+    let part_of: Vec<u16> = positions.par_iter().map(|p| part_of(place(*p), n_bits)).collect();
+    let mut begins = vec![0_usize; (1 << n_bits) + 1];
+    part_of.iter().for_each(|part| begins[usize::from(*part) + 1] += 1);
+    (1..begins.len()).for_each(|part| begins[part] += begins[part - 1]);
+    // The positions of each part, in ascending order of their indices.
+    let (mut next, mut sorted) = (begins.clone(), vec![0_u32; positions.len()]);
+    for (ix, part) in part_of.iter().enumerate() {
+        let slot = &mut next[usize::from(*part)];
+        sorted[*slot] = ix as u32;
+        *slot += 1;
+    }
+    let welded = |window: &[usize]| {
+        let mut first_at = HashMap::with_capacity(window[1] - window[0]);
+        let first = |ix: &u32| *first_at.entry(place(positions[*ix as usize])).or_insert(*ix);
+        sorted[window[0]..window[1]].iter().map(first).collect::<Vec<u32>>()
     };
-    positions.iter().enumerate().map(place).collect()
+    let parts: Vec<Vec<u32>> = begins.par_windows(2).map(welded).collect();
+    let mut first_of = vec![0; positions.len()];
+    sorted.iter().zip(parts.iter().flatten()).for_each(|(ix, first)| first_of[*ix as usize] = *first);
+    first_of
+}
+
+/// Returns what is equal for positions at the same place, and for no others.
+fn place(p: Vec3) -> [u32; 3] {
+    // Adding 0 turns -0 into 0.
+    (p + Vec3::ZERO).to_array().map(f32::to_bits)
+}
+
+/// Returns the part of a place: bits of a product, after Fibonacci hashing (Knuth, *The Art of Computer Programming*,
+/// volume 3, section 6.4).
+fn part_of([x, y, z]: [u32; 3], n_bits: u32) -> u16 {
+    const RATIO: u64 = 0x9e37_79b9_7f4a_7c15;
+    let xy = (u64::from(x) << 32 | u64::from(y)).wrapping_mul(RATIO);
+    let mixed = ((xy ^ xy >> 29) + u64::from(z)).wrapping_mul(RATIO);
+    (mixed >> (64 - n_bits)) as u16
 }
 
 /// Returns the normal and the angles of a face. They are computed in f64, in which the cross product of edges of
@@ -209,6 +250,29 @@ mod tests {
             if is_flat || facet.normal == Vec3::ZERO { [Vec3::ZERO; 3] } else { normals }
         };
         faces.iter().zip(&facets).map(normals).collect()
+    }
+
+    /// Positions are many enough to be sorted into parts. Most of them have others at the same place, and some of these
+    /// have zeros of the other sign.
+    #[test]
+    fn many_positions_are_welded_as_few_are() {
+        let coordinate = |ix: u32| match ix % 64 {
+            0 => 0.0,
+            1 => -0.0,
+            2 => 3.0e8,
+            3 => -2.25e-9,
+            n => n as f32 / 3.0,
+        };
+        let mixed = |ix: u32, shift: u32| coordinate(ix.wrapping_mul(2_654_435_761) >> shift);
+        for n in [0, 1, 16_384, 16_385, 100_000] {
+            let positions: Vec<Vec3> = (0..n).map(|ix| Vec3::new(mixed(ix, 8), mixed(ix, 16), mixed(ix, 25))).collect();
+            let of_place = |p: &Vec3| p.to_array().map(|x| if x == 0.0 { 0 } else { x.to_bits() });
+            let mut first_at = HashMap::new();
+            let first = |(ix, p): (u32, &Vec3)| *first_at.entry(of_place(p)).or_insert(ix);
+            let expected: Vec<u32> = (0..n).zip(&positions).map(first).collect();
+            assert!(n < 100_000 || first_at.len() < 90_000, "{} places", first_at.len());
+            assert_eq!(weld(&positions), expected, "{n}");
+        }
     }
 
     #[test]

@@ -49,7 +49,8 @@ pub(super) fn fill_in(scene: &mut Scene, lacks: Lacks, options: &LoadOptions) ->
     let look = &options.look;
     let up = look.up.unwrap_or(lacks.up);
     let axes = WorldAxes::with_up(up.vector());
-    let needs_bounds = lacks.camera || lacks.light;
+    let lacks_light = lacks.light && look.sky.is_none();
+    let needs_bounds = lacks.camera || lacks_light;
     let bounds = if needs_bounds { scene.bounds() } else { Default::default() };
     let is_interior = needs_bounds && interior::is_interior(scene, bounds);
     if lacks.camera {
@@ -61,10 +62,14 @@ pub(super) fn fill_in(scene: &mut Scene, lacks: Lacks, options: &LoadOptions) ->
         scene.camera = of_interior.unwrap_or_else(|| framing::camera(bounds, &outside));
     }
     look.set_camera(scene)?;
+    if look.sky.is_some() {
+        let up = [Up::Y, Up::Z].into_iter().find(|up| up.vector() == scene.camera.up).unwrap_or(up);
+        look.set_sky(scene, up, azimuth_of_key(scene, up))?;
+    }
     if lacks.integrator && scene.needs_path() {
         scene.defaults.integrator = Integrator::Path;
     }
-    if lacks.light && !scene.has_bright_surfaces() {
+    if lacks_light && !scene.has_bright_surfaces() {
         let lamps = if is_interior { lamps_inside(scene, bounds) } else { lamps_outside(scene, &axes) };
         let [sky, ground] = if is_interior { AMBIENT_OF_INTERIORS } else { AMBIENT };
         (scene.ambient, scene.ground) = (sky, Some(Ground { ambient: ground, up }));
@@ -84,18 +89,34 @@ struct Lamp {
     irradiance: f32,
 }
 
+/// Returns the azimuth of the main light of a scene that is seen from outside, as of [`Sky::new`], degrees.
+fn azimuth_of_key(scene: &Scene, up: Up) -> f32 {
+    let axes = WorldAxes::with_up(up.vector());
+    let towards = lamp_towards(scene, &axes, &KEY);
+    let north = match up {
+        Up::Y => -towards.z,
+        Up::Z => towards.y,
+    };
+    towards.x.atan2(north).to_degrees()
+}
+
 /// Returns the lights of a scene that is seen from outside.
 fn lamps_outside(scene: &Scene, axes: &WorldAxes) -> [Light; 2] {
+    [KEY, FILL].map(|lamp| Light::Directional {
+        towards: lamp_towards(scene, axes, &lamp),
+        irradiance: Vec3::splat(lamp.irradiance),
+    })
+}
+
+/// Returns the direction towards a lamp, world space.
+fn lamp_towards(scene: &Scene, axes: &WorldAxes, lamp: &Lamp) -> Vec3 {
     let up = axes.up.as_vec3();
     let towards_eye = (scene.camera.eye - scene.camera.target).reject_from_normalized(up);
     let towards_eye = towards_eye.try_normalize().unwrap_or(axes.front.as_vec3());
     let right = up.cross(towards_eye);
-    [KEY, FILL].map(|Lamp { azimuth, elevation, irradiance }| {
-        let (azimuth, elevation) = (azimuth.to_radians(), elevation.to_radians());
-        let horizontal = towards_eye * azimuth.cos() + right * azimuth.sin();
-        let towards = (horizontal * elevation.cos() + up * elevation.sin()).normalize();
-        Light::Directional { towards, irradiance: Vec3::splat(irradiance) }
-    })
+    let (azimuth, elevation) = (lamp.azimuth.to_radians(), lamp.elevation.to_radians());
+    let horizontal = towards_eye * azimuth.cos() + right * azimuth.sin();
+    (horizontal * elevation.cos() + up * elevation.sin()).normalize()
 }
 
 /// Returns the lights of an interior: one in its middle, and one at the eye, whose shadows the eye does not see.

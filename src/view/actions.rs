@@ -12,7 +12,7 @@ use super::{
     session::Session,
 };
 use crate::{
-    frame::RenderOptions,
+    frame::{Integrator, RenderOptions},
     gpu::GpuError,
     output::{self, OutputError},
     render::Displayed,
@@ -48,13 +48,18 @@ impl Session {
                 let axis = self.controller.change_up();
                 self.message = Some(Message::note(Topic::Settings, &format!("{axis} points up")));
             }
+            Action::ChangeMotion if self.settings.options.integrator == Integrator::Path => {
+                self.settings.in_motion = self.settings.in_motion.other();
+                let note = format!("in motion: {}", self.settings.in_motion);
+                self.message = Some(Message::note(Topic::Settings, &note));
+            }
             Action::Show(view) => self.settings.view = view,
             Action::Pick { x, y } => {
-                if let Some(displayed) = gpu.renderer.displayed() {
-                    self.pick(gpu.renderer.options(), displayed, window, (x, y));
+                if let Some(displayed) = gpu.front().displayed() {
+                    self.pick(gpu.front().options(), displayed, window, (x, y));
                 }
             }
-            Action::TogglePanel | Action::ToggleKeys | Action::Quit => {}
+            Action::ChangeMotion | Action::TogglePanel | Action::ToggleKeys | Action::Quit => {}
         }
     }
 
@@ -62,7 +67,8 @@ impl Session {
     /// Otherwise the save stays due, while drawing goes on and the window stays responsive.
     pub fn save_if_due(&mut self, gpu: &GpuSession, window: (u32, u32)) {
         let is_whole = |displayed: Displayed| displayed.size == window && displayed.camera == *self.controller.camera();
-        if gpu.renderer.displayed().is_some_and(is_whole) {
+        let is_at_rest = gpu.front().options().integrator == self.settings.options.integrator;
+        if is_at_rest && gpu.front().displayed().is_some_and(is_whole) {
             self.save_as_it_is(gpu);
         }
     }
@@ -74,7 +80,7 @@ impl Session {
         if !std::mem::take(&mut self.is_save_due) {
             return;
         }
-        match gpu.renderer.displayed_picture() {
+        match gpu.front().displayed_picture() {
             Ok(Some(picture)) => self.saver.save(&self.loaded.scene().name, picture),
             Ok(None) => {}
             Err(error) => self.show_error(Topic::File, &error.to_string()),
@@ -115,10 +121,10 @@ impl Session {
     /// # Errors
     /// The copy fails.
     pub fn point_at(&mut self, gpu: &GpuSession, window: (u32, u32), at: (f64, f64)) -> Result<(), GpuError> {
-        let RenderOptions { width, height, features, .. } = *gpu.renderer.options();
+        let RenderOptions { width, height, features, .. } = *gpu.front().options();
         if !features {
             self.pointed = None;
-        } else if let Some(feature) = gpu.renderer.feature_at(pixel_at(at, window, (width, height)))? {
+        } else if let Some(feature) = gpu.front().feature_at(pixel_at(at, window, (width, height)))? {
             self.pointed = Some(feature);
         }
         Ok(())
@@ -160,7 +166,7 @@ mod tests {
     use crate::{
         engine::choices::{Processor, Request, Workload},
         frame::View,
-        view::{LoadOptions, LoadedScene, Settings, saver::Saver},
+        view::{InMotion, LoadOptions, LoadedScene, Settings, saver::Saver},
     };
 
     #[test]
@@ -186,6 +192,7 @@ mod tests {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell.toml");
         let settings = Settings {
             options: RenderOptions { width: 640, height: 480, ..RenderOptions::default() },
+            in_motion: InMotion::default(),
             max_samples: 1,
             budget_ms: 16.0,
             vsync: true,

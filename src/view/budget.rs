@@ -1,5 +1,7 @@
 //! Chooses how large a picture may be, so that it is drawn within a time budget.
 
+use crate::frame::Integrator;
+
 /// A picture's sides are k / `N_STEPS` of the window's, where the step k is at most `N_STEPS`.
 const N_STEPS: u32 = 16;
 /// The smallest step: 1/8 of a side, which is 1/64 of the pixels.
@@ -11,6 +13,15 @@ const ROOM: f64 = 0.85;
 pub const PART_MS: f64 = 100.0;
 /// Weight of the newest frame in the mean cost.
 const NEWEST: f64 = 0.4;
+
+/// Number of budgets: for each integrator, one of views that need all rays, and one of views that need primary rays
+/// only.
+pub const N_BUDGETS: usize = 4;
+
+/// Returns the index of a budget.
+pub fn budget_ix(integrator: Integrator, needs_primary_rays_only: bool) -> usize {
+    2 * usize::from(integrator == Integrator::Path) + usize::from(needs_primary_rays_only)
+}
 
 /// Chooses the size of pictures that are drawn while the camera moves.
 #[derive(Clone, Debug)]

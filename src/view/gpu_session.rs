@@ -18,10 +18,15 @@ use crate::{
 
 /// A device that renders a scene and shows its pictures in a window.
 pub struct GpuSession {
+    /// The renderer that draws now.
     pub renderer: Renderer,
     /// Choices made for the scene with which the device was opened.
     pub choices: Choices,
     present: Present,
+    /// The renderer of the other integrator, with its pass. It keeps its pipelines and buffers while it is not used.
+    other: Option<(Renderer, Present)>,
+    /// Whether the picture of the other renderer is shown, since `renderer` has not drawn any since it was changed to.
+    shows_other: bool,
     overlay: Overlay,
     pub presenter: Presenter,
     pub context: Arc<Context>,
@@ -49,7 +54,59 @@ impl GpuSession {
         let renderer = Renderer::new(context.clone(), &loaded.world, &options)?;
         let present = Present::new(&context, renderer.resources(), &presenter)?;
         let choices = Choices::of_pictures(loaded.accel, methods);
-        Ok(Self { renderer, choices, present, overlay, presenter, context })
+        let (other, shows_other) = (None, false);
+        Ok(Self { renderer, choices, present, other, shows_other, overlay, presenter, context })
+    }
+
+    /// Changes to the renderer of another integrator. It is made at the first change; from then on, both are kept. The
+    /// picture of the previous one stays on screen until the other one has drawn a picture. `options` have the
+    /// integrator, and a size for which the buffers are made.
+    ///
+    /// # Errors
+    /// The buffers exceed the device's memory. Then nothing has changed.
+    pub fn change_to(&mut self, options: &RenderOptions) -> Result<(), GpuError> {
+        let is_of = |renderer: &Renderer| renderer.options().integrator == options.integrator;
+        let (renderer, present) = match self.other.take_if(|(renderer, _)| is_of(renderer)) {
+            Some(other) => other,
+            None => {
+                let renderer = self.renderer.sharing(options)?;
+                let present = Present::new(&self.context, renderer.resources(), &self.presenter)?;
+                (renderer, present)
+            }
+        };
+        let before = (std::mem::replace(&mut self.renderer, renderer), std::mem::replace(&mut self.present, present));
+        self.other = Some(before);
+        self.shows_other = true;
+        Ok(())
+    }
+
+    /// Releases the renderer that is not used.
+    pub fn drop_other(&mut self) {
+        if !self.shows_other {
+            self.other = None;
+        }
+    }
+
+    /// Notes that the renderer that draws now has a picture of the present view, which is shown from now on.
+    pub fn note_picture(&mut self) {
+        self.shows_other = false;
+    }
+
+    /// Returns the renderer whose picture is shown.
+    pub fn front(&self) -> &Renderer {
+        match &self.other {
+            Some((other, _)) if self.shows_other => other,
+            _ => &self.renderer,
+        }
+    }
+
+    /// Replaces the renderer that draws, and with it the other one.
+    fn install(&mut self, renderer: Renderer) -> Result<(), GpuError> {
+        let present = Present::new(&self.context, renderer.resources(), &self.presenter)?;
+        self.context.wait()?;
+        (self.renderer, self.present) = (renderer, present);
+        (self.other, self.shows_other) = (None, false);
+        Ok(())
     }
 
     /// Replaces the scene. If that fails, the previous scene stays.
@@ -60,9 +117,7 @@ impl GpuSession {
         let camera = *self.renderer.camera();
         let mut renderer = Renderer::new(self.context.clone(), &loaded.world, self.renderer.options())?;
         renderer.set_camera(&camera);
-        self.context.wait()?;
-        self.renderer = renderer;
-        Ok(())
+        self.install(renderer)
     }
 
     /// Replaces the scene by that of another file, from whose camera the next picture is drawn. Chooses traversal and
@@ -75,9 +130,7 @@ impl GpuSession {
         let RenderOptions { width, height, .. } = *self.renderer.options();
         let methods = methods_for(&self.context, loaded, loaded.load_options.request, (width, height))?;
         let options = methods.apply(&RenderOptions { width, height, ..options.clone() });
-        let renderer = Renderer::new(self.context.clone(), &loaded.world, &options)?;
-        self.context.wait()?;
-        self.renderer = renderer;
+        self.install(Renderer::new(self.context.clone(), &loaded.world, &options)?)?;
         Ok(options)
     }
 
@@ -91,8 +144,9 @@ impl GpuSession {
         let before = self.context.replace_shaders(shaders);
         let remade = Present::new(&self.context, self.renderer.resources(), &self.presenter)
             .and_then(|present| self.renderer.remake_passes().map(|()| self.present = present));
-        if remade.is_err() {
-            self.context.replace_shaders(before);
+        match remade {
+            Ok(()) => (self.other, self.shows_other) = (None, false),
+            Err(_) => drop(self.context.replace_shaders(before)),
         }
         remade
     }
@@ -111,7 +165,11 @@ impl GpuSession {
     /// # Errors
     /// A Vulkan call fails.
     pub fn show(&mut self, window: (u32, u32), overlay: Option<&OverlayFrame>) -> Result<bool, GpuError> {
-        let Self { renderer, present, overlay: drawer, presenter, .. } = self;
+        let Self { renderer, present, other, shows_other, overlay: drawer, presenter, .. } = self;
+        let (renderer, present) = match other {
+            Some((renderer, present)) if *shows_other => (&*renderer, &*present),
+            _ => (&*renderer, &*present),
+        };
         presenter.present(window, |commands, image| {
             if let Some(displayed) = renderer.displayed() {
                 present.record(commands, renderer.resources(), displayed.size, image);

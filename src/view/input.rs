@@ -28,6 +28,8 @@ pub enum Action {
     GoHome,
     /// Makes another axis point up in the picture.
     ChangeUp,
+    /// Draws the other picture while the camera moves.
+    ChangeMotion,
     TogglePanel,
     /// Shows or hides the list of keys.
     ToggleKeys,
@@ -127,6 +129,7 @@ impl Input {
             KeyCode::KeyF => Some(Action::FrameScene),
             KeyCode::Home => Some(Action::GoHome),
             KeyCode::KeyU => Some(Action::ChangeUp),
+            KeyCode::KeyM => Some(Action::ChangeMotion),
             KeyCode::KeyH | KeyCode::F1 => Some(Action::ToggleKeys),
             KeyCode::Tab => Some(Action::TogglePanel),
             KeyCode::Escape => Some(Action::Quit),

@@ -34,6 +34,6 @@ pub use self::{
     error::ViewError,
     loaded_scene::{LoadOptions, LoadedScene},
     opened::{Opened, Opener},
-    panel::Settings,
+    panel::{InMotion, Settings},
     tour::Tour,
 };

@@ -3,7 +3,7 @@
 use std::{path::Path, sync::Arc, time::Instant};
 
 use super::{
-    budget::Budget,
+    budget::{Budget, N_BUDGETS},
     controller::Controller,
     gpu_session::GpuSession,
     loaded_scene::LoadedScene,
@@ -51,8 +51,8 @@ impl Session {
         self.picked = None;
         self.profile = Profile::default();
         // The times and the buffers of the previous scene say nothing about this one.
-        self.budgets = [(); 2].map(|()| Budget::new(self.settings.budget_ms));
-        self.room = (0, 0);
+        self.budgets = [(); N_BUDGETS].map(|()| Budget::new(self.settings.budget_ms));
+        self.rooms = [(0, 0); 2];
         self.pace.moved(Instant::now());
         self.clear_message(Topic::Scene);
         true

@@ -3,24 +3,27 @@
 use std::time::Instant;
 
 use super::{
-    budget::{Budget, PART_MS, differs_by_two},
+    budget::{Budget, N_BUDGETS, PART_MS, budget_ix, differs_by_two},
     controller::Controller,
     gpu_session::GpuSession,
     history::{FrameRecord, History},
     loaded_scene::LoadedScene,
     message::{Message, Topic},
     pace::Pace,
-    panel::{Facts, Settings},
+    panel::{Facts, InMotion, Settings},
     pick::Picked,
     saver::Saver,
 };
 use crate::{
     accel::Statistics,
-    frame::{Profile, RenderOptions, View},
+    frame::{Integrator, Profile, RenderOptions, View},
     gpu::GpuError,
     layout::Feature,
+    scene::RenderDefaults,
 };
 
+/// Number of parts of a picture at rest whose time is unknown, since others were drawn while the camera moved.
+const FIRST_PARTS: u32 = 64;
 /// Least length in seconds of the history that the panel shows.
 const HISTORY_S: f64 = 5.0;
 /// A pixel has the cost view's full brightness if its rays read this many nodes per level of the kd-tree. A pixel has
@@ -46,8 +49,8 @@ pub struct Session {
     pub history: History,
     /// All frames, without the times of their passes.
     pub all_frames: History,
-    /// Budget of views that need all rays, then of views that need primary rays only.
-    pub(super) budgets: [Budget; 2],
+    /// Budgets by [`budget_ix`].
+    pub(super) budgets: [Budget; N_BUDGETS],
     pub(super) profile: Profile,
     /// Whether a user moves the camera. Then a new picture is first drawn small, so that it is shown at once. With a
     /// script, only frames in which the camera moves are drawn small: see `Script::direct`.
@@ -56,8 +59,11 @@ pub struct Session {
     is_moving: bool,
     /// Whether the last frame completed a sample.
     has_new_sample: bool,
-    /// Maximum width and maximum height of all pictures so far, pixels. The buffers are large enough for them.
-    pub(super) room: (u32, u32),
+    /// The integrator that draws now.
+    drawing: Integrator,
+    /// Maximum width and maximum height of all pictures so far, pixels. The buffers of the renderers, by
+    /// [`Integrator`], are large enough for them.
+    pub(super) rooms: [(u32, u32); 2],
     /// Size of the window for which the last frame was drawn, pixels.
     window: (u32, u32),
     /// Time spent so far on the sample that is being drawn, milliseconds.
@@ -85,7 +91,8 @@ impl Session {
     ) -> Self {
         Self {
             controller: Controller::new(loaded.scene().camera, loaded.bounds()),
-            budgets: [(); 2].map(|()| Budget::new(settings.budget_ms)),
+            budgets: [(); N_BUDGETS].map(|()| Budget::new(settings.budget_ms)),
+            drawing: settings.options.integrator,
             loaded,
             settings,
             pace: Pace::default(),
@@ -96,7 +103,7 @@ impl Session {
             is_moving: false,
             has_new_sample: false,
             sample_ms: 0.0,
-            room: (0, 0),
+            rooms: [(0, 0); 2],
             window: (0, 0),
             picked: None,
             pointed: None,
@@ -116,13 +123,37 @@ impl Session {
             || self.controller.flight.is_under_way()
             || self.pace.is_moving(now)
             || self.is_learning()
+            || options.integrator != self.settings.options.integrator // the picture at rest is due
             || self.has_new_sample // the overlay shows its figures a frame later
             || !self.is_done(gpu)
     }
 
     /// Returns whether the time of a picture is still unknown. Small pictures are drawn until it is known.
     fn is_learning(&self) -> bool {
-        self.is_interactive && self.budget().full_ms().is_none()
+        self.is_interactive && self.budgets[self.budget_ix(self.in_motion())].full_ms().is_none()
+    }
+
+    /// Returns the integrator of pictures while the camera moves. Views other than the picture show the numbers of the
+    /// picture's own integrator.
+    fn in_motion(&self) -> Integrator {
+        match self.settings.view {
+            View::Picture => self.settings.in_motion.integrator(self.settings.options.integrator),
+            _ => self.settings.options.integrator,
+        }
+    }
+
+    /// Returns the options of a picture of the window's size by an integrator.
+    fn whole(&self, integrator: Integrator, (width, height): (u32, u32)) -> RenderOptions {
+        let features = self.settings.view != View::Picture;
+        let at_rest = &self.settings.options;
+        let whole = RenderOptions { width, height, features, ..at_rest.clone() };
+        if integrator == at_rest.integrator {
+            return whole;
+        }
+        // What differs between integrators is what the scene states for this one.
+        let RenderDefaults { max_depth, denoise, .. } = self.loaded.scene().defaults.for_integrator(Some(integrator));
+        let max_depth = max_depth.min(at_rest.max_depth);
+        RenderOptions { integrator, max_depth, denoise, stands_in: true, ..whole }
     }
 
     /// Returns whether the picture has all its samples.
@@ -137,13 +168,18 @@ impl Session {
         if needs_one { 1 } else { self.settings.max_samples }
     }
 
-    /// Returns the budget of the current view.
+    /// Returns the index of the budget of the current view by an integrator.
+    fn budget_ix(&self, integrator: Integrator) -> usize {
+        budget_ix(integrator, self.settings.view.needs_primary_rays_only())
+    }
+
+    /// Returns the budget of what is drawn now.
     fn budget(&self) -> &Budget {
-        &self.budgets[usize::from(self.settings.view.needs_primary_rays_only())]
+        &self.budgets[self.budget_ix(self.drawing)]
     }
 
     fn budget_mut(&mut self) -> &mut Budget {
-        &mut self.budgets[usize::from(self.settings.view.needs_primary_rays_only())]
+        &mut self.budgets[self.budget_ix(self.drawing)]
     }
 
     /// Draws one more sample or a part of it. While the camera moves, the picture is as much smaller than the window
@@ -163,8 +199,8 @@ impl Session {
         gpu.presenter.set_vsync(self.settings.vsync);
         self.budgets.iter_mut().for_each(|budget| budget.set_budget(self.settings.budget_ms));
         self.fit_window(gpu, window)?;
-        let features = self.settings.view != View::Picture;
-        let whole = RenderOptions { width: window.0, height: window.1, features, ..self.settings.options.clone() };
+        self.drawing = gpu.renderer.options().integrator;
+        let whole = self.whole(self.drawing, window);
         let (view, brightest) = self.view();
         let is_other_view = gpu.renderer.set_view(view, brightest);
         let makes_room = !self.has_room(gpu, &whole);
@@ -179,6 +215,14 @@ impl Session {
         }
         let is_moving = self.pace.is_moving(now) || self.is_learning();
         self.is_moving = self.pace.is_moving(now);
+        let integrator = if is_moving { self.in_motion() } else { self.settings.options.integrator };
+        let whole = self.whole(integrator, window);
+        let is_changed = integrator != gpu.renderer.options().integrator;
+        if is_changed {
+            self.change_to(gpu, &whole)?;
+        }
+        let is_elsewhere = self.controller.camera() != gpu.renderer.camera();
+        let makes_room = if is_changed { !self.has_room(gpu, &whole) } else { makes_room };
         let (width, height) = if is_moving { self.budget().size(window) } else { window };
         let asked = RenderOptions { width, height, ..whole.clone() };
         let is_new = asked != *gpu.renderer.options();
@@ -199,12 +243,41 @@ impl Session {
         }
         self.has_new_sample = false;
         if !self.is_done(gpu) {
-            self.draw_batch(gpu, window, is_moving)
-        } else if is_new {
-            gpu.renderer.show()
-        } else {
-            Ok(())
+            self.draw_batch(gpu, window, is_moving)?;
+        } else if is_new || is_changed {
+            gpu.renderer.show()?;
         }
+        if gpu.renderer.n_samples() > 0 {
+            gpu.note_picture();
+        }
+        if !self.keeps_both() {
+            gpu.drop_other();
+        }
+        Ok(())
+    }
+
+    /// Changes to the renderer of another integrator. If the device refuses it, the one that is used stays.
+    fn change_to(&mut self, gpu: &mut GpuSession, whole: &RenderOptions) -> Result<(), GpuError> {
+        match gpu.change_to(whole) {
+            Ok(()) => {
+                self.drawing = whole.integrator;
+                let (view, brightest) = self.view();
+                gpu.renderer.set_view(view, brightest);
+                Ok(())
+            }
+            Err(error) => {
+                // Neither integrator takes the place of the other any more.
+                self.settings.in_motion = InMotion::Path;
+                self.take_back(gpu, error)
+            }
+        }
+    }
+
+    /// Returns whether the picture in motion is by another integrator than the one at rest, so that both renderers are
+    /// kept.
+    fn keeps_both(&self) -> bool {
+        let at_rest = self.settings.options.integrator;
+        self.settings.in_motion.integrator(at_rest) != at_rest
     }
 
     /// Adapts the budgets if the window's size has changed.
@@ -221,11 +294,12 @@ impl Session {
     }
 
     /// Returns whether the renderer's buffers are large enough for a picture with the options `whole`. Also adds the
-    /// picture's size to `room`, since the caller enlarges the buffers if they are too small.
+    /// picture's size to `rooms`, since the caller enlarges the buffers if they are too small.
     fn has_room(&mut self, gpu: &GpuSession, whole: &RenderOptions) -> bool {
         let now = gpu.renderer.options();
-        let has_room = whole.width <= self.room.0 && whole.height <= self.room.1;
-        self.room = (self.room.0.max(whole.width), self.room.1.max(whole.height));
+        let room = &mut self.rooms[usize::from(whole.integrator == Integrator::Path)];
+        let has_room = whole.width <= room.0 && whole.height <= room.1;
+        *room = (room.0.max(whole.width), room.1.max(whole.height));
         let filter = |options: &RenderOptions| std::mem::discriminant(&options.noise_filter());
         has_room && whole.features == now.features && filter(whole) == filter(now)
     }
@@ -236,7 +310,7 @@ impl Session {
         let renderer = &mut gpu.renderer;
         if !renderer.is_pending() {
             self.sample_ms = 0.0;
-            let most_pixels = self.budget().part_pixels(window).filter(|_| !is_moving);
+            let most_pixels = self.part_pixels(window).filter(|_| !is_moving);
             if renderer.n_samples() == 0 || differs_by_two(most_pixels, renderer.most_pixels()) {
                 renderer.limit_batches(most_pixels)?;
             }
@@ -259,13 +333,23 @@ impl Session {
         Ok(())
     }
 
+    /// Returns the number of pixels of a part of a picture at rest.
+    fn part_pixels(&self, window: (u32, u32)) -> Option<u32> {
+        let is_unknown = self.budget().full_ms().is_none() && self.keeps_both();
+        if is_unknown { Some((window.0 * window.1).div_ceil(FIRST_PARTS)) } else { self.budget().part_pixels(window) }
+    }
+
     /// Returns to the options that the device accepted last, and shows a message. The viewer goes on, because the
     /// user may be unable to undo the change, such as the window's size. Returns the error if the device is lost.
     fn take_back(&mut self, gpu: &GpuSession, error: GpuError) -> Result<(), GpuError> {
         if error.is_device_lost() {
             return Err(error);
         }
-        self.settings.options = gpu.renderer.options().clone();
+        if gpu.renderer.options().integrator == self.settings.options.integrator || !self.keeps_both() {
+            self.settings.options = gpu.renderer.options().clone();
+        } else {
+            self.settings.in_motion = InMotion::Path;
+        }
         self.show_error(Topic::Settings, &error.to_string());
         Ok(())
     }

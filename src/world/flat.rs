@@ -15,7 +15,7 @@ use crate::{
     },
     scene::{
         self, Alpha, Camera, Conductor, Environment, Ground, Instance, Lobes, Mesh, Microfacet, RenderDefaults, Scene,
-        Transform,
+        Sky, Transform,
     },
 };
 
@@ -39,7 +39,7 @@ pub struct FlatScene {
     pub lights: Vec<Light>,
     /// Rectangles, disks and spheres that shine. Only the path tracer knows them.
     pub area_lights: Vec<AreaLight>,
-    /// The image of what is beyond the scene. Only the path tracer knows it.
+    /// The image of what is beyond the scene, or of its sky. Only the path tracer knows it.
     pub environment: Option<Environment>,
     /// The camera that renders the scene unless another one is set.
     pub camera: Camera,
@@ -71,6 +71,8 @@ impl FlatScene {
             let material_of = |slot: &u32| instance.materials[*slot as usize % instance.materials.len()];
             triangle_materials.extend(mesh.slots.iter().map(material_of));
         }
+        let sky = scene.sky.as_ref().map(Sky::environment);
+        let sun = scene.sky.filter(|sky| sky.has_sun).map(|sky| sky.sun());
         Ok(Self {
             name: scene.name.clone(),
             triangles,
@@ -78,9 +80,9 @@ impl FlatScene {
             materials: scene.materials.iter().map(Material::from).collect(),
             material_names: scene.materials.iter().map(|material| material.name.clone()).collect(),
             textures: Textures::new(scene)?,
-            lights: scene.lights.iter().filter_map(flat_light).collect(),
+            lights: scene.lights.iter().chain(&sun).filter_map(flat_light).collect(),
             area_lights: scene.lights.iter().filter_map(area_light).collect(),
-            environment: scene.environment.clone(),
+            environment: sky.or_else(|| scene.environment.clone()),
             camera: scene.camera,
             ambient: scene.ambient,
             ground: scene.ground,

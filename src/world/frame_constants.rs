@@ -1,10 +1,10 @@
 //! Constants of a frame of a world, as the kernels read them.
 
 use crate::{
-    frame::RenderOptions,
+    frame::{Integrator, RenderOptions},
     layout::Frame,
     scene::{Ground, Up},
-    world::World,
+    world::{World, stand_in::StandIn},
 };
 
 impl World {
@@ -13,14 +13,19 @@ impl World {
     pub fn frame_constants(&self, options: &RenderOptions) -> Frame {
         let scene = self.scene();
         let ground = scene.ground.unwrap_or(Ground { ambient: scene.ambient, up: Up::Y });
+        let stand_in = match options.stands_in && options.integrator == Integrator::Whitted {
+            true => self.stand_in(ground.up),
+            false => StandIn::default(),
+        };
+        let (sky, ground_ambient) = (scene.ambient + stand_in.sky, ground.ambient + stand_in.ground);
         let mut frame = Frame {
             n_triangles: scene.triangles.len() as u32,
             n_lights: scene.lights.len() as u32,
             // Equal colours give this colour and no tilt, without any rounding.
-            ambient: scene.ambient + (ground.ambient - scene.ambient) / 2.0,
-            ambient_tilt: (scene.ambient - ground.ambient) / 2.0,
+            ambient: sky + (ground_ambient - sky) / 2.0,
+            ambient_tilt: (sky - ground_ambient) / 2.0,
             up_axis: if ground.up == Up::Z { 2 } else { 1 },
-            background: scene.background,
+            background: stand_in.background.unwrap_or(scene.background),
             ..Frame::default()
         };
         frame.set_options(options);

@@ -11,6 +11,8 @@ mod geometry;
 mod levels;
 mod mismatch;
 mod path_materials;
+mod scene_hash;
+mod stand_in;
 mod texture_arrays;
 mod textured;
 
@@ -18,6 +20,7 @@ use std::sync::{Arc, OnceLock};
 
 use glam::Vec3;
 
+use self::stand_in::StandIn;
 #[cfg(test)]
 pub(crate) use self::texture_arrays::tests::{arrays_of, scene_of};
 pub use self::{
@@ -30,7 +33,7 @@ use crate::{
         grid::DeviceBuild,
         kdtree::{BuildOptions, KdTree},
     },
-    scene::Scene,
+    scene::{Scene, Up},
     util::progress::Progress,
 };
 
@@ -49,6 +52,8 @@ struct Parts {
     accel_options: AccelOptions,
     /// Made when they are first needed.
     emitters: OnceLock<Emitters>,
+    /// The same, for each axis that may point up.
+    stand_ins: [OnceLock<StandIn>; 2],
 }
 
 impl World {
@@ -87,7 +92,13 @@ impl World {
     ) -> Result<Self, Mismatch> {
         mismatch::check_materials(&scene)?;
         let accel = Accel::new_observed(&scene.triangles, options, progress);
-        Ok(Self(Arc::new(Parts { scene, accel, accel_options: options.clone(), emitters: OnceLock::new() })))
+        Ok(Self(Arc::new(Parts {
+            scene,
+            accel,
+            accel_options: options.clone(),
+            emitters: OnceLock::new(),
+            stand_ins: Default::default(),
+        })))
     }
 
     /// Joins a scene and a kd-tree that was built elsewhere. `build_options`: the options that the tree was built
@@ -99,7 +110,13 @@ impl World {
         mismatch::check_materials(&scene)?;
         let (accel, accel_options) = (Accel::KdTree(tree), AccelOptions::KdTree(build_options.clone()));
         Geometry::new(&scene.triangles, &accel)?;
-        Ok(Self(Arc::new(Parts { scene, accel, accel_options, emitters: OnceLock::new() })))
+        Ok(Self(Arc::new(Parts {
+            scene,
+            accel,
+            accel_options,
+            emitters: OnceLock::new(),
+            stand_ins: Default::default(),
+        })))
     }
 
     /// The flattened scene.
@@ -110,6 +127,11 @@ impl World {
     /// The tables from which the path tracer picks lights. They are made at the first call.
     pub fn emitters(&self) -> &Emitters {
         self.0.emitters.get_or_init(|| Emitters::new(&self.0.scene))
+    }
+
+    /// The ambient light that stands for light of which only paths know. It is made at the first call.
+    fn stand_in(&self, up: Up) -> StandIn {
+        *self.0.stand_ins[usize::from(up == Up::Z)].get_or_init(|| StandIn::new(&self.0.scene, up))
     }
 
     /// The acceleration structure over the scene's triangles.

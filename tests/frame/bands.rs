@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{Vec3, vec3};
 use kdray::{
-    frame::{BounceStats, Crop, Denoise, Picture, Primary, RenderOptions},
+    frame::{BounceStats, Crop, Denoise, Goal, Picture, Primary, RenderOptions},
     gpu::{Context, DeviceOverrides, GpuError},
     layout::Feature,
     render::{BandedRenderer, Renderer},
@@ -75,7 +75,7 @@ fn in_bands(context: &Arc<Context>, options: &RenderOptions, n_samples: u32) -> 
     let made = [scene.camera, ELSEWHERE].map(|camera| {
         renderer.set_camera(&camera);
         let mut n_told = 0;
-        let drawn = renderer.draw(n_samples, || n_told += 1).expect("a drawing");
+        let drawn = renderer.draw(Goal::Samples(n_samples), &mut || n_told += 1).expect("a drawing");
         assert_eq!(n_told, n_samples * n_bands);
         let n_batches = drawn.profile.passes.iter().filter_map(|pass| pass.batch).max().map_or(0, |batch| batch + 1);
         assert_eq!(drawn.profile.n_batches, n_batches);

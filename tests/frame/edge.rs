@@ -4,13 +4,13 @@
 use glam::{Vec3, vec3};
 use kdray::{
     cpu::{self, Batching},
-    frame::{Crop, Denoise, Integrator, Picture, RenderOptions, sampling::samples_log2},
+    frame::{Crop, Denoise, Goal, Integrator, Picture, RenderOptions, sampling::samples_log2},
     gpu::DeviceOverrides,
     render::{BandedRenderer, Renderer},
     world::FlatScene,
 };
 
-use super::studio::{assert_silent, device, differing, identical, world_of};
+use super::studio::{assert_silent, device, identical, world_of};
 use crate::support::{pretended, scenes};
 
 fn options(width: u32, height: u32) -> RenderOptions {
@@ -38,17 +38,26 @@ fn on_cpu(scene: &FlatScene, options: &RenderOptions, n_samples: u32) -> Picture
     renderer.picture()
 }
 
+/// Returns the root of the mean squared difference of two pictures, divided by that of their radiance.
+fn difference(a: &Picture, b: &Picture) -> f32 {
+    let [a, b] = [a, b].map(|picture| picture.radiance.iter().map(|&[r, g, b, _]| vec3(r, g, b)));
+    let squares = a.clone().zip(b).map(|(a, b)| (a - b).length_squared()).sum::<f32>();
+    (squares / a.map(Vec3::length_squared).sum::<f32>()).sqrt()
+}
+
 #[test]
 fn device_and_cpu_agree() {
     let scene = scenes::mixed_outdoors();
     for n_samples in [1, 3] {
         let (found, expected) =
             (on_device(&scene, &options(40, 30), n_samples), on_cpu(&scene, &options(40, 30), n_samples));
-        // A path that takes another way also changes the pixels around.
-        let n_differing = differing(&found, &expected, 1e-2).len();
-        assert!(n_differing <= 60, "{n_differing} of 1200 pixels differ");
+        // A path that takes another way also changes the pixels around, all of them a little. There are more such paths
+        // on drivers whose sines are rough.
+        let same = difference(&found, &expected);
+        assert!(same < 0.1, "{same} with {n_samples} samples");
         let unfiltered = RenderOptions { denoise: Denoise::Off, ..options(40, 30) };
-        assert!(differing(&found, &on_cpu(&scene, &unfiltered, n_samples), 1e-2).len() > 300);
+        let others = difference(&found, &on_cpu(&scene, &unfiltered, n_samples));
+        assert!(others > 0.3, "{others} with {n_samples} samples");
     }
 }
 
@@ -117,7 +126,7 @@ fn batches_and_bands_change_no_bit() {
     let narrow = pretended(DeviceOverrides { storage_range: Some(31 * 180 * 128), ..DeviceOverrides::default() });
     let mut renderer = BandedRenderer::new(narrow.clone(), &world, &options).expect("a renderer");
     assert!(renderer.n_bands() > 1);
-    renderer.draw(3, || ()).expect("a picture");
+    renderer.draw(Goal::Samples(3), &mut || ()).expect("a picture");
     assert!(identical(&whole, &renderer.picture().expect("a picture")));
     [&context, &narrow].into_iter().for_each(|context| assert_silent(context));
 }
@@ -152,7 +161,7 @@ fn pictures_know_their_noise() {
     for (denoise, n_samples) in [(Denoise::Off, 16), (Denoise::Edge, 20), (Denoise::Paper { threshold: 0.1 }, 1)] {
         let with_filter = RenderOptions { denoise, ..noisy.clone() };
         let mut renderer = BandedRenderer::new(context.clone(), &world_of(&scene), &with_filter).expect("a renderer");
-        let features = renderer.draw(n_samples, || ()).expect("a picture").features;
+        let features = renderer.draw(Goal::Samples(n_samples), &mut || ()).expect("a picture").features;
         assert!(features.iter().all(|feature| feature.n_samples == n_samples));
         assert!(renderer.picture().expect("a picture").radiance.iter().all(|pixel| pixel[3] == 1.0));
         let variance = features.iter().map(|feature| feature.variance).sum::<f32>() / features.len() as f32;

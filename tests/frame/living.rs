@@ -3,10 +3,10 @@
 use glam::vec3;
 use kdray::{
     accel::kdtree::Traversal,
-    frame::{Denoise, Picture, Primary, RenderOptions, Tonemap},
+    frame::{Denoise, Integrator, Picture, Primary, RenderOptions, Tonemap},
     gpu::GpuError,
     render::Renderer,
-    scene::{Camera, Projection},
+    scene::{Camera, Environment, Projection},
     world::FlatScene,
 };
 
@@ -32,6 +32,30 @@ fn sampled(renderer: &mut Renderer, n_samples: u32) -> Picture {
 
 fn sampled_anew(scene: &FlatScene, options: &RenderOptions, n_samples: u32) -> Picture {
     sampled(&mut Renderer::new(device(), &world_of(scene), options).expect("a renderer"), n_samples)
+}
+
+/// The renderers of both integrators share the scene's arrays, in whichever order they are made.
+#[test]
+fn renderers_that_share_a_scene_draw_what_new_ones_draw() {
+    let colours = (0..32).map(|ix| vec3(ix as f32 / 8.0, 0.5, 1.0)).collect();
+    let (environment, _) = Environment::new([8, 4], colours, (0.0, 1.0)).unwrap();
+    let scene = FlatScene { environment: Some(environment), ..scenes::mixed_outdoors() };
+    let (world, context) = (world_of(&scene), device());
+    let of = |integrator, traversal| RenderOptions { integrator, traversal, ..options(24, 18, 3) };
+    for integrators in [[Integrator::Whitted, Integrator::Path], [Integrator::Path, Integrator::Whitted]] {
+        for traversals in [[Traversal::Ropes; 2], [Traversal::Ropes, Traversal::MaskBoxes]] {
+            let [first, second] = [0, 1].map(|ix| of(integrators[ix], traversals[ix]));
+            let mut one = Renderer::new(context.clone(), &world, &first).expect("a renderer");
+            let mut other = one.sharing(&second).expect("a renderer");
+            for is_other in [true, false, true] {
+                let (renderer, options) = if is_other { (&mut other, &second) } else { (&mut one, &first) };
+                assert!(identical(&sampled(renderer, 2), &sampled_anew(&scene, options, 2)), "{options:?}");
+            }
+            one.set_options(&second).expect("options");
+            assert!(identical(&sampled(&mut one, 2), &sampled(&mut other, 2)), "{second:?}");
+        }
+    }
+    assert_silent(&context);
 }
 
 #[test]

@@ -5,7 +5,7 @@ use glam::{Vec3, vec3};
 use kdray::{
     cpu::{self, Batching},
     frame::{
-        Crop, Denoise, FrameKind, Integrator, Pass, PathOptions, Picture, PixelFilter, Plan, RenderOptions, plan,
+        Crop, Denoise, FrameKind, Goal, Integrator, Pass, PathOptions, Picture, PixelFilter, Plan, RenderOptions, plan,
         sampling::samples_log2,
     },
     gpu::DeviceOverrides,
@@ -146,7 +146,7 @@ fn batches_and_bands_change_no_bit() {
     let narrow = pretended(DeviceOverrides { storage_range: Some(31 * 25 * 128), ..DeviceOverrides::default() });
     let mut renderer = BandedRenderer::new(narrow.clone(), &world, &options).expect("a renderer");
     assert!(renderer.n_bands() > 3);
-    renderer.draw(20, || ()).expect("a picture");
+    renderer.draw(Goal::Samples(20), &mut || ()).expect("a picture");
     assert!(identical(&whole, &renderer.picture().expect("a picture")));
     let whole = on_cpu(&scene, &options, 20);
     for n_pixels in [1, 100] {

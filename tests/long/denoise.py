@@ -9,7 +9,8 @@ pictures of many samples, which are kept in FOLDER for the next time. Printed ar
 (squared differences over the squared reference plus 0.01) and LDR-FLIP (Andersson et al. 2020). Pictures are kept in
 FOLDER, too: the reference and those of all filters side by side, for each number of samples. "WORSE" marks where
 `edge` does not have the smallest error of both kinds. The program fails if its FLIP is not the smallest, or its
-relative error not less than that without a filter. """
+relative error not less than that without a filter.
+"""
 
 import argparse
 import subprocess

@@ -2,14 +2,15 @@
 
     python3 tests/long/loading.py KDRAY [--repeat N] [--only NAME,NAME] [--obj FILE]
 
-The script makes three files, renders each by the CPU in a tiny picture, and prints medians of the times that `kdray
+The script makes four scenes, renders each by the CPU in a tiny picture, and prints medians of the times that `kdray
 render --profile` reports. It fails if one exceeds its bound, which is for two cores.
 
 | name | file | bound |
 |---|---|---|
 | textures | glTF, 262,088 triangles in 48 primitives, 48 PNG images of 1024x1024 | 2 s to load and to build the tree |
-| ply | binary PLY, 9,999,392 triangles | 10 s to load |
+| ply | binary PLY, 9,999,392 triangles | 5 s to load |
 | instances | TOML that names a PLY file of 69,938 triangles a hundred times | 2 s to load |
+| files | TOML that names 40 PLY files of 249,218 triangles | 2 s to load |
 
 --obj measures an OBJ file as well, without a bound.
 """
@@ -126,6 +127,17 @@ def write_instances(folder, n):
     return path
 
 
+def write_files(folder, n):
+    path = os.path.join(folder, "files.toml")
+    with open(path, "w") as file:
+        file.write("ambient = [1, 1, 1]\n[camera]\neye = [1600, 900, 3000]\ntarget = [1600, 0, 1000]\n")
+        for ix in range(n):
+            write_ply(os.path.join(folder, f"{ix}.ply"), 353, 353)
+            position = f"[{400.0 * (ix % 8)}, 0.0, {400.0 * (ix // 8)}]"
+            file.write(f'[[mesh]]\nfile = "{ix}.ply"\ntransform = {{ translate = {position} }}\n')
+    return path
+
+
 def times(kdray, scene, repeat, build=True):
     """Returns the median times of loading and of building, s. Without `build`, the structure is a grid, which is
     built quickly."""
@@ -146,7 +158,7 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("kdray")
     parser.add_argument("--repeat", type=int, default=3)
-    parser.add_argument("--only", default="textures,ply,instances")
+    parser.add_argument("--only", default="textures,ply,instances,files")
     parser.add_argument("--obj")
     arguments = parser.parse_args()
     kdray, repeat, names = os.path.abspath(arguments.kdray), arguments.repeat, arguments.only.split(",")
@@ -165,13 +177,16 @@ def main():
             path = os.path.join(folder, "large.ply")
             write_ply(path, 2236, 2236)
             load, build = times(kdray, path, 1, build=False)
-            report("ply", load, build, load > 10.0)
+            report("ply", load, build, load > 5.0)
         if "instances" in names:
             write_ply(os.path.join(folder, "bunny.ply"), 187, 187)
             one, build_one = times(kdray, write_instances(folder, 1), repeat)
             report("instance", one, build_one, False)
             load, build = times(kdray, write_instances(folder, 100), 1, build=False)
             report("instances", load, build, load > 2.0)
+        if "files" in names:
+            load, build = times(kdray, write_files(folder, 40), repeat, build=False)
+            report("files", load, build, load > 2.0)
     if arguments.obj:
         load, build = times(kdray, arguments.obj, repeat)
         report("obj", load, build, False)

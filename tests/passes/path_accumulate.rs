@@ -18,6 +18,7 @@ fn agrees_with_its_twin() {
         frame.samples_log2 = log2;
         n_samples += 1 << log2;
         frame.n_samples = n_samples;
+        frame.samples_reciprocal = 1.0 / n_samples as f32;
         stage.resources.set_constants(&frame);
         stage.resources.frame.upload(&[frame]).expect("constants");
         let samples: Vec<[f32; 4]> = (0..1200).map(|_| [0; 4].map(|_| random.between(0.0, 5.0))).collect();

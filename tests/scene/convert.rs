@@ -5,7 +5,7 @@ use std::{f32::consts::PI, fs, path::Path};
 use base64::{Engine, engine::general_purpose::STANDARD};
 use glam::Vec3;
 use kdray::{
-    scene::{Alpha, Light, LoadOptions, PathDefaults, RenderDefaults, Scene, scene_file_of},
+    scene::{Alpha, Light, LightChoice, LoadOptions, PathDefaults, RenderDefaults, Scene, scene_file_of},
     world::FlatScene,
 };
 use serde_json::json;
@@ -280,4 +280,22 @@ fn scene_files_have_several_cameras() {
     let blind = camera("a", 1).replace("[1, 0, 5]", "[0, 0, 0]");
     let error = load(&[("s.toml", format!("{disc}{blind}").as_bytes())]).unwrap_err().to_string();
     assert!(error.contains("s.toml:5: camera 1: eye, target and up"), "{error}");
+}
+
+/// A converted sky is the same, and a light of the user's takes the place of its sun.
+#[test]
+fn converted_skies_are_the_same() {
+    let folder = TempDir::new().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    fs::create_dir(path("in")).unwrap();
+    let toml = "[sky]\ndirection = [1, -2, -3]\nturbidity = 5.5\nground_albedo = [0.1, 0.3, 0.2]\nstrength = 0.7\n\
+                up = 'z'\n[[mesh]]\ngenerator = 'box'\nsize = [1, 2, 3]\n";
+    fs::write(path("in/s.toml"), toml).unwrap();
+    let (text, before, after) = converted(&path("in/s.toml"), &path("t.toml"), &LoadOptions::default());
+    assert_same(&text, &before, &after);
+    let mut options = LoadOptions::default();
+    options.look.light = Some(LightChoice::None);
+    let (text, before, after) = converted(&path("in/s.toml"), &path("t.toml"), &options);
+    assert_same(&text, &before, &after);
+    assert!(!after.sky.unwrap().has_sun, "{text}");
 }

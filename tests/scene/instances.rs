@@ -49,6 +49,7 @@ fn scene(instances: Vec<Instance>) -> Scene {
         ground: None,
         background: Vec3::ZERO,
         environment: None,
+        sky: None,
         defaults: RenderDefaults::default(),
     }
 }

@@ -376,3 +376,38 @@ fn triangle_strips_and_concave_polygons_are_read() {
     let areas: Vec<f32> = scene.triangles.iter().map(|t| super::facet_normal(t).z / 2.0).collect();
     assert!(areas.iter().all(|area| *area > 0.0) && areas.iter().sum::<f32>() == 4.0, "{areas:?}");
 }
+
+/// Several PLY and STL files are read at the same time. Each mesh is the one that its file alone gives, and the first
+/// table with a bad file decides which error is reported.
+#[test]
+fn files_that_are_read_together_are_those_that_are_read_alone() {
+    let mut files: Vec<(String, Vec<u8>)> =
+        cubes().into_iter().enumerate().map(|(ix, (ending, content))| (format!("{ix}.{ending}"), content)).collect();
+    // The content counts, and not the name.
+    files.insert(3, ("odd.ply".to_owned(), stl_binary(b"")));
+    let table = |ix: usize, name: &str| {
+        format!(
+            "[[mesh]]\nfile = '{name}'\nsmooth = {}\ntransform.translate = [{}, 0, 0]\n",
+            ix.is_multiple_of(2),
+            4 * ix
+        )
+    };
+    let load_tables = |tables: &str| {
+        let named = files.iter().map(|(name, content)| (&name[..], &content[..]));
+        load(&[("scene.toml", tables.as_bytes())].into_iter().chain(named).collect::<Vec<_>>())
+    };
+    let tables: Vec<String> = files.iter().enumerate().map(|(ix, (name, _))| table(ix, name)).collect();
+    let together = load_tables(&tables.concat()).unwrap();
+    assert_eq!(together.triangles.len(), 12 * files.len());
+    for (ix, alone) in tables.iter().enumerate() {
+        let alone = load_tables(alone).unwrap();
+        assert_eq!(together.triangles[12 * ix..][..12], alone.triangles, "{}", files[ix].0);
+    }
+    let [bad, missing] = [table(0, "bad.ply"), table(1, "missing.stl")];
+    for (first, second, named) in [(&bad, &missing, "bad.ply"), (&missing, &bad, "missing.stl")] {
+        let scene = [&tables[0], first, second].map(String::as_str).concat();
+        let all = [("scene.toml", scene.as_bytes()), ("0.ply", &files[0].1), ("bad.ply", b"ply\nno header")];
+        let error = load(&all).map(|scene| scene.triangles.len()).unwrap_err().to_string();
+        assert!(error.contains(named), "{error}");
+    }
+}

@@ -3,7 +3,12 @@
 use std::fs;
 
 use glam::{Vec2, Vec3};
-use kdray::scene::{Camera, Ground, Light, LightChoice, LoadOptions, Look, Projection, Scene, Up, scene_file_of};
+use kdray::{
+    frame::Integrator,
+    scene::{
+        Camera, Ground, Light, LightChoice, LoadOptions, Look, Projection, Scene, Sky, SkyChoice, Up, scene_file_of,
+    },
+};
 
 /// Writes files to one folder and loads the first one.
 fn load(files: &[(&str, &str)], options: &LoadOptions) -> Scene {
@@ -306,6 +311,45 @@ fn the_users_look_replaces_the_scenes() {
     }
 }
 
+/// A sky replaces all light of a scene. Its sun is over the viewer's left shoulder, whichever axis points up.
+#[test]
+fn the_users_sky_replaces_all_light() {
+    let toml = "ambient = { sky = [1, 1, 1], ground = [1, 1, 1] }\nbackground = [0, 0, 1]\n[render]\nmetered = true\n\
+                [[light]]\nkind = 'point'\nposition = [1, 9, 1]\nintensity = [9, 9, 9]\n\
+                [[mesh]]\ngenerator = 'box'\nsize = [2, 2, 2]\n";
+    let choice = SkyChoice { elevation: 40.0, azimuth: None, turbidity: 4.0 };
+    let with_sky = |choice| with_look(Look { sky: Some(choice), ..Look::default() });
+    let obj = box_obj(Vec3::splat(-1.0), Vec3::splat(2.0));
+    for files in [[("a.toml", toml)], [("a.obj", obj.as_str())]] {
+        let scene = load(&files, &with_sky(choice));
+        let sky = scene.sky.expect("a sky");
+        assert_eq!((sky.up, sky.turbidity, sky.strength, sky.has_sun), (Up::Y, 4.0, 1.0, true));
+        assert!(scene.lights.is_empty() && scene.ambient == Vec3::ZERO && scene.ground.is_none());
+        assert_eq!((scene.background, scene.defaults.is_metered), (Vec3::ZERO, false));
+        assert_eq!(scene.defaults.for_integrator(None).integrator, Integrator::Path);
+        let right = (scene.camera.target - scene.camera.eye).cross(scene.camera.up);
+        let behind = scene.camera.eye - scene.camera.target;
+        assert!(sky.towards_sun.dot(right) < 0.0 && sky.towards_sun.dot(behind) > 0.0, "{sky:?}");
+        assert!((sky.towards_sun.y.asin().to_degrees() - 40.0).abs() < 1e-3);
+        let east = load(&files, &with_sky(SkyChoice { azimuth: Some(90.0), ..choice })).sky.unwrap().towards_sun;
+        assert!(east.x > 0.7 && east.z.abs() < 1e-6, "{east}");
+    }
+    let (y, mut turned) = (load(&[("a.obj", &obj)], &with_sky(choice)), with_sky(choice));
+    turned.look.up = Some(Up::Z);
+    let z = load(&[("a.obj", &obj)], &turned).sky.unwrap();
+    let Vec3 { x, y, z: depth } = y.sky.unwrap().towards_sun;
+    assert!(z.up == Up::Z && z.towards_sun.distance(Vec3::new(x, -depth, y)) < 1e-4, "{z:?}");
+}
+
+/// `--light` takes the place of the sun; the sky stays.
+#[test]
+fn the_users_light_replaces_the_sun() {
+    let toml = "sky = { elevation = 30 }\n[[mesh]]\ngenerator = 'box'\nsize = [2, 2, 2]\n";
+    let look = Look { light: Some(LightChoice::None), ..Look::default() };
+    let sky = load(&[("a.toml", toml)], &with_look(look)).sky.unwrap();
+    assert_eq!(sky, Sky { has_sun: false, ..Sky::new([30.0, 0.0], Up::Y).unwrap() });
+}
+
 #[test]
 fn a_field_of_view_keeps_a_bare_mesh_in_the_picture() {
     let look = Look { vertical_fov_degrees: Some(10.0), ..Look::default() };
@@ -337,5 +381,13 @@ fn converted_files_keep_the_look_and_the_samples() {
             assert_eq!(before.defaults, after.defaults, "{text}");
             assert_eq!(after.defaults.samples, samples, "{text}");
         }
+        let choice = SkyChoice { elevation: 33.3, azimuth: None, turbidity: 2.7 };
+        let options = with_look(Look { sky: Some(choice), ..Look::default() });
+        let text = scene_file_of(&path(input), &path("c.toml"), &options).unwrap();
+        fs::write(path("c.toml"), &text).unwrap();
+        let (before, after) =
+            (Scene::load_with(&path(input), &options).unwrap(), Scene::load(&path("c.toml")).unwrap());
+        assert!(before.sky.is_some() && before.sky == after.sky, "{text}");
+        assert_eq!((&before.lights, before.background), (&after.lights, after.background), "{text}");
     }
 }

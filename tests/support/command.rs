@@ -53,6 +53,11 @@ pub fn fail(directory: &Path, arguments: &[&str], code: i32, named: &str) {
     assert!(output.stdout.is_empty(), "{arguments:?}: {}", stdout(&output));
 }
 
+/// Returns the colours of a picture's file, without what the file says of its origin.
+pub fn pixels(path: &Path) -> Vec<f32> {
+    image::open(path).unwrap().into_rgb32f().into_raw()
+}
+
 /// Returns the sorted names of the files in a directory.
 pub fn names(directory: &Path) -> Vec<String> {
     let mut names: Vec<_> =

@@ -31,6 +31,7 @@ pub fn empty() -> Scene {
         ground: None,
         background: Vec3::ZERO,
         environment: None,
+        sky: None,
         defaults: RenderDefaults::default(),
     }
 }

@@ -1,20 +1,43 @@
 //! What a scene consists of, before it is flattened.
 
 use kdray::{
-    scene::{Alpha, Camera, Image, Material, Pixels, Projection, Scene, TermValue},
+    scene::{Alpha, Camera, Image, Material, Pixels, Projection, Scene, Sky, TermValue},
     world::Textures,
 };
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-/// Meshes, images and cameras of a scene. The materials' details are with the materials.
+/// Meshes, images, cameras and the sky of a scene. The materials' details are with the materials.
 #[derive(Serialize)]
 pub struct Contents {
     pub meshes: Vec<MeshUse>,
     pub images: Vec<ImageUse>,
     pub cameras: Vec<CameraUse>,
+    /// The sky. Its sun is one of the lights.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sky: Option<SkyUse>,
     /// The camera that renders the scene.
     pub camera: CameraUse,
+}
+
+/// The sky, for `--integrator path`.
+#[derive(Serialize)]
+pub struct SkyUse {
+    /// Unit vector towards the sun.
+    pub towards_sun: [f32; 3],
+    pub turbidity: f32,
+    pub ground_albedo: [f32; 3],
+    pub strength: f32,
+    /// Whether the sun shines.
+    pub sun: bool,
+}
+
+impl From<&Sky> for SkyUse {
+    fn from(sky: &Sky) -> Self {
+        let &Sky { towards_sun, turbidity, ground_albedo, strength, has_sun, .. } = sky;
+        let (towards_sun, ground_albedo) = (towards_sun.to_array(), ground_albedo.to_array());
+        Self { towards_sun, turbidity, ground_albedo, strength, sun: has_sun }
+    }
 }
 
 /// A mesh and how often it is placed.
@@ -108,6 +131,7 @@ impl From<&Scene> for Contents {
             meshes: meshes.collect(),
             images: images(scene),
             cameras: cameras.collect(),
+            sky: scene.sky.as_ref().map(SkyUse::from),
             camera: CameraUse::new(None, &scene.camera),
         }
     }

@@ -4,7 +4,7 @@ use serde_json::{Map, Value};
 
 use super::{
     LightUse, MaterialUse,
-    contents::{CameraUse, Contents, ImageUse, MeshUse, TextureMemory},
+    contents::{CameraUse, Contents, ImageUse, MeshUse, SkyUse, TextureMemory},
     vector,
 };
 use crate::cli::table::table;
@@ -53,6 +53,7 @@ pub fn contents(contents: &Contents, materials: &[MaterialUse], lights: &[LightU
         }));
     }
     tables.push(cameras(contents));
+    tables.extend(contents.sky.iter().map(|sky| table(["sky", ""], &sky_rows(sky))));
     tables.push(memory_table(memory));
     tables.join("\n")
 }
@@ -113,6 +114,16 @@ fn image_row(image: &ImageUse) -> [String; 5] {
     }
     let size = format!("{}x{}", image.width, image.height);
     [shortened(&image.name), size, image.channels.to_owned(), image.bytes.to_string(), uses]
+}
+
+fn sky_rows(sky: &SkyUse) -> [[String; 2]; 4] {
+    let sun = if sky.sun { "towards the sun" } else { "towards the sun, which is hidden" };
+    [
+        [sun.to_owned(), vector(sky.towards_sun)],
+        ["turbidity".to_owned(), sky.turbidity.to_string()],
+        ["ground albedo".to_owned(), vector(sky.ground_albedo)],
+        ["strength".to_owned(), sky.strength.to_string()],
+    ]
 }
 
 fn spot_row(light: &LightUse) -> [String; 4] {

@@ -4,8 +4,7 @@ use std::path::{Path, PathBuf};
 
 use kdray::{
     frame::{Aov, Picture},
-    layout::Feature,
-    output::{self, Format, HeatMap},
+    output::{self, Format, HeatMap, Layers},
     scene::Scene,
 };
 
@@ -37,6 +36,11 @@ impl Files {
         self.layers.iter().chain(&self.heat_map).filter(|path| **path != self.picture)
     }
 
+    /// Whether all files exist.
+    pub fn exist(&self) -> bool {
+        self.picture.exists() && self.beside().all(|path| path.exists())
+    }
+
     /// Enters the files into `roles` as outputs. Refuses files that the command also reads, or that it writes twice.
     pub fn note(&self, roles: &mut FileRoles) -> Result<(), CliError> {
         roles.write("--output", &self.picture)?;
@@ -49,16 +53,17 @@ impl Files {
         Ok(self.beside().try_for_each(|path| output::check(path))?)
     }
 
-    pub fn write(&self, aovs: &[Aov], picture: &Picture, features: &[Feature]) -> Result<(), CliError> {
-        if let Some(path) = &self.layers {
-            output::write_layers(path, picture, aovs, features)?;
+    pub fn write(&self, picture: &Picture, layers: &Layers) -> Result<(), CliError> {
+        let is_exr = self.picture.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("exr"));
+        if let Some(path) = self.layers.as_ref().or(is_exr.then_some(&self.picture)) {
+            output::write_layers(path, picture, layers)?;
         }
         if let Some(path) = &self.heat_map {
-            let values = features.iter().map(|feature| feature.n_steps).collect();
+            let values = layers.features.iter().map(|feature| feature.n_steps).collect();
             HeatMap { title: "steps a pixel", width: picture.width, height: picture.height, values }.write(path)?;
         }
-        if self.layers.as_ref() != Some(&self.picture) {
-            output::write_picture(&self.picture, picture)?;
+        if !is_exr {
+            output::write_recorded(&self.picture, picture, layers.record)?;
         }
         Ok(())
     }

@@ -1,27 +1,27 @@
 //! `kdray render`: renders a scene file to pictures.
 
+mod draw;
 mod files;
 mod memory;
 
-use std::{
-    path::Path,
-    time::{Duration, Instant},
-};
+use std::{path::Path, time::Instant};
 
 use kdray::{
     engine::{
-        Built, Engine, Renderer,
-        choices::{Choices, Workload},
+        Built, Engine,
+        choices::{Choices, ChosenAccel, Workload},
     },
-    frame::{Profile, Watcher},
+    frame::{Goal, Profile, RenderOptions, SampleRange},
     gpu::{Context, ContextOptions, GpuError},
-    output,
-    scene::{Camera, CameraPath, LoadOptions, Scene},
+    output::{self, Record, WholeRecord},
+    scene::{CameraPath, LoadOptions, Scene},
     util::progress::Work,
+    world::World,
 };
 use tracing::info_span;
 
 use self::{
+    draw::{Common, DrawnPictures, FrameJob, draw_and_write},
     files::{Files, check_outputs, numbered, output_of, roles},
     memory::check_memory,
 };
@@ -31,7 +31,7 @@ use super::{
     error::CliError,
     file_roles::FileRoles,
     open_device, print, print_line,
-    progress::{Progress, StepProgress},
+    progress::Progress,
     report::{FrameTimeRange, Report},
     spans::Spans,
     trace::trace_json,
@@ -47,19 +47,26 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
 
     let (begun_at, spans) = (Instant::now(), Spans::default());
     let progress = Progress::with_spans(args.quiet, 3, args.trace.is_some().then_some(&spans));
+    let views = views(args, roles, &progress)?;
+    if views.is_empty() {
+        return Ok(());
+    }
     let (scene, load_ms) = load(args, &progress)?;
-    let views = views(args, &scene, roles)?;
     let options = args.options(&scene)?;
     let n_samples = args.samples(&scene);
-    check_memory(&options, n_samples, args.cpu)?;
+    let some_samples = args.some_samples(&scene, &options)?;
+    let n_drawn = some_samples.map_or(n_samples, |range| range.len());
+    check_memory(&options, n_drawn, args.cpu)?;
     let device = ContextOptions::new(args.device.clone(), args.validate);
     let opening = || info_span!("create device").in_scope(|| open_device(&device, &progress));
     let context = if args.cpu { None } else { Some(opening()?) };
 
     let engine = context.clone().map_or_else(Engine::on_cpu, Engine::on_device).with_request(args.picture.request());
     let n_triangles = scene.n_triangles();
+    // A part of a picture gets the structure that the whole picture gets.
     let n_pictures = u64::from(n_samples) * views.len() as u64;
-    let cameras = views.iter().map(|view| &view.camera);
+    let camera = scene.camera;
+    let cameras = views.iter().map(|view| view.camera.as_ref().unwrap_or(&camera));
     let workload = Workload::of_pictures(&options, scene.lights.len(), n_pictures).with_cameras(cameras);
     let accel = engine.choose_accel(n_triangles, &workload);
     build::check_memory(accel, n_triangles)?;
@@ -71,14 +78,17 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     let methods = engine.methods(&world, &workload)?;
     let mut options = methods.apply(&options);
     args.picture.meter(&world, &mut options).into_iter().for_each(|note| progress.note(&note));
-    let crop = options.crop_or_whole();
+    let record = record(&engine, &world, &options, accel, (n_samples, some_samples));
+    let crop = record.crop;
+    let goal = args.time.map_or(Goal::Samples(n_drawn), Goal::Time);
+    let common = Common { args, options: &options, camera, goal, n_drawn, some_samples, record };
     let rendering = format!("rendering {}x{}", crop.width(), crop.height());
     let (drawn, _) = progress.stage(&rendering, || {
         let begin = Instant::now();
         let renderer = engine.renderer(&world, &options)?;
-        draw_and_write((args, n_samples), renderer, &views, (&progress, &rendering), begin)
+        draw_and_write(&common, renderer, &views, (&progress, &rendering), begin)
     });
-    let (profiles, render_ms) = drawn.map_err(CliError::of_drawing)?;
+    let DrawnPictures { profiles, n_samples, render_ms } = drawn.map_err(CliError::of_drawing)?;
     drop(progress);
 
     let repeated = FrameTimeRange::of(&profiles);
@@ -111,6 +121,30 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     context.map_or(Ok(()), |context| report_validation(&context))
 }
 
+/// Returns the record of the pictures, from the scene's own camera.
+fn record(
+    engine: &Engine,
+    world: &World,
+    options: &RenderOptions,
+    accel: ChosenAccel,
+    (n_samples, some_samples): (u32, Option<SampleRange>),
+) -> Record {
+    let device = engine.context().map(|context| context.info());
+    Record {
+        scene: world.scene().name.clone(),
+        whole: WholeRecord::new(world.scene(), options, n_samples),
+        crop: options.crop_or_whole(),
+        samples: some_samples.unwrap_or(SampleRange::whole(n_samples)),
+        device: device.map_or_else(|| "CPU".to_owned(), |device| device.name.clone()),
+        driver: device.map_or_else(String::new, |device| device.driver.clone()),
+        accel: match accel.tree_kind() {
+            Some(tree) => format!("{}, {}, {}", accel.kind(), tree.value, options.traversal),
+            None => accel.kind().to_string(),
+        },
+        checksum: None,
+    }
+}
+
 /// Loads the scene. Returns it and the loading time in milliseconds. Warns if the scene has no light.
 fn load(args: &RenderArgs, progress: &Progress) -> Result<(Scene, f64), CliError> {
     let loading = format!("loading {}", args.scene.display());
@@ -125,24 +159,27 @@ fn load(args: &RenderArgs, progress: &Progress) -> Result<(Scene, f64), CliError
     Ok((scene, load_ms))
 }
 
-/// A camera, and the files of its picture.
-struct FrameJob {
-    camera: Camera,
-    files: Files,
-}
-
-/// Returns the scene's own view or, with a path, one view per frame. Refuses views whose files cannot be written or
-/// have another role.
-fn views(args: &RenderArgs, scene: &Scene, mut roles: FileRoles) -> Result<Vec<FrameJob>, CliError> {
+/// Returns the scene's own view or, with a path, one view per frame. Leaves out views whose files exist, if the user
+/// wants that. Refuses views whose files cannot be written or have another role.
+fn views(args: &RenderArgs, mut roles: FileRoles, progress: &Progress) -> Result<Vec<FrameJob>, CliError> {
     let output = output_of(args);
-    let views = match &args.path {
-        None => vec![FrameJob { camera: scene.camera, files: Files::of(output, &args.aov) }],
+    let mut views = match &args.path {
+        None => vec![FrameJob { camera: None, files: Files::of(output, &args.aov) }],
         Some(path) => {
             let views = views_along(path, args, &output)?;
             views.iter().try_for_each(|view| view.files.note(&mut roles))?;
             views
         }
     };
+    if args.skip_existing {
+        let n_all = views.len();
+        views.retain(|view| !view.files.exist());
+        match n_all - views.len() {
+            0 => (),
+            1 => progress.note("1 picture exists already"),
+            n => progress.note(&format!("{n} pictures exist already")),
+        }
+    }
     views.iter().try_for_each(|view| view.files.check())?;
     Ok(views)
 }
@@ -150,8 +187,8 @@ fn views(args: &RenderArgs, scene: &Scene, mut roles: FileRoles) -> Result<Vec<F
 /// Returns one view per frame of the path.
 fn views_along(path_file: &Path, args: &RenderArgs, output: &Path) -> Result<Vec<FrameJob>, CliError> {
     let path = CameraPath::load(path_file)?;
-    let Frames { first, last } =
-        args.frames.unwrap_or(Frames { first: path.begin().ceil() as u32, last: path.end().floor() as u32 });
+    let Frames { first, last, step } =
+        args.frames.unwrap_or(Frames { first: path.begin().ceil() as u32, last: path.end().floor() as u32, step: 1 });
     if first > last {
         return Err(CliError::Usage(format!(
             "{}: no whole frame number lies between its first and last keyframe",
@@ -163,57 +200,9 @@ fn views_along(path_file: &Path, args: &RenderArgs, output: &Path) -> Result<Vec
             let file = path_file.display();
             CliError::Usage(format!("{file}: at frame {frame}, eye and target coincide, or up points along the view"))
         })?;
-        Ok(FrameJob { camera, files: Files::of(numbered(output, frame)?, &args.aov) })
+        Ok(FrameJob { camera: Some(camera), files: Files::of(numbered(output, frame)?, &args.aov) })
     };
-    (first..=last).map(view).collect()
-}
-
-/// Draws each view `--repeat` times and writes its picture. Returns the frames' profiles, and the time in
-/// milliseconds from `begin` until the pictures were in memory, without the time of writing files.
-fn draw_and_write(
-    (args, n_samples): (&RenderArgs, u32),
-    mut renderer: Renderer,
-    views: &[FrameJob],
-    (progress, message): (&Progress, &str),
-    begin: Instant,
-) -> Result<(Vec<Profile>, f64), CliError> {
-    let factors = [views.len() as u32, n_samples, args.repeat.into(), renderer.n_bands()];
-    let n_steps = factors.into_iter().fold(1, u32::saturating_mul);
-    let mut steps = progress.steps(message, n_steps);
-    // Progress within a sample takes time, because the CPU waits for the device. Measured frames are drawn without
-    // it.
-    steps.shows_parts &= args.profile.is_none() && args.trace.is_none() && args.repeat == 1;
-    let (mut profiles, mut drawing, mut last) = (Vec::new(), Duration::ZERO, begin);
-    for view in views {
-        let mut features = Vec::new();
-        for _ in 0..args.repeat {
-            let drawn = renderer.draw(&view.camera, n_samples, Bar(&mut steps))?;
-            profiles.push(drawn.profile);
-            features = drawn.features;
-        }
-        let picture = renderer.picture()?;
-        drawing += last.elapsed();
-        view.files.write(&args.aov, &picture, &features)?;
-        last = Instant::now();
-    }
-    Ok((profiles, drawing.as_secs_f64() * 1e3))
-}
-
-/// Moves the progress bar while a frame is drawn.
-struct Bar<'a, 'b>(&'a mut StepProgress<'b>);
-
-impl Watcher for Bar<'_, '_> {
-    fn sees_parts(&self) -> bool {
-        self.0.shows_parts
-    }
-
-    fn part(&mut self, share: f32) {
-        self.0.part(share);
-    }
-
-    fn sample(&mut self) {
-        self.0.step();
-    }
+    (first..=last).step_by(step as usize).map(view).collect()
 }
 
 /// Sets the number of threads of rayon's global pool. Without a number, rayon chooses.

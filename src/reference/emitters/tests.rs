@@ -13,7 +13,7 @@ use crate::{
     frame::RenderOptions,
     layout::{Frame, Material, Triangle},
     reference::inputs::KernelInputs,
-    scene::{Environment, Light, Scene},
+    scene::{Environment, Light, Scene, Sky, Up},
     world::{Emitters, FlatScene, World},
 };
 
@@ -279,6 +279,37 @@ fn the_map_is_where_it_is_documented() {
     let world = world_with(Vec::new(), |scene| scene.environment = Some(made));
     let frame = frame(&world);
     assert_eq!(environment_radiance(&inputs_of(&world, &frame), Vec3::Y), Vec3::ONE);
+}
+
+/// A sky is seen where its sun is stated, with the radiance of its formula, and the sun's disk before it.
+#[test]
+fn skies_are_seen_as_their_formula_tells() {
+    for up in [Up::Y, Up::Z] {
+        let sky = Sky::new([35.0, 250.0], up).unwrap();
+        let scene = Scene { sky: Some(sky), ..Scene::empty(Path::new("scene")) };
+        let world = World::of_flat(FlatScene::new(&scene).unwrap(), &BuildOptions::default()).unwrap();
+        let frame = frame(&world);
+        let inputs = inputs_of(&world, &frame);
+        let zenith = up.vector();
+        // Directions that are at least a texel above the horizon.
+        let directions = numbers(2000).map(|u| (2.0 * u - 1.0).normalize_or(zenith)).filter(|d| d.dot(zenith) > 0.02);
+        for direction in directions.filter(|d| d.distance(sky.towards_sun) > 0.05) {
+            let (seen, expected) = (environment_radiance(&inputs, direction), sky.radiance(direction));
+            assert!((seen / expected - 1.0).abs().max_element() < 0.01, "{up} {direction}: {seen} {expected}");
+        }
+        let Light::Sun { towards, irradiance, angle_degrees } = sky.sun() else { panic!("{:?}", sky.sun()) };
+        let disk = irradiance.x / (angle_degrees / 2.0).to_radians().sin().powi(2);
+        let beside =
+            |degrees: f32| (towards + towards.any_orthonormal_vector() * degrees.to_radians().tan()).normalize();
+        // The cosine of a quarter of a degree has three digits of 1 - cos in single precision.
+        assert_near(environment_radiance(&inputs, towards).x, disk, 1e-2);
+        assert_near(environment_radiance(&inputs, beside(0.26)).x, disk, 1e-2);
+        assert!(environment_radiance(&inputs, beside(0.27)).x < 10.0);
+        let hidden = Scene { sky: Some(Sky { has_sun: false, ..sky }), ..scene };
+        let world = World::of_flat(FlatScene::new(&hidden).unwrap(), &BuildOptions::default()).unwrap();
+        assert!(environment_radiance(&inputs_of(&world, &frame), towards).x < 10.0);
+        assert_eq!((world.emitters().suns().len(), world.scene().lights.len()), (0, 0));
+    }
 }
 
 #[test]

@@ -47,15 +47,21 @@ fn moved(input: &Path, places: &Places, (scene, options): (&Scene, &LoadOptions)
     if options.camera.is_some() || options.look.has_camera() {
         table.insert("camera".to_owned(), Value::Table(parsed(text::camera(&scene.camera))));
     }
+    if options.look.sky.is_some() {
+        for key in ["light", "ambient", "background", "environment"] {
+            table.remove(key);
+        }
+        unmeter(&mut table);
+    }
+    if let Some(sky) = scene.sky.filter(|_| options.look.sky.is_some() || options.look.light.is_some()) {
+        table.insert("sky".to_owned(), Value::Table(parsed(text::sky(&sky))));
+    }
     if options.look.light.is_some() {
         // Without `ambient`, a file that has no lights would be given some.
         let lights: String = scene.lights.iter().map(text::light).collect();
         table.remove("light");
         table.extend(parsed(format!("ambient = {}\n{lights}", text::ambient(scene))));
-        // A scene without the lights of its file is not metered.
-        if let Some(Value::Table(render)) = table.get_mut("render") {
-            render.remove("metered");
-        }
+        unmeter(&mut table);
     }
     if options.look.light.is_some() || options.look.background.is_some() {
         table.extend(parsed(format!("background = {}\n", text::vector(scene.background))));
@@ -69,6 +75,13 @@ fn moved(input: &Path, places: &Places, (scene, options): (&Scene, &LoadOptions)
         *name = places.name_of(&folder.join(&*name))?;
     }
     toml::to_string(&table).map_err(|error| SceneError::file(input, error.to_string()))
+}
+
+/// Lets the exposure of a scene file be the stated one: a scene without the lights of its file is not metered.
+fn unmeter(table: &mut Table) {
+    if let Some(Value::Table(render)) = table.get_mut("render") {
+        render.remove("metered");
+    }
 }
 
 /// Returns the names of files in a scene file.

@@ -8,7 +8,7 @@ use hashbrown::HashMap;
 use crate::{
     frame::Denoise,
     scene::{
-        Camera, Ground, Light, Material, MaterialChoice, Projection, RenderDefaults, Scene,
+        Camera, Ground, Light, Material, MaterialChoice, Projection, RenderDefaults, Scene, Sky,
         assemble::DEFAULT_MATERIAL,
         material_spec::MaterialSpec,
         overrides::override_terms,
@@ -40,6 +40,7 @@ pub(super) fn scene_file(scene: &Scene, mesh: &MeshTable) -> String {
         text += &format!("\n[[cameras]]\nname = {}\n{}", quoted(name), camera(named));
     }
     text.extend(scene.lights.iter().map(light));
+    text.extend(scene.sky.iter().map(|it| format!("\n[sky]\n{}", sky(it))));
     text += &render(&scene.defaults);
     let materials = materials(scene, &mesh.replaced);
     if !materials.is_empty() {
@@ -122,6 +123,18 @@ pub(super) fn light(light: &Light) -> String {
         }
     };
     format!("\n[[light]]\n{keys}")
+}
+
+/// Returns the keys of a sky.
+pub(super) fn sky(sky: &Sky) -> String {
+    let Sky { towards_sun, up, turbidity, ground_albedo, strength, has_sun } = *sky;
+    let (direction, albedo) = (vector(-towards_sun), vector(ground_albedo));
+    format!(
+        "direction = {direction}\nturbidity = {}\nground_albedo = {albedo}\nstrength = {}\nsun = {has_sun}\n\
+         up = \"{up}\"\n",
+        number(turbidity),
+        number(strength)
+    )
 }
 
 fn render(defaults: &RenderDefaults) -> String {

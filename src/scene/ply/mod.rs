@@ -18,7 +18,7 @@ use serde::Deserialize;
 use serde_ply::{DeserializeError, ElementDef, PlyFormat, PlyHeader, PlyProperty, PlyReader, PropertyType, ScalarType};
 
 use self::{
-    quick::quick_triangles,
+    quick::{quick_triangles, quick_vertices},
     vertex::{Vertices, upper_left},
 };
 use super::{
@@ -26,7 +26,7 @@ use super::{
     image_files::{Images, View},
     material::{Material, MaterialSpec},
     mesh::Mesh,
-    mesh_file::{Loaded, Loading},
+    mesh_file::Loaded,
     needs::{Attributes, MeshSize, require_for_mesh, require_for_rows},
     outside::Access,
     polygon::Triangulator,
@@ -120,21 +120,43 @@ struct Elements {
     strips: Vec<Strips>,
 }
 
-/// Makes a mesh of a file's content, and reads the images that it names. Its faces have the slot of their image.
-pub(super) fn parse_ply(path: &Path, bytes: &[u8], loading: &mut Loading) -> Checked<Loaded> {
-    let &mut Loading { shading, origin, n_loaded, access, ref mut images } = loading;
-    let mut reader = PlyReader::from_reader(Counted::new(bytes, images.progress()))
+/// The mesh of a file without its materials. Its faces have the slot of their image.
+pub(super) struct PlyMesh {
+    mesh: Mesh,
+    /// The names of the images.
+    names: Vec<String>,
+    /// Whether normals depend on the crease angle.
+    uses_crease: bool,
+}
+
+/// Makes a mesh of a file's content. `n_loaded`: the number of triangles that the scene has already.
+pub(super) fn ply_mesh(
+    bytes: &[u8],
+    (shading, origin): (Shading, DVec3),
+    n_loaded: usize,
+    progress: &Progress,
+) -> Checked<PlyMesh> {
+    let mut reader = PlyReader::from_reader(Counted::new(bytes, progress))
         .map_err(|error| format!("is no PLY file: {}", text(&error)))?;
     let header = reader.header().clone();
     check(&header.elem_defs)?;
     check_counts(&header, bytes.len() as u64)?;
     let elements = read(&mut reader, (&header, bytes), origin)?;
+    progress.report(Work::Reading, 1.0);
     require_for_mesh(n_loaded as u64, &elements.size())?;
-    let names: Vec<&str> = texture_files(&header.comments).collect();
+    let names: Vec<String> = texture_files(&header.comments).map(str::to_owned).collect();
     let uses_crease = shading.smooth && elements.vertices.normals.is_empty();
     let mesh = mesh(elements, names.len(), shading)?;
-    let materials = if mesh.uvs[0].is_empty() { Vec::new() } else { materials(path, &names, access, images) };
-    Ok(Loaded { mesh, materials, uses_crease })
+    Ok(PlyMesh { mesh, names, uses_crease })
+}
+
+impl PlyMesh {
+    /// Reads the images that the file names.
+    pub fn with_materials(self, path: &Path, access: Access, images: &mut Images) -> Loaded {
+        let Self { mesh, names, uses_crease } = self;
+        let materials = if mesh.uvs[0].is_empty() { Vec::new() } else { materials(path, &names, access, images) };
+        Loaded { mesh, materials, uses_crease }
+    }
 }
 
 impl Elements {
@@ -192,17 +214,19 @@ fn least_bytes(property: &PropertyType) -> u64 {
     }
 }
 
-/// Reads the elements in the order of the file.
+/// Reads the elements, in the order of the file if they are not read in the quick way.
 fn read(reader: &mut PlyReader<Counted>, (header, bytes): (&PlyHeader, &[u8]), origin: DVec3) -> Checked<Elements> {
     let mut found = Elements::default();
+    if let Some(triangles) = quick_triangles(bytes, header) {
+        let vertices = quick_vertices(bytes, header, origin);
+        let vertices = vertices.map_or_else(|| Vertices::read(reader, &header.elem_defs[0], origin), Ok)?;
+        return Ok(Elements { vertices, triangles, ..found });
+    }
     for element in &header.elem_defs {
         let failed = |error| format!("element `{}`: {}", element.name.escape_debug(), text(&error));
         match element.name.as_str() {
             "vertex" => found.vertices = Vertices::read(reader, element, origin)?,
-            "face" => match quick_triangles(bytes, header) {
-                Some(triangles) => found.triangles = triangles,
-                None => found.polygons = reader.next_element().map_err(failed)?,
-            },
+            "face" => found.polygons = reader.next_element().map_err(failed)?,
             "tristrips" => found.strips = reader.next_element().map_err(failed)?,
             _ => drop(reader.next_element::<Vec<Skipped>>().map_err(failed)?),
         }
@@ -216,16 +240,16 @@ fn texture_files(comments: &[String]) -> impl Iterator<Item = &str> {
 }
 
 /// Returns one material for each name of an image, which is its base colour. Warns of images that cannot be read.
-fn materials(path: &Path, names: &[&str], access: Access, images: &mut Images) -> Vec<Material> {
+fn materials(path: &Path, names: &[String], access: Access, images: &mut Images) -> Vec<Material> {
     let reach = access.beside(path);
     let warn = |what: &str| tracing::warn!("{}: TextureFile is not shown: {}", path.display(), what.escape_debug());
-    let mut add = |name: &&str| {
+    let mut add = |name: &String| {
         let is_shown = !images.is_replaced(name);
         is_shown.then(|| reach.find(reach.root, name).map(|file| images.add(file.path)))
     };
     let files: Vec<Option<Checked<usize>>> = names.iter().map(&mut add).collect();
     images.decode();
-    let material = |(name, file): (&&str, Option<Checked<usize>>)| {
+    let material = |(name, file): (&String, Option<Checked<usize>>)| {
         let image = file.and_then(|file| {
             let image = file.and_then(|file| {
                 images.get(file)?;

@@ -105,8 +105,7 @@ impl<'de> Visitor<'de> for PaintedVisitor {
 impl Vertices {
     /// Returns the memory that a vertex takes while vertices are read, bytes: its row, and what the row becomes.
     pub fn n_row_bytes(element: &ElementDef) -> usize {
-        let has_any = |names: &[&str]| names.iter().any(|name| element.has_property(name));
-        let has_more = has_any(&REDS) || has_any(&FIRST_UVS);
+        let has_more = has_more(element);
         let row = if has_more { size_of::<Painted>() } else { size_of::<Plain>() };
         let more = if has_more { size_of::<Vec4>() + size_of::<Vec2>() } else { 0 };
         row + 2 * size_of::<Vec3>() + more
@@ -150,6 +149,11 @@ impl Vertices {
         }
         Ok(vertices)
     }
+}
+
+/// Returns whether vertices have colours or texture coordinates.
+pub fn has_more(element: &ElementDef) -> bool {
+    REDS.iter().chain(&FIRST_UVS).any(|name| element.has_property(name))
 }
 
 /// Returns the number that stands for 1 in the colours: the largest of an integer type, 1 for floats, or 255 for floats

@@ -4,7 +4,7 @@ use std::fmt::Display;
 
 use egui::{ComboBox, DragValue, Grid, Slider, SliderClamping, Ui};
 
-use super::Settings;
+use super::{InMotion, Settings};
 use crate::{
     accel::{AccelKind, kdtree::Traversal},
     frame::{Denoise, Integrator, Primary, Tonemap, View},
@@ -16,13 +16,16 @@ use crate::{
 /// choice of traversals.
 pub fn show(ui: &mut Ui, settings: &mut Settings, projection: &mut Projection, accel: AccelKind) {
     Grid::new("controls").num_columns(2).spacing([10.0, 3.0]).show(ui, |ui| {
-        let Settings { options, max_samples, budget_ms, vsync, view, gain } = settings;
+        let Settings { options, in_motion, max_samples, budget_ms, vsync, view, gain } = settings;
         choice(ui, "view", view, View::ALL);
         if matches!(view, View::Depth | View::Cost | View::Rays) {
             row(ui, "brightness", |ui| ui.add(Slider::new(gain, 0.01..=100.0).logarithmic(true)));
         }
         lens(ui, projection);
         choice(ui, "integrator", &mut options.integrator, Integrator::ALL);
+        if options.integrator == Integrator::Path {
+            choice(ui, "in motion", in_motion, InMotion::ALL);
+        }
         row(ui, "max depth", |ui| ui.add(Slider::new(&mut options.max_depth, 1..=32)));
         row(ui, "samples", |ui| ui.add(Slider::new(max_samples, 1..=4096).logarithmic(true)));
         row(ui, "exposure", |ui| ui.add(Slider::new(&mut options.exposure, 0.01..=100.0).logarithmic(true)));

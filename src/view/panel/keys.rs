@@ -3,7 +3,7 @@
 use egui::{Align2, Area, Color32, Frame, Grid, Id, Order, RichText, ScrollArea, Ui, Window, vec2};
 
 /// Keys and mouse actions, each with its effect. docs/guide.md has the same rows.
-pub const KEYS: [(&str, &str); 16] = [
+pub const KEYS: [(&str, &str); 17] = [
     ("left drag, right drag", "go around the target, look around"),
     ("middle drag, Shift + left drag", "move sideways, up and down"),
     ("wheel", "nearer, farther, to where the mouse points"),
@@ -16,6 +16,7 @@ pub const KEYS: [(&str, &str); 16] = [
     ("U", "another axis points up: +z, +x, -y, -z, -x, +y"),
     ("1, 2 3 4", "picture; depth, normals, triangles: primary rays only"),
     ("5, 6", "steps, rays: sums over all rays, slow as the picture"),
+    ("M", "of paths, in motion: quick pictures by whitted, or paths"),
     ("P", "print the camera as a scene file has it"),
     ("S, F12", "save what is seen, drawn in full"),
     ("H, F1, ?", "show or hide these keys"),

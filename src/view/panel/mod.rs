@@ -17,7 +17,7 @@ use super::{
     pick::Picked,
 };
 use crate::{
-    frame::{Profile, RenderOptions, View},
+    frame::{Integrator, Profile, RenderOptions, View},
     gpu::MemoryUse,
     layout::Feature,
     scene::Projection,
@@ -31,6 +31,8 @@ const WIDTH: f32 = 300.0;
 pub struct Settings {
     /// Render options. The size in them follows the window; the user cannot set it.
     pub options: RenderOptions,
+    /// What is drawn while the camera moves.
+    pub in_motion: InMotion,
     /// Samples per pixel at which a picture at rest is done.
     pub max_samples: u32,
     /// Time budget per frame while the camera moves, milliseconds.
@@ -41,6 +43,39 @@ pub struct Settings {
     pub view: View,
     /// Factor on the brightness of the views depth, cost and rays.
     pub gain: f32,
+}
+
+/// The picture that is drawn while the camera moves.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum InMotion {
+    /// The picture of [`Integrator::Whitted`], with ambient light in place of light that only paths show.
+    #[default]
+    Whitted,
+    /// The picture at rest with one sample a pixel.
+    Path,
+}
+
+named_enum!(InMotion {
+    Whitted = "whitted": "quick pictures without noise, with ambient light in place of light that only paths show",
+    Path = "path": "the picture at rest with one sample a pixel",
+});
+
+impl InMotion {
+    /// Returns the other picture.
+    pub fn other(self) -> Self {
+        match self {
+            Self::Whitted => Self::Path,
+            Self::Path => Self::Whitted,
+        }
+    }
+
+    /// Returns the integrator in motion. `at_rest`: the one at rest.
+    pub fn integrator(self, at_rest: Integrator) -> Integrator {
+        match self {
+            Self::Whitted => Integrator::Whitted,
+            Self::Path => at_rest,
+        }
+    }
 }
 
 /// What the panel's controls change.

@@ -1,0 +1,34 @@
+//! `kdray merge`: joins the parts of a picture.
+
+use kdray::{merge, output};
+
+use super::{args::MergeArgs, error::CliError, file_roles::FileRoles, print, print_line};
+
+/// Reads the parts, checks that they make up one picture, and writes it.
+pub fn run(args: &MergeArgs) -> Result<(), CliError> {
+    let mut roles = FileRoles::default();
+    args.parts.iter().for_each(|part| roles.read("PART", part));
+    roles.write("--output", &args.output)?;
+    output::Format::of(&args.output)?;
+    output::check(&args.output)?;
+    let merged = merge::merge(&args.parts)?;
+    merged.write(&args.output)?;
+    if args.quiet {
+        return Ok(());
+    }
+    if merged.devices.len() > 1 {
+        let devices = merged.devices.join("; ");
+        print_line(
+            "note",
+            &format!("the parts come from several devices, which may round in different ways: {devices}"),
+        );
+    }
+    let merge::Merged { n_parts, picture, record, .. } = &merged;
+    let (width, height, n_samples) = (picture.width, picture.height, record.whole.n_samples);
+    let parts = if *n_parts == 1 { "part" } else { "parts" };
+    print(&format!(
+        "{n_parts} {parts} of {}, {width}x{height} pixels with {n_samples} samples\nwrote {}\n",
+        record.scene,
+        args.output.display()
+    ))
+}

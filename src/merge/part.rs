@@ -1,0 +1,132 @@
+//! A part of a picture, read from its OpenEXR file.
+
+use std::path::{Path, PathBuf};
+
+use exr::{
+    meta::{BlockDescription, MetaData},
+    prelude::{
+        AnyChannel, AnyChannels, AttributeValue, FlatSamples, Layer, LayerAttributes, ReadChannels, ReadLayers, Text,
+        f16, read as exr_read,
+    },
+};
+
+use super::MergeError;
+use crate::{
+    frame::{BlockSum, Channel, SampleRange, SampleSums, Samples},
+    output::{RECORD_ATTRIBUTE, Record},
+    util::memory,
+};
+
+/// A part of a picture.
+#[derive(Clone, Debug)]
+pub struct Part {
+    /// The file that it comes from.
+    pub path: PathBuf,
+    /// What it shows.
+    pub record: Record,
+    /// The mean of its samples, linear RGB, rows from the top. The fourth component is 1.
+    pub radiance: Vec<[f32; 4]>,
+    /// The sums of its samples, if they are some of the picture's samples, but not one aligned block of them.
+    sums: Vec<BlockSum>,
+    /// Its channels beside colour.
+    pub channels: Vec<Channel>,
+}
+
+impl Part {
+    /// Reads a part.
+    ///
+    /// # Errors
+    /// The file cannot be read, has no record, is damaged, or lacks a channel.
+    pub fn read(path: &Path) -> Result<Self, MergeError> {
+        let refused = |message: String| MergeError::Part { path: path.to_owned(), message };
+        check_size(path).map_err(refused)?;
+        let image = exr_read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer();
+        let image = image.all_attributes().from_file(path).map_err(|error| refused(error.to_string()))?;
+        Self::of_layer(path, &image.layer_data).map_err(refused)
+    }
+
+    /// Adds the part's samples to the sums of earlier ones.
+    ///
+    /// # Panics
+    /// The samples do not follow those of the sums.
+    pub(super) fn add_to(&self, sums: &mut SampleSums) {
+        if self.sums.is_empty() {
+            sums.push_mean(self.record.samples, &self.radiance);
+        } else {
+            self.sums.iter().for_each(|block| sums.push(block.clone()));
+        }
+    }
+
+    fn of_layer(path: &Path, layer: &Layer<AnyChannels<FlatSamples>>) -> Result<Self, String> {
+        let record = record_of(&layer.attributes)?;
+        let channels: Vec<_> = layer.channel_data.list.iter().map(channel_of).collect();
+        if !record.is_intact(&channels) {
+            return Err(
+                "its checksum is not that of its contents: the file is damaged, render the part again".to_owned()
+            );
+        }
+        let radiance = colours(&channels, "")?.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect();
+        let blocks: Vec<_> = record.samples.blocks().collect();
+        let is_whole = record.samples == SampleRange::whole(record.whole.n_samples);
+        let blocks = if is_whole || blocks.len() == 1 { Vec::new() } else { blocks };
+        let sum =
+            |samples: SampleRange| Ok(BlockSum { samples, sums: colours(&channels, &format!("sum {samples}."))? });
+        let sums = blocks.into_iter().map(sum).collect::<Result<_, String>>()?;
+        let is_colour = |name: &str| ["R", "G", "B"].contains(&name) || name.starts_with("sum ");
+        let channels = channels.into_iter().filter(|channel| !is_colour(&channel.name)).collect();
+        Ok(Self { path: path.to_owned(), record, radiance, sums, channels })
+    }
+}
+
+/// The longest side of a file's tiles, pixels. The decoder allocates whole tiles; those that kdray writes are smaller.
+const MOST_TILE_SIDE: usize = 1024;
+
+/// Refuses a file that is not a part, or whose header asks for more pixels than its record states or than fit into
+/// memory, since the decoder allocates them all.
+fn check_size(path: &Path) -> Result<(), String> {
+    let meta = MetaData::read_from_file(path, false).map_err(|error| error.to_string())?;
+    let [header] = &meta.headers[..] else { return Err(format!("it has {} layers, not one", meta.headers.len())) };
+    let record = record_of(&header.own_attributes)?;
+    let (width, height) = (header.layer_size.0, header.layer_size.1);
+    if (width, height) != (record.crop.width() as usize, record.crop.height() as usize) {
+        return Err(format!("it has {width}x{height} pixels, which are not those of its crop"));
+    }
+    if let BlockDescription::Tiles(tiles) = header.blocks
+        && tiles.tile_size.0.max(tiles.tile_size.1) > MOST_TILE_SIDE
+    {
+        return Err(format!("it has tiles of {}x{} pixels", tiles.tile_size.0, tiles.tile_size.1));
+    }
+    let n_bytes = (width * height) as u64 * 4 * header.channels.list.len() as u64;
+    memory::require("reading it", 2 * n_bytes).map_err(|error| error.to_string())
+}
+
+fn record_of(attributes: &LayerAttributes) -> Result<Record, String> {
+    match attributes.other.get(&Text::from(RECORD_ATTRIBUTE)) {
+        Some(AttributeValue::Text(json)) => {
+            Record::of_json(&json.to_string()).map_err(|error| format!("its record cannot be used: {error}"))
+        }
+        _ => Err("the file does not say what it shows: `kdray render` writes files that do".to_owned()),
+    }
+}
+
+fn channel_of(channel: &AnyChannel<FlatSamples>) -> Channel {
+    let samples = match &channel.sample_data {
+        FlatSamples::F32(samples) => Samples::Float(samples.clone()),
+        FlatSamples::F16(samples) => Samples::Float(samples.iter().map(|sample: &f16| sample.to_f32()).collect()),
+        FlatSamples::U32(samples) => Samples::Uint(samples.clone()),
+    };
+    Channel { name: channel.name.to_string(), samples }
+}
+
+/// Returns the colours of the channels whose names begin with `prefix`.
+fn colours(channels: &[Channel], prefix: &str) -> Result<Vec<[f32; 3]>, String> {
+    let channel = |component: &str| {
+        let name = format!("{prefix}{component}");
+        match channels.iter().find(|channel| channel.name == name).map(|channel| &channel.samples) {
+            Some(Samples::Float(samples)) => Ok(samples),
+            _ => Err(format!("it lacks the channel `{name}`")),
+        }
+    };
+    let [r, g, b] = ["R", "G", "B"].map(channel);
+    Ok(r?.iter().zip(g?).zip(b?).map(|((r, g), b)| [*r, *g, *b]).collect())
+}
