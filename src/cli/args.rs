@@ -8,7 +8,7 @@ use kdray::{
     engine::choices::{BuildPolicy, Request},
     frame::{Aov, Crop, Denoise, Integrator, RenderOptions, SampleRange},
     gpu::DeviceSelector,
-    scene::Scene,
+    scene::{Scene, packed_path},
 };
 
 #[cfg(feature = "bench")]
@@ -49,6 +49,8 @@ pub enum Command {
     Cast(CastArgs),
     /// Join the parts of a picture that were rendered with --crop, --tile or --samples
     Merge(MergeArgs),
+    /// Put a scene and all files that it needs into one file, which is a scene file itself
+    Pack(PackArgs),
     /// List the Vulkan devices
     Devices,
     /// Describe a scene and its acceleration structure
@@ -63,7 +65,7 @@ pub enum Command {
 
 #[derive(clap::Args)]
 pub struct RenderArgs {
-    /// Scene file (TOML), or mesh file (glTF, OBJ, PLY, STL)
+    /// Scene file (TOML), mesh file (glTF, OBJ, PLY, STL), or pack
     pub scene: PathBuf,
     /// Picture to write: .png, or .exr for linear radiance; with --path, #### in the name stands for the frame's
     /// number [default: the scene's name with .png, or with .####.png, in the working directory]
@@ -72,9 +74,9 @@ pub struct RenderArgs {
     /// Move the camera along the keyframes of this TOML file, and write one picture per frame
     #[arg(long, value_name = "FILE", conflicts_with = "repeat")]
     pub path: Option<PathBuf>,
-    /// Frames of the path to render, both ends included, for example 0-99, 7, or 0-99x4 for every fourth [default: from
-    /// the first keyframe to the last]
-    #[arg(long, value_name = "A-BxS", requires = "path")]
+    /// Frames of the path to render, both ends included, for example 0-99, 7, or 0-99x4 for every fourth; the path is
+    /// that of --path, or the one in a pack [default: from the first keyframe to the last]
+    #[arg(long, value_name = "A-BxS", conflicts_with = "repeat")]
     pub frames: Option<Frames>,
     /// Leave out pictures whose files exist already, whatever they show, so that a film that was interrupted goes on
     /// where it ended
@@ -93,7 +95,7 @@ pub struct RenderArgs {
     /// Draw as many samples of each pixel as fit into this time, at least one, for example 30s or 5m; loading and
     /// building do not count
     #[arg(long, value_name = "TIME", value_parser = time)]
-    #[arg(conflicts_with_all = ["spp", "samples", "repeat", "trace", "path", "tile"])]
+    #[arg(conflicts_with_all = ["spp", "samples", "repeat", "trace", "path", "frames", "tile"])]
     pub time: Option<Duration>,
     /// Render only some of the samples of each pixel to an .exr file, from A on up to but without B, for example 0-32;
     /// both are multiples of 16, or B is the number of all samples; `kdray merge` joins such files; for --integrator
@@ -222,6 +224,23 @@ pub struct ConvertArgs {
 }
 
 #[derive(clap::Args)]
+pub struct PackArgs {
+    /// Scene file (TOML), or mesh file (glTF, OBJ, PLY, STL)
+    pub scene: PathBuf,
+    /// Pack to write, a .kdpack file [default: the scene's name with .kdpack, in the working directory]
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Path of the camera to pack with the scene: the TOML file of its keyframes
+    #[arg(long, value_name = "FILE")]
+    pub path: Option<PathBuf>,
+    #[command(flatten)]
+    pub load: LoadArgs,
+    /// Print errors only
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+#[derive(clap::Args)]
 pub struct MergeArgs {
     /// Parts of one picture, in any order: .exr files that `kdray render` wrote
     #[arg(required = true, value_name = "PART")]
@@ -235,6 +254,17 @@ pub struct MergeArgs {
 }
 
 impl RenderArgs {
+    /// Returns the arguments with the path in the scene's pack, if the user wants frames and names no path.
+    pub fn with_packed_path(self) -> Result<Self, CliError> {
+        if self.frames.is_none() || self.path.is_some() {
+            return Ok(self);
+        }
+        match packed_path(&self.scene)? {
+            Some(path) => Ok(Self { path: Some(path), ..self }),
+            None => Err(CliError::Usage("--frames needs --path FILE, or a pack with a path".into())),
+        }
+    }
+
     /// Refuses arguments that contradict each other.
     pub fn check(&self) -> Result<(), CliError> {
         self.picture.check()?;

@@ -18,6 +18,7 @@ mod log;
 mod look_args;
 mod merge;
 mod or_auto;
+mod pack;
 mod picture_args;
 mod progress;
 mod render;
@@ -69,11 +70,12 @@ pub fn main(arguments: impl Iterator<Item = OsString>) -> ExitCode {
 
 fn run(args: Args) -> Result<(), CliError> {
     match args.command {
-        Command::Render(args) => render::run(&args),
+        Command::Render(args) => render::run(args),
         #[cfg(feature = "view")]
         Command::View(args) => view::run(&args),
         Command::Cast(args) => cast::run(&args),
         Command::Merge(args) => merge::run(&args),
+        Command::Pack(args) => pack::run(&args),
         Command::Devices => devices::run(),
         Command::Inspect(args) => inspect::run(&args),
         Command::Convert(args) => convert::run(&args),

@@ -3,7 +3,6 @@
 
 use std::{
     collections::{HashMap, HashSet},
-    fs,
     ops::Range,
     path::PathBuf,
 };
@@ -16,6 +15,7 @@ use super::{
     assemble::File,
     description::{CommonSpec, MeshSpec, Source},
     error::Checked,
+    files,
     generate::{Generator, TriangleBudget},
     gltf,
     image_files::Images,
@@ -124,7 +124,7 @@ impl<'a> Placer<'a> {
         let mut seen = HashSet::new();
         let readings: Vec<Reading> =
             readings.filter(|it| is_shape(it) && it.scene.is_none()).filter(|it| seen.insert(it.clone())).collect();
-        let n_bytes: u64 = readings.iter().map(|it| fs::metadata(&it.path).map_or(0, |metadata| metadata.len())).sum();
+        let n_bytes: u64 = readings.iter().map(|it| files::n_bytes(&it.path)).sum();
         if readings.len() < 2 || require("reading files", n_bytes.saturating_mul(READING_BYTES)).is_err() {
             return;
         }

@@ -39,7 +39,8 @@ use super::{
 
 /// Runs `kdray render`: loads the scene, builds its structure, renders, writes and reports. Arguments, files and
 /// memory are checked before the work that an error would waste.
-pub fn run(args: &RenderArgs) -> Result<(), CliError> {
+pub fn run(args: RenderArgs) -> Result<(), CliError> {
+    let args = &args.with_packed_path()?;
     args.check()?;
     let roles = roles(args)?;
     check_outputs(args)?;
