@@ -16,6 +16,7 @@ use super::bench::Suite;
 #[cfg(feature = "view")]
 pub use super::view_args::ViewArgs;
 use super::{
+    device_args::{DeviceList, device},
     error::CliError,
     load_args::LoadArgs,
     look_args::LookArgs,
@@ -117,10 +118,10 @@ pub struct RenderArgs {
     /// Number of CPU threads for loading, building and --cpu, 1 to 1024 [default: one per processor]
     #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
-    /// Vulkan device to use: its index in `kdray devices`, or a part of its name [default: a
-    /// discrete GPU, else an integrated one, else a software driver]
-    #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
-    pub device: Option<DeviceSelector>,
+    /// Vulkan devices that share the drawing: indices in `kdray devices` or parts of names, separated by commas, or `all`
+    /// for all devices of the best one's kind [default: a discrete GPU, else an integrated one, else a software driver]
+    #[arg(long, value_name = "LIST|all")]
+    pub device: Option<DeviceList>,
     /// Number of times to draw the frame, 1 to 10000; the report shows the frame of median time
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u16).range(1..=10_000))]
     pub repeat: u16,
@@ -278,6 +279,15 @@ impl RenderArgs {
             return Err(CliError::Usage("--samples needs --output FILE.exr: `kdray merge` joins .exr files".into()));
         }
         Ok(())
+    }
+
+    /// Refuses arguments that several devices cannot serve.
+    pub fn check_devices(&self, n_devices: usize) -> Result<(), CliError> {
+        let refused = [(self.time.is_some(), "--time"), (self.trace.is_some(), "--trace")];
+        match refused.iter().find(|(is_given, _)| *is_given && n_devices > 1) {
+            Some((_, name)) => Err(CliError::Usage(format!("{name} needs a single device, and there are {n_devices}"))),
+            None => Ok(()),
+        }
     }
 
     /// Returns the number of samples per pixel of the whole picture: the user's, else the scene's.
@@ -454,15 +464,6 @@ fn time(word: &str) -> Result<Duration, String> {
         Ok(time) if time > Duration::from_secs(30 * 24 * 3600) => Err("expected at most 30 days".to_owned()),
         Ok(time) => Ok(time),
         Err(_) => Err("expected a number with a unit, such as 30s, 5m or 1h".to_owned()),
-    }
-}
-
-/// Parses a device selector: an index if the word is a number, else a part of a name.
-pub fn device(word: &str) -> Result<DeviceSelector, String> {
-    match word.parse() {
-        Ok(index) => Ok(DeviceSelector::Index(index)),
-        Err(_) if word.trim().is_empty() => Err("expected an index or a name".into()),
-        Err(_) => Ok(DeviceSelector::Name(word.to_owned())),
     }
 }
 

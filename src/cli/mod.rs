@@ -9,6 +9,7 @@ mod build;
 mod cast;
 mod cast_report;
 mod convert;
+mod device_args;
 mod devices;
 mod error;
 mod file_roles;
@@ -37,17 +38,12 @@ use std::{
     ffi::OsString,
     io::{self, Write},
     process::ExitCode,
-    sync::Arc,
 };
 
 use args::{Args, Command};
 use clap::Parser;
 use error::CliError;
-use kdray::{
-    gpu::{Context, ContextOptions, GpuError},
-    util::text::{escape_controls, one_line},
-};
-use progress::Progress;
+use kdray::util::text::{escape_controls, one_line};
 
 /// Runs the command that `arguments` describe. The first argument is the program's name.
 pub fn main(arguments: impl Iterator<Item = OsString>) -> ExitCode {
@@ -82,15 +78,6 @@ fn run(args: Args) -> Result<(), CliError> {
         #[cfg(feature = "bench")]
         Command::Bench(suite) => bench::run(&suite),
     }
-}
-
-/// Opens the selected device. If the user selected none and the best device is a software driver, a note says so.
-fn open_device(options: &ContextOptions, progress: &Progress) -> Result<Arc<Context>, GpuError> {
-    let context = Context::new(options)?;
-    if options.device.is_none() && context.is_software() {
-        progress.note(&format!("no GPU found, rendering in software on {}", context.info().name));
-    }
-    Ok(context)
 }
 
 /// Writes a report to standard output. Control characters are escaped within each line, since a report quotes names

@@ -63,6 +63,21 @@ impl BandedRenderer {
         self.renderer.set_camera(camera);
     }
 
+    /// Sets the part of the picture that is drawn next. Buffers are kept as [`Renderer::set_crop`] keeps them.
+    ///
+    /// # Panics
+    /// The crop exceeds the picture.
+    ///
+    /// # Errors
+    /// The part exceeds the device's limits or memory.
+    pub fn set_crop(&mut self, crop: Crop) -> Result<(), GpuError> {
+        let options = RenderOptions { crop: Some(crop), ..self.renderer.options().clone() };
+        let bands = bands(self.renderer.context.limits(), &options);
+        self.renderer.set_crop(largest(&bands, &options).unwrap_or(crop))?;
+        (self.bands, self.joined) = (bands, None);
+        Ok(())
+    }
+
     /// Sets the index of the next picture's first sample, a multiple of `2^MOST_SAMPLES_LOG2`. Only frames of paths
     /// know it.
     ///
