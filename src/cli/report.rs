@@ -230,7 +230,8 @@ impl Report {
         }
         if self.devices > 1 {
             let n = self.devices;
-            text += &format!("{n} devices: the times of passes are sums over all, the frame's is that of the clock\n\n");
+            text +=
+                &format!("{n} devices: the times of passes are sums over all, the frame's is that of the clock\n\n");
         }
         if let Some(FrameTimeRange { n_frames, min_ms, max_ms }) = &self.repeated {
             text += &format!("the median of {n_frames} frames, which took {min_ms:.3} to {max_ms:.3} ms:\n\n");

@@ -48,6 +48,9 @@ impl Crop {
     /// Copies the pixels of `crop` out of those of this rectangle, which must contain it. `pixels`: the pixels of
     /// this rectangle, rows from the top.
     pub(crate) fn part<T: Copy>(&self, pixels: &[T], crop: &Crop) -> Vec<T> {
+        if self == crop {
+            return pixels.to_vec();
+        }
         let (left, width) = ((crop.x0 - self.x0) as usize, crop.width() as usize);
         let rows = pixels.chunks_exact(self.width() as usize).skip((crop.y0 - self.y0) as usize);
         rows.take(crop.height() as usize).flat_map(|row| &row[left..left + width]).copied().collect()

@@ -6,6 +6,8 @@
 
 use std::{fmt, str::FromStr};
 
+use rayon::prelude::*;
+
 use crate::layout::MOST_SAMPLES_LOG2;
 
 /// Samples of each pixel: those from `first` on, up to but without `end`.
@@ -104,6 +106,11 @@ impl SampleSums {
         &self.0
     }
 
+    /// Returns the blocks, in order.
+    pub fn into_blocks(self) -> Vec<BlockSum> {
+        self.0
+    }
+
     /// Returns the range of all samples.
     pub fn samples(&self) -> SampleRange {
         let ends = (self.0.first().zip(self.0.last())).map(|(first, last)| (first.samples.first, last.samples.end));
@@ -137,7 +144,7 @@ impl SampleSums {
     /// As [`SampleSums::push`].
     pub fn push_mean(&mut self, samples: SampleRange, radiance: &[[f32; 4]]) {
         let n = samples.len() as f32;
-        let sums = radiance.iter().map(|&[r, g, b, _]| [r * n, g * n, b * n]).collect();
+        let sums = radiance.par_iter().map(|&[r, g, b, _]| [r * n, g * n, b * n]).collect();
         self.push(BlockSum { samples, sums });
     }
 
@@ -148,7 +155,7 @@ impl SampleSums {
         let Some((last, earlier)) = self.0.split_last() else { return Vec::new() };
         let mut sums = last.sums.clone();
         earlier.iter().rev().for_each(|block| add(&mut sums, &block.sums));
-        sums.into_iter().map(|[r, g, b]| [r * reciprocal, g * reciprocal, b * reciprocal, 1.0]).collect()
+        sums.into_par_iter().map(|[r, g, b]| [r * reciprocal, g * reciprocal, b * reciprocal, 1.0]).collect()
     }
 }
 
@@ -164,7 +171,7 @@ pub fn variance_of_joined(ranges: impl Iterator<Item = (u32, f32)>) -> f32 {
 }
 
 fn add(sums: &mut [[f32; 3]], others: &[[f32; 3]]) {
-    sums.as_flattened_mut().iter_mut().zip(others.as_flattened()).for_each(|(sum, other)| *sum += other);
+    sums.as_flattened_mut().par_iter_mut().zip(others.as_flattened()).for_each(|(sum, other)| *sum += other);
 }
 
 #[cfg(test)]

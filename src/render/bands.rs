@@ -123,6 +123,31 @@ impl BandedRenderer {
         Ok(all)
     }
 
+    /// Returns the mean of the samples before the noise filter, of the crop and the border that the filter reads.
+    ///
+    /// # Panics
+    /// There are several bands.
+    ///
+    /// # Errors
+    /// A copy fails.
+    pub fn window_mean(&self) -> Result<Vec<[f32; 4]>, GpuError> {
+        assert_eq!(self.bands.len(), 1, "one band");
+        self.renderer.window_mean()
+    }
+
+    /// Replaces the mean of the samples, as [`BandedRenderer::window_mean`] returns it, filters and
+    /// displays it. The next sample is the first of a new picture.
+    ///
+    /// # Panics
+    /// There are several bands, or the mean has another number of pixels.
+    ///
+    /// # Errors
+    /// A copy fails.
+    pub fn show_mean(&mut self, mean: &[[f32; 4]]) -> Result<(), GpuError> {
+        assert_eq!(self.bands.len(), 1, "one band");
+        self.renderer.show_mean(mean)
+    }
+
     /// Returns the picture that was drawn last. It is downloaded if it is still on the device.
     ///
     /// # Errors

@@ -207,6 +207,29 @@ impl Renderer {
         Ok(())
     }
 
+    /// Downloads the mean of the samples before the noise filter, of the whole window.
+    ///
+    /// # Errors
+    /// A copy fails.
+    fn window_mean(&self) -> Result<Vec<[f32; 4]>, GpuError> {
+        self.resources.pixels.pixel_radiance.download_first(self.resources.n_pixels())
+    }
+
+    /// Replaces the mean of the samples, filters and displays it. The next sample is the first of a new picture.
+    ///
+    /// # Panics
+    /// The mean does not have one value for each pixel of the window.
+    ///
+    /// # Errors
+    /// A copy fails, or a Vulkan call.
+    fn show_mean(&mut self, mean: &[[f32; 4]]) -> Result<(), GpuError> {
+        assert_eq!(mean.len(), self.resources.n_pixels(), "pixels of the window");
+        self.resources.pixels.pixel_radiance.upload(mean)?;
+        self.show()?;
+        self.reset_samples();
+        Ok(())
+    }
+
     /// Downloads the picture as it was last drawn or shown. The last sample must be complete: one that was drawn in
     /// part, even if it has been dropped, has overwritten some of the radiance.
     ///
@@ -243,8 +266,7 @@ impl Renderer {
     /// # Errors
     /// A copy fails.
     fn note_noise(&self, features: &mut [Feature]) -> Result<(), GpuError> {
-        let means = self.resources.pixels.pixel_radiance.download_first(self.resources.n_pixels())?;
-        let means = self.in_use.window().part(&means, &self.in_use.crop_or_whole());
+        let means = self.in_use.window().part(&self.window_mean()?, &self.in_use.crop_or_whole());
         features.iter_mut().zip(means).for_each(|(feature, mean)| feature.set_noise(mean, self.n_samples));
         Ok(())
     }

@@ -1,36 +1,40 @@
-//! Draws one picture on several devices: each has the whole scene, and draws tiles of full rows that are handed out by
-//! the devices' measured speeds. On devices of one kind, the picture has the same bits as on one of them.
+//! Draws one picture on several devices, each of which has the whole scene. On devices of one kind, the picture has the
+//! same bits as on one of them.
+//!
+//! ```text
+//! handout   ranges of units of work for each device, by its measured speed
+//! samples   units are blocks of samples of all pixels, which cost the same everywhere: paths without a filter or layers
+//! rows      units are rows of pixels, of which tiles are made: everything else
+//! ```
 
 mod handout;
+mod rows;
+mod samples;
 
 use std::{
+    ops::Range,
     sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc},
     thread,
     time::Instant,
 };
 
-use self::handout::Handout;
+use self::handout::{Handout, Portions};
 use crate::{
-    frame::{Crop, Drawn, Goal, Picture, RenderOptions, Watcher},
+    frame::{Crop, Denoise, Drawn, Goal, Integrator, Picture, RenderOptions, Watcher},
     gpu::{Context, GpuError},
-    layout::Feature,
     render::BandedRenderer,
     scene::Camera,
     world::World,
 };
 
-/// Number of pixels of the smallest tile on a GPU. Fewer pixels leave parts of a large GPU idle.
-const LEAST_PIXELS: u32 = 1 << 16;
-/// The same on a software driver.
-const LEAST_SOFTWARE_PIXELS: u32 = 1 << 8;
-/// Number of rows of a border that is wide: to draw it around many tiles would take long.
-const WIDE_BORDER: u32 = 8;
-
 /// Renderers of one world on several devices.
 pub struct RendererGroup {
     members: Vec<Member>,
     options: RenderOptions,
-    handout: Handout,
+    /// Index of the next picture's first sample.
+    first_sample: u32,
+    rows: Handout,
+    samples: Handout,
     /// The picture that was drawn last.
     picture: Picture,
 }
@@ -42,26 +46,22 @@ struct Member {
     renderer: BandedRenderer,
 }
 
-/// A tile of the picture that has been drawn.
-struct Tile {
-    crop: Crop,
-    picture: Picture,
-    drawn: Drawn,
-}
-
 impl RendererGroup {
     /// Uploads the scene to all devices and creates the pipelines, on all devices at the same time.
     ///
     /// # Errors
     /// Fails as [`BandedRenderer::new`] does on any device.
     pub fn new(contexts: &[Arc<Context>], world: &World, options: &RenderOptions) -> Result<Self, GpuError> {
+        let n_devices = contexts.len();
         let asked = options.crop_or_whole();
-        let least_pixels = if contexts[0].is_software() { LEAST_SOFTWARE_PIXELS } else { LEAST_PIXELS };
-        let has_wide_borders = options.border() >= WIDE_BORDER;
-        let handout = Handout::new(contexts.len(), least_pixels.div_ceil(asked.width()), has_wide_borders);
-        // A first tile that is larger gets larger buffers.
-        let n_rows = asked.height().div_ceil(contexts.len() as u32);
-        let first = RenderOptions { crop: Some(Crop { y1: asked.y0 + n_rows, ..asked }), ..options.clone() };
+        let first = match can_share_samples(options) {
+            true => options.clone(),
+            // A first tile that is larger gets larger buffers.
+            false => {
+                let y1 = asked.y0 + asked.height().div_ceil(n_devices as u32);
+                RenderOptions { crop: Some(Crop { y1, ..asked }), ..options.clone() }
+            }
+        };
         let open = |context: &Arc<Context>| BandedRenderer::new(Arc::clone(context), world, &first);
         let renderers: Vec<_> = thread::scope(|scope| {
             let threads: Vec<_> = contexts.iter().map(|context| scope.spawn(|| open(context))).collect();
@@ -70,8 +70,16 @@ impl RendererGroup {
         let members = (contexts.iter().zip(renderers).enumerate())
             .map(|(ix, (context, renderer))| Ok(Member { ix, name: context.info().name.clone(), renderer: renderer? }))
             .collect::<Result<_, GpuError>>()?;
-        let picture = Picture { width: 0, height: 0, radiance: Vec::new(), display: Vec::new() };
-        Ok(Self { members, options: options.clone(), handout, picture })
+        let are_equal = contexts.iter().all(|context| context.info().name == contexts[0].info().name);
+        let of_samples = if are_equal { Portions::OneEach } else { Portions::Many { least: 1 } };
+        Ok(Self {
+            members,
+            options: options.clone(),
+            first_sample: 0,
+            rows: Handout::new(n_devices, rows::portions(contexts, options)),
+            samples: Handout::new(n_devices, of_samples),
+            picture: Picture { width: 0, height: 0, radiance: Vec::new(), display: Vec::new() },
+        })
     }
 
     /// Sets the camera of the next pictures.
@@ -84,11 +92,12 @@ impl RendererGroup {
     /// # Errors
     /// A Vulkan call fails.
     pub fn set_first_sample(&mut self, first_sample: u32) -> Result<(), GpuError> {
+        self.first_sample = first_sample;
         self.members.iter_mut().try_for_each(|member| member.renderer.set_first_sample(first_sample))
     }
 
-    /// Draws a new picture. The watcher is told of the samples of the whole picture. If a device fails, the others draw
-    /// its rows and it draws no more; a warning says so. Times of passes are sums over all devices, and the time of the
+    /// Draws a new picture. The watcher is told of the samples of the whole picture. If a device fails, the others do
+    /// its work and it draws no more; a warning says so. Times of passes are sums over all devices, and the time of the
     /// frame is what the clock shows.
     ///
     /// # Errors
@@ -98,72 +107,19 @@ impl RendererGroup {
             let device = "several devices".to_owned();
             return Err(GpuError::Lacks { device, missing: "pictures that end by time".to_owned() });
         };
-        let asked = self.options.crop_or_whole();
         let begin = Instant::now();
-        self.handout.begin(asked.y0..asked.y1);
-        let job = Job { handout: Mutex::new(&mut self.handout), freed: Mutex::default(), crop: asked, goal };
-        let (send, receive) = mpsc::channel();
-        let mut tiles = Vec::new();
-        let mut failed = Vec::new();
-        thread::scope(|scope| {
-            for member in &mut self.members {
-                let (job, send) = (&job, send.clone());
-                scope.spawn(move || job.work(member, &send));
-            }
-            drop(send);
-            let mut progress = WholeSamples { n_rows: asked.height(), n_samples, n_done: 0 };
-            for message in receive {
-                match message {
-                    Message::Sample(n_rows) => progress.add(n_rows, watcher),
-                    Message::Tile(tile) => tiles.push(*tile),
-                    Message::Failed(ix, error) => failed.push((ix, error)),
-                }
-            }
-        });
-        self.join(tiles, failed, begin)
-    }
-
-    /// Joins the tiles to the picture.
-    fn join(
-        &mut self,
-        mut tiles: Vec<Tile>,
-        mut failed: Vec<(usize, GpuError)>,
-        begin: Instant,
-    ) -> Result<Drawn, GpuError> {
-        let asked = self.options.crop_or_whole();
-        let is_complete = tiles.iter().map(|tile| tile.crop.height()).sum::<u32>() == asked.height();
-        if !is_complete {
-            return Err(failed.pop().expect("rows are missing only if a device fails").1);
-        }
-        for (ix, error) in failed {
-            let name = self.members.iter().find(|member| member.ix == ix).map_or("", |member| &member.name);
-            tracing::warn!("device {ix} of the list, {name}, has failed, and the others draw its rows: {error}");
-            self.members.retain(|member| member.ix != ix);
-        }
-        tiles.sort_by_key(|tile| tile.crop.y0);
-        let n_pixels = asked.width() as usize * asked.height() as usize;
-        let mut picture =
-            Picture { width: asked.width(), height: asked.height(), radiance: Vec::new(), display: Vec::new() };
-        picture.radiance.reserve_exact(n_pixels);
-        picture.display.reserve_exact(n_pixels);
-        let (mut all, mut features) = (None::<Drawn>, Vec::<Feature>::new());
-        for Tile { picture: part, mut drawn, .. } in tiles {
-            picture.radiance.extend(part.radiance);
-            picture.display.extend(part.display);
-            features.append(&mut drawn.features);
-            match &mut all {
-                None => all = Some(drawn),
-                Some(all) => all.profile.append(drawn.profile),
-            }
-        }
-        self.picture = picture;
-        let mut all = all.expect("a picture has rows");
-        all.features = features;
-        all.profile.device = self.device_names();
-        if let Some(ms) = &mut all.profile.frame_ms {
+        let has_one_band = |member: &Member| member.renderer.n_bands() == 1;
+        let by_samples =
+            can_share_samples(&self.options) && n_samples >= 2 * samples::UNIT && self.members.iter().all(has_one_band);
+        let mut drawn = match by_samples {
+            true => self.draw_samples(n_samples, watcher)?,
+            false => self.draw_rows(n_samples, watcher)?,
+        };
+        drawn.profile.device = self.device_names();
+        if let Some(ms) = &mut drawn.profile.frame_ms {
             *ms = begin.elapsed().as_secs_f64() * 1e3;
         }
-        Ok(all)
+        Ok(drawn)
     }
 
     /// Returns the names of the devices, those of several equal devices with their number.
@@ -185,59 +141,100 @@ impl RendererGroup {
     }
 }
 
+/// Whether samples of all pixels can be drawn apart. The noise filter `edge` and layers need all samples of a pixel on
+/// one device.
+fn can_share_samples(options: &RenderOptions) -> bool {
+    options.integrator == Integrator::Path && !options.features && options.noise_filter() != Denoise::Edge
+}
+
+/// Work that all members share.
+struct Job<'a, W> {
+    handout: Mutex<&'a mut Handout>,
+    /// Ranges of devices that have failed.
+    freed: Mutex<Vec<Range<u32>>>,
+    work: W,
+}
+
 /// What a thread tells of its device.
-enum Message {
-    /// A sample of a tile of this number of rows has been drawn.
-    Sample(u32),
-    Tile(Box<Tile>),
+enum Message<T> {
+    /// Samples of this many pixels, as a share of all pixels, have been drawn.
+    Samples(f64),
+    Done(Range<u32>, T),
     /// The member has failed.
     Failed(usize, GpuError),
 }
 
-/// A picture that all members draw.
-struct Job<'a> {
-    handout: Mutex<&'a mut Handout>,
-    /// Tiles of devices that have failed.
-    freed: Mutex<Vec<Crop>>,
-    crop: Crop,
-    goal: Goal,
+/// Lets all members work until no units are left. `work` does a range of units and calls its last argument with the
+/// share of the picture of which a sample has been drawn. Returns the results in the order of their ranges.
+///
+/// # Errors
+/// All members have failed.
+fn share<T: Send>(
+    members: &mut Vec<Member>,
+    handout: &mut Handout,
+    units: Range<u32>,
+    watcher: &mut impl Watcher,
+    work: impl Fn(&mut BandedRenderer, Range<u32>, &dyn Fn(f64)) -> Result<T, GpuError> + Sync,
+) -> Result<Vec<(Range<u32>, T)>, GpuError> {
+    let n_units = units.len();
+    handout.begin(units);
+    let job = Job { handout: Mutex::new(handout), freed: Mutex::default(), work };
+    let (send, receive) = mpsc::channel();
+    let (mut results, mut failed, mut progress) = (Vec::new(), Vec::new(), WholeSamples { n_done: 0.0 });
+    thread::scope(|scope| {
+        for member in &mut *members {
+            let (job, send) = (&job, send.clone());
+            scope.spawn(move || job.run(member, &send));
+        }
+        drop(send);
+        for message in receive {
+            match message {
+                Message::Samples(share) => progress.add(share, watcher),
+                Message::Done(range, result) => results.push((range, result)),
+                Message::Failed(ix, error) => failed.push((ix, error)),
+            }
+        }
+    });
+    if results.iter().map(|(range, _)| range.len()).sum::<usize>() < n_units {
+        return Err(failed.pop().expect("units are missing only if a device has failed").1);
+    }
+    for (ix, error) in failed {
+        let name = members.iter().find(|member| member.ix == ix).map_or("", |member| &member.name);
+        tracing::warn!("device {ix} of the list, {name}, has failed, and the others do its work: {error}");
+        members.retain(|member| member.ix != ix);
+    }
+    results.sort_by_key(|(range, _)| range.start);
+    Ok(results)
 }
 
-impl Job<'_> {
-    /// Draws tiles on a device until none are left.
-    fn work(&self, member: &mut Member, send: &mpsc::Sender<Message>) {
+impl<W> Job<'_, W> {
+    /// Does the work of a device until no units are left.
+    fn run<T>(&self, member: &mut Member, send: &mpsc::Sender<Message<T>>)
+    where
+        W: Fn(&mut BandedRenderer, Range<u32>, &dyn Fn(f64)) -> Result<T, GpuError>,
+    {
         // The receiver lives as long as all threads.
         let tell = |message| send.send(message).expect("a receiver");
-        while let Some(crop) = self.next(member.ix) {
+        while let Some(range) = self.next(member.ix) {
             let begin = Instant::now();
-            match self.draw(&mut member.renderer, crop, || tell(Message::Sample(crop.height()))) {
-                Ok(tile) => {
-                    lock(&self.handout).note(member.ix, &(crop.y0..crop.y1), begin.elapsed());
-                    tell(Message::Tile(Box::new(tile)));
+            match (self.work)(&mut member.renderer, range.clone(), &|share| tell(Message::Samples(share))) {
+                Ok(result) => {
+                    lock(&self.handout).note(member.ix, &range, begin.elapsed());
+                    tell(Message::Done(range, result));
                 }
                 Err(error) => {
                     lock(&self.handout).lose(member.ix);
-                    lock(&self.freed).push(crop);
+                    lock(&self.freed).push(range);
                     return tell(Message::Failed(member.ix, error));
                 }
             }
         }
     }
 
-    /// Returns the next tile of a device.
-    fn next(&self, member_ix: usize) -> Option<Crop> {
-        if let Some(crop) = lock(&self.freed).pop() {
-            return Some(crop);
-        }
-        let rows = lock(&self.handout).take(member_ix)?;
-        Some(Crop { y0: rows.start, y1: rows.end, ..self.crop })
-    }
-
-    fn draw(&self, renderer: &mut BandedRenderer, crop: Crop, sample: impl FnMut()) -> Result<Tile, GpuError> {
-        renderer.set_crop(crop)?;
-        let mut sample = sample;
-        let drawn = renderer.draw(self.goal, &mut sample)?;
-        Ok(Tile { crop, picture: renderer.picture()?.into_owned(), drawn })
+    /// Returns the next range of a device.
+    fn next(&self, member_ix: usize) -> Option<Range<u32>> {
+        let freed = lock(&self.freed).pop();
+        freed.or_else(|| lock(&self.handout).take(member_ix))
     }
 }
 
@@ -245,22 +242,19 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Turns the samples of tiles into samples of the whole picture.
+/// Turns samples of parts of the picture into samples of the whole picture.
 struct WholeSamples {
-    /// Height of the picture.
-    n_rows: u32,
-    /// Number of samples of each pixel.
-    n_samples: u32,
-    /// Number of rows that have been drawn, each sample counted.
-    n_done: u64,
+    /// Number of samples of all pixels that have been drawn.
+    n_done: f64,
 }
 
 impl WholeSamples {
-    fn add(&mut self, n_rows: u32, watcher: &mut impl Watcher) {
-        let whole = |n_done: u64| n_done / u64::from(self.n_rows);
+    fn add(&mut self, share: f64, watcher: &mut impl Watcher) {
+        // The shares of a sample add up to 1, but for rounding.
+        let whole = |n_done: f64| (n_done + 1e-6).floor() as u64;
         let before = whole(self.n_done);
-        self.n_done = (self.n_done + u64::from(n_rows)).min(u64::from(self.n_rows) * u64::from(self.n_samples));
+        self.n_done += share;
         (before..whole(self.n_done)).for_each(|_| watcher.sample());
-        watcher.part((self.n_done % u64::from(self.n_rows)) as f32 / self.n_rows as f32);
+        watcher.part((self.n_done - self.n_done.floor()) as f32);
     }
 }
