@@ -151,10 +151,14 @@ impl SampleSums {
     /// Returns the means of all samples as the kernel computes them: the sums are added from the last block to the
     /// first one, and multiplied by the reciprocal of their number. The fourth component is 1.
     pub fn mean(&self) -> Vec<[f32; 4]> {
+        self.clone().into_mean()
+    }
+
+    /// Returns what [`SampleSums::mean`] does.
+    pub fn into_mean(mut self) -> Vec<[f32; 4]> {
         let reciprocal = 1.0 / self.samples().len() as f32;
-        let Some((last, earlier)) = self.0.split_last() else { return Vec::new() };
-        let mut sums = last.sums.clone();
-        earlier.iter().rev().for_each(|block| add(&mut sums, &block.sums));
+        let Some(BlockSum { mut sums, .. }) = self.0.pop() else { return Vec::new() };
+        self.0.iter().rev().for_each(|block| add(&mut sums, &block.sums));
         sums.into_par_iter().map(|[r, g, b]| [r * reciprocal, g * reciprocal, b * reciprocal, 1.0]).collect()
     }
 }

@@ -71,6 +71,9 @@ impl BandedRenderer {
     /// # Errors
     /// The part exceeds the device's limits or memory.
     pub fn set_crop(&mut self, crop: Crop) -> Result<(), GpuError> {
+        if self.bands == [crop] {
+            return Ok(());
+        }
         let options = RenderOptions { crop: Some(crop), ..self.renderer.options().clone() };
         let bands = bands(self.renderer.context.limits(), &options);
         self.renderer.set_crop(largest(&bands, &options).unwrap_or(crop))?;
@@ -85,6 +88,9 @@ impl BandedRenderer {
     /// A Vulkan call fails.
     pub fn set_first_sample(&mut self, first_sample: u32) -> Result<(), GpuError> {
         let options = self.renderer.options();
+        if options.paths.first_sample == first_sample {
+            return Ok(());
+        }
         let paths = PathOptions { first_sample, ..options.paths };
         self.renderer.set_options(&RenderOptions { paths, ..options.clone() })
     }
@@ -135,17 +141,17 @@ impl BandedRenderer {
         self.renderer.window_mean()
     }
 
-    /// Replaces the mean of the samples, as [`BandedRenderer::window_mean`] returns it, filters and
-    /// displays it. The next sample is the first of a new picture.
+    /// Replaces the mean of the samples, which [`BandedRenderer::window_mean`] returns, and returns the picture of it,
+    /// filtered and encoded. The next sample is the first of a new picture.
     ///
     /// # Panics
     /// There are several bands, or the mean has another number of pixels.
     ///
     /// # Errors
     /// A copy fails.
-    pub fn show_mean(&mut self, mean: &[[f32; 4]]) -> Result<(), GpuError> {
+    pub fn picture_of(&mut self, mean: Vec<[f32; 4]>) -> Result<Picture, GpuError> {
         assert_eq!(self.bands.len(), 1, "one band");
-        self.renderer.show_mean(mean)
+        self.renderer.picture_of(mean)
     }
 
     /// Returns the picture that was drawn last. It is downloaded if it is still on the device.

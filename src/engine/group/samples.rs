@@ -41,10 +41,7 @@ impl RendererGroup {
                 Some(profile) => profile.add(&part_profile),
             }
         }
-        let display = &mut self.members[0].renderer;
-        display.set_first_sample(first)?;
-        display.show_mean(&sums.mean())?;
-        self.picture = display.picture()?.into_owned();
+        self.picture = self.members[0].renderer.picture_of(sums.into_mean())?;
         Ok(Drawn { features: Vec::new(), profile: profile.unwrap_or_default(), n_samples })
     }
 }
