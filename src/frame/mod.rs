@@ -232,7 +232,7 @@ impl Primary {
 }
 
 /// The picture of a rendered frame, or of its crop. Pixels are in rows from the top, left to right.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Picture {
     /// Width, pixels.
     pub width: u32,
@@ -246,8 +246,13 @@ pub struct Picture {
 
 /// Sets the fourth component of pixels to 1. In frames of paths, kernels use it for the noise of the samples.
 pub(crate) fn opaque(mut radiance: Vec<[f32; 4]>) -> Vec<[f32; 4]> {
-    radiance.par_iter_mut().for_each(|pixel| pixel[3] = 1.0);
+    make_opaque(&mut radiance);
     radiance
+}
+
+/// Does what [`opaque`] does, in place.
+pub(crate) fn make_opaque(radiance: &mut [[f32; 4]]) {
+    radiance.par_iter_mut().for_each(|pixel| pixel[3] = 1.0);
 }
 
 named_enum!(Tonemap {

@@ -195,23 +195,32 @@ impl<T: Pod> Buffer<T> {
     pub fn download_part(&self, first: usize, len: usize) -> Result<Vec<T>, GpuError> {
         let end = first + len;
         assert!(end <= self.len, "`{}` holds {} elements, not {end}", self.any.name, self.len);
-        let bytes = len * size_of::<T>();
-        if bytes == 0 {
-            return Ok(Vec::new());
+        let mut data = vec![T::zeroed(); len];
+        self.download_bytes(first * size_of::<T>(), bytemuck::cast_slice_mut(&mut data))?;
+        Ok(data)
+    }
+
+    /// Downloads bytes from the byte `first` on, a multiple of 4, and waits for the device.
+    ///
+    /// # Panics
+    /// The buffer has fewer bytes.
+    pub fn download_bytes(&self, first: usize, to: &mut [u8]) -> Result<(), GpuError> {
+        assert!((first + to.len()) as u64 <= self.any.bytes, "`{}` holds {} bytes", self.any.name, self.any.bytes);
+        if to.is_empty() {
+            return Ok(());
         }
         let context = &self.any.context;
-        let mut staging = AnyBuffer::staging(context, &self.any.name, bytes as u64, MemoryLocation::GpuToCpu)?;
+        let mut staging = AnyBuffer::staging(context, &self.any.name, to.len() as u64, MemoryLocation::GpuToCpu)?;
         context.run("download", |commands| {
             commands.barrier(Access::ComputeWrite, Access::TransferRead); // the buffer
-            let begin = (first * size_of::<T>()) as u64;
-            commands.copy_buffer_part((&self.any, begin), (&staging, 0), bytes as u64);
+            commands.copy_buffer_part((&self.any, first as u64), (&staging, 0), to.len() as u64);
             commands.barrier(Access::TransferWrite, Access::HostRead); // staging
         })?;
-        let mut data = vec![T::zeroed(); len];
         // Fresh pages are mapped one by one when they are first written, which several threads do faster.
-        let parts = bytemuck::cast_slice_mut(&mut data).par_chunks_mut(COPIED_BYTES);
-        parts.zip(staging.mapped()[..bytes].par_chunks(COPIED_BYTES)).for_each(|(to, from)| to.copy_from_slice(from));
-        Ok(data)
+        let from = &staging.mapped()[..to.len()];
+        let parts = to.par_chunks_mut(COPIED_BYTES).zip(from.par_chunks(COPIED_BYTES));
+        parts.for_each(|(to, from)| to.copy_from_slice(from));
+        Ok(())
     }
 
     /// Returns the buffer without its element type.

@@ -165,6 +165,25 @@ impl BandedRenderer {
         }
     }
 
+    /// Copies the picture that was drawn last into slices of its pixels, rows from the top. Memory that has been used
+    /// before is filled sooner than new memory.
+    ///
+    /// # Panics
+    /// A slice does not have one element for each pixel.
+    ///
+    /// # Errors
+    /// A copy from the device fails.
+    pub fn picture_into(&self, radiance: &mut [[f32; 4]], display: &mut [[u8; 4]]) -> Result<(), GpuError> {
+        let options = self.renderer.options();
+        if self.joined.is_none() && options.window() == options.crop_or_whole() {
+            return self.renderer.picture_into(radiance, display);
+        }
+        let picture = self.picture()?;
+        radiance.copy_from_slice(&picture.radiance);
+        display.copy_from_slice(&picture.display);
+        Ok(())
+    }
+
     /// Copies the displayed picture into an image that the caller owns, as [`Renderer::copy_picture_to`] does.
     ///
     /// # Errors

@@ -32,7 +32,10 @@ use self::{
 };
 use crate::{
     buffers::{Needs, Resources},
-    frame::{Denoise, FrameKind, Integrator, Pass, Picture, Plan, Primary, Profile, RenderOptions, Step, opaque, plan},
+    frame::{
+        Denoise, FrameKind, Integrator, Pass, Picture, Plan, Primary, Profile, RenderOptions, Step, make_opaque,
+        opaque, plan,
+    },
     gpu::{Access, AnyBuffer, CommandBuffer, Commands, Context, GpuError},
     layout::{Batch, FalseColor, Feature, MATERIAL_REFLECT, MATERIAL_REFRACT},
     passes::{FramePasses, Inputs, Rasterize},
@@ -243,6 +246,16 @@ impl Renderer {
     pub fn picture(&self) -> Result<Picture, GpuError> {
         let _fetching = info_span!("fetch picture").entered();
         self.picture_with(self.resources.pixels.filtered().download_first(self.resources.n_pixels())?)
+    }
+
+    /// Does what [`Renderer::picture`] does, into slices of the pixels of a window without border.
+    fn picture_into(&self, radiance: &mut [[f32; 4]], display: &mut [[u8; 4]]) -> Result<(), GpuError> {
+        let (pixels, n_pixels) = (&self.resources.pixels, self.resources.n_pixels());
+        assert_eq!((radiance.len(), display.len()), (n_pixels, n_pixels), "pixels of the window");
+        pixels.filtered().download_bytes(0, bytemuck::cast_slice_mut(radiance))?;
+        make_opaque(radiance);
+        // The words of the buffer have the red byte first on every host that kdray runs on.
+        pixels.pixel_display.download_bytes(0, display.as_flattened_mut())
     }
 
     /// Downloads what a display shows of the picture. `radiance`: the radiance of the window's pixels.

@@ -78,7 +78,7 @@ impl RendererGroup {
             first_sample: 0,
             rows: Handout::new(n_devices, rows::portions(contexts, options)),
             samples: Handout::new(n_devices, of_samples),
-            picture: Picture { width: 0, height: 0, radiance: Vec::new(), display: Vec::new() },
+            picture: Picture::default(),
         })
     }
 

@@ -1,8 +1,8 @@
 //! Pictures whose rows several devices share.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
-use super::{RendererGroup, handout::Portions, share};
+use super::{RendererGroup, handout::Portions, lock, share};
 use crate::{
     frame::{Crop, Drawn, Goal, Picture, RenderOptions, Watcher},
     gpu::{Context, GpuError},
@@ -34,29 +34,34 @@ impl RendererGroup {
     /// Draws a picture from tiles of full rows.
     pub(super) fn draw_rows(&mut self, n_samples: u32, watcher: &mut impl Watcher) -> Result<Drawn, GpuError> {
         let asked = self.options.crop_or_whole();
+        // The memory of the last picture is used again.
+        let mut whole = std::mem::take(&mut self.picture);
+        (whole.width, whole.height) = (asked.width(), asked.height());
+        let n_pixels = asked.width() as usize * asked.height() as usize;
+        whole.radiance.resize(n_pixels, [0.0; 4]);
+        whole.display.resize(n_pixels, [0; 4]);
+        let picture = Mutex::new(whole);
         let tiles = share(&mut self.members, &mut self.rows, asked.y0..asked.y1, watcher, |renderer, rows, tell| {
             let crop = Crop { y0: rows.start, y1: rows.end, ..asked };
             renderer.set_crop(crop)?;
             let of_all = f64::from(crop.height()) / f64::from(asked.height());
             let drawn = renderer.draw(Goal::Samples(n_samples), &mut || tell(of_all))?;
-            Ok((renderer.picture()?.into_owned(), drawn))
+            let pixel = |y: u32| (y - asked.y0) as usize * asked.width() as usize;
+            let pixels = pixel(crop.y0)..pixel(crop.y1);
+            let mut whole = lock(&picture);
+            let Picture { radiance, display, .. } = &mut *whole;
+            renderer.picture_into(&mut radiance[pixels.clone()], &mut display[pixels])?;
+            Ok(drawn)
         })?;
-        let n_pixels = asked.width() as usize * asked.height() as usize;
-        let (width, height) = (asked.width(), asked.height());
-        let mut picture = Picture { width, height, radiance: Vec::new(), display: Vec::new() };
-        picture.radiance.reserve_exact(n_pixels);
-        picture.display.reserve_exact(n_pixels);
         let (mut all, mut features) = (None::<Drawn>, Vec::<Feature>::new());
-        for (_, (part, mut drawn)) in tiles {
-            picture.radiance.extend(part.radiance);
-            picture.display.extend(part.display);
+        for (_, mut drawn) in tiles {
             features.append(&mut drawn.features);
             match &mut all {
                 None => all = Some(drawn),
                 Some(all) => all.profile.append(drawn.profile),
             }
         }
-        self.picture = picture;
+        self.picture = picture.into_inner().unwrap_or_else(PoisonError::into_inner);
         Ok(Drawn { features, ..all.expect("a picture has rows") })
     }
 }
