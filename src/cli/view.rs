@@ -7,7 +7,7 @@ use kdray::{
     frame::{RenderOptions, View},
     gpu::{ContextOptions, chosen_device},
     output::{self, Format, OutputError},
-    scene::{self, Camera, CameraPath, RenderDefaults, Scene},
+    scene::{self, CameraPath, RenderDefaults, Scene},
     view::{Display, LoadOptions, LoadedScene, Opened, Opener, Settings, Tour, ViewOptions, ViewReport},
 };
 use serde::Serialize;
@@ -126,7 +126,7 @@ fn load(args: &ViewArgs, path: &Path, progress: &Progress) -> Result<Start, CliE
     scene.warn_of_missing_light(path, args.picture.options(&scene.defaults).integrator);
     args.look.note_up(path, &scene).into_iter().for_each(|note| progress.note(&note));
     let mut options = args.picture.options(&scene.defaults);
-    let tour = tour(args, scene.camera)?;
+    let tour = tour(args, &scene)?;
     let workload = match &tour {
         Some(tour) => {
             let n_pictures = u64::from(tour.n_frames()) * u64::from(n_samples(args, true));
@@ -160,9 +160,9 @@ fn n_samples(args: &ViewArgs, has_tour: bool) -> u32 {
 }
 
 /// Returns the camera tour of `--path` and `--frames`, or none if neither is given.
-fn tour(args: &ViewArgs, start: Camera) -> Result<Option<Tour>, CliError> {
-    let Some(file) = &args.path else { return Ok(args.frames.map(|n_frames| Tour::around(start, n_frames))) };
-    let path = CameraPath::load(file)?;
+fn tour(args: &ViewArgs, scene: &Scene) -> Result<Option<Tour>, CliError> {
+    let Some(file) = &args.path else { return Ok(args.frames.map(|n_frames| Tour::around(scene.camera, n_frames))) };
+    let path = CameraPath::load(file)?.from_origin(scene.origin);
     let n_frames = args.frames.unwrap_or((path.end() - path.begin()).ceil() as u32 + 1);
     let tour = Tour::along(&path, n_frames).ok_or_else(|| {
         let file = file.display();

@@ -3,10 +3,12 @@
 
 use std::path::Path;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 use super::{
     error::SceneError,
+    extent::MeshOrigin,
     image_files::Images,
     material::Material,
     mesh::Mesh,
@@ -78,7 +80,7 @@ pub(super) struct Loading<'a> {
     pub shading: Shading,
     /// The point of the file that becomes the origin of the mesh. It is subtracted before coordinates are rounded to
     /// single precision.
-    pub origin: DVec3,
+    pub origin: MeshOrigin,
     /// Number of triangles that the scene has already.
     pub n_loaded: usize,
     /// Which files the mesh file may name.
@@ -92,13 +94,21 @@ pub(super) struct Loaded {
     /// The mesh. The slot of a face is an index into `materials`, or `materials.len()` for a face without a material,
     /// or with one that no library defines.
     pub mesh: Mesh,
+    /// The point of the file that is the origin of the mesh.
+    pub origin: DVec3,
     pub materials: Vec<Material>,
     /// Whether normals depend on the crease angle.
     pub uses_crease: bool,
 }
 
 /// The mesh of a file whose materials are not needed to make it. Several can be made at the same time.
-pub(super) enum Shape {
+pub(super) struct Shape {
+    kind: ShapeKind,
+    /// The point of the file that is the origin of the mesh.
+    origin: DVec3,
+}
+
+enum ShapeKind {
     Ply(PlyMesh),
     Stl(Mesh),
 }
@@ -108,27 +118,46 @@ impl Shape {
     pub fn parse(
         path: &Path,
         bytes: Vec<u8>,
-        place: (Shading, DVec3),
+        (shading, origin): (Shading, MeshOrigin),
         (n_loaded, progress): (usize, &Progress),
     ) -> Result<Self, SceneError> {
-        let made = match MeshFormat::of(path, &bytes) {
-            MeshFormat::Ply => ply_mesh(&bytes, place, n_loaded, progress).map(Self::Ply),
-            _ => parse_stl(bytes, place, n_loaded).map(Self::Stl),
+        let format = MeshFormat::of(path, &bytes);
+        let parse = |bytes: Vec<u8>, origin: DVec3| {
+            let made = match format {
+                MeshFormat::Ply => ply_mesh(&bytes, (shading, origin), n_loaded, progress).map(ShapeKind::Ply),
+                _ => parse_stl(bytes, (shading, origin), n_loaded).map(ShapeKind::Stl),
+            };
+            made.map(|kind| Self { kind, origin }).map_err(|what| SceneError::file(path, what))
         };
-        made.map_err(|what| SceneError::file(path, what))
+        let made = parse(bytes, origin.first())?;
+        let mesh = match &made.kind {
+            ShapeKind::Ply(ply) => ply.mesh(),
+            ShapeKind::Stl(mesh) => mesh,
+        };
+        match origin.second(bounds_of(mesh.positions.par_iter().copied())) {
+            Some(nearer) => parse(read_mesh(path)?, nearer),
+            None => Ok(made),
+        }
     }
 
     /// Reads the materials.
     pub fn loaded(self, path: &Path, loading: &mut Loading) -> Result<Loaded, SceneError> {
-        let loaded = match self {
-            Self::Ply(ply) => ply.with_materials(path, loading.access, loading.images),
-            Self::Stl(mesh) => Loaded { mesh, materials: Vec::new(), uses_crease: loading.shading.smooth },
+        let Self { kind, origin } = self;
+        let loaded = match kind {
+            ShapeKind::Ply(ply) => Loaded { origin, ..ply.with_materials(path, loading.access, loading.images) },
+            ShapeKind::Stl(mesh) => Loaded { mesh, origin, materials: Vec::new(), uses_crease: loading.shading.smooth },
         };
         match loaded.mesh.faces.is_empty() {
             true => Err(SceneError::file(path, "has no triangles")),
             false => Ok(loaded),
         }
     }
+}
+
+/// Returns the least and the greatest coordinates of points.
+pub(super) fn bounds_of(points: impl ParallelIterator<Item = Vec3>) -> (Vec3, Vec3) {
+    let none = || (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    points.map(|p| (p, p)).reduce(none, |a, b| (a.0.min(b.0), a.1.max(b.1)))
 }
 
 /// Makes a mesh from the content of a file that is not glTF, and reads the materials that it names.

@@ -16,6 +16,7 @@ use super::{
     assemble::File,
     description::{CommonSpec, MeshSpec, Source},
     error::Checked,
+    extent::MeshOrigin,
     generate::{Generator, TriangleBudget},
     gltf,
     image_files::Images,
@@ -52,6 +53,8 @@ struct Reading {
     uv_scale: Option<[u32; 2]>,
     /// Bits of the coordinates of the point that becomes the mesh's origin.
     origin: Option<[u64; 3]>,
+    /// Whether the mesh gets an origin of its own if it is far from 0 and the table states no `origin`.
+    recentre: bool,
 }
 
 /// A mesh file whose meshes are in the scene.
@@ -90,6 +93,8 @@ pub(super) struct Placer<'a> {
     shapes: HashMap<Reading, Result<Content, SceneError>>,
     /// The readings whose materials some table shows.
     with_materials: HashSet<Reading>,
+    /// Whether meshes that are far from 0 get an origin of their own.
+    recentre: bool,
 }
 
 impl<'a> Placer<'a> {
@@ -98,11 +103,12 @@ impl<'a> Placer<'a> {
         file: &'a File<'a>,
         (scene, images): (Scene, Images),
         materials: NamedMaterials<'a>,
-        tables: &[MeshTable],
+        (tables, recentre): (&[MeshTable], bool),
     ) -> Self {
         let has_own =
             |table: &&MeshTable| table.spec.common.material.is_none() && table.spec.common.materials.is_empty();
-        let with_materials = tables.iter().filter(has_own).filter_map(|table| Reading::of(file, &table.spec).ok()?);
+        let with_materials = tables.iter().filter(has_own);
+        let with_materials = with_materials.filter_map(|table| Reading::of(file, &table.spec, recentre).ok()?);
         let with_materials = with_materials.collect();
         Self {
             file,
@@ -113,13 +119,14 @@ impl<'a> Placer<'a> {
             read: HashMap::new(),
             shapes: HashMap::new(),
             with_materials,
+            recentre,
         }
     }
 
     /// Reads the PLY and STL files of all tables at the same time, if there are several and there is memory for them.
     /// Errors are kept until the table of the file is added, so that the first table with an error decides.
     pub fn read_together(&mut self, tables: &[MeshTable]) {
-        let readings = tables.iter().filter_map(|table| Reading::of(self.file, &table.spec).ok()?);
+        let readings = tables.iter().filter_map(|table| Reading::of(self.file, &table.spec, self.recentre).ok()?);
         let is_shape = |it: &Reading| matches!(MeshFormat::of_name(&it.path), Some(MeshFormat::Ply | MeshFormat::Stl));
         let mut seen = HashSet::new();
         let readings: Vec<Reading> =
@@ -150,7 +157,8 @@ impl<'a> Placer<'a> {
         match source {
             Source::Generator(generator) => self.generate(generator, common, (transform, named)).map_err(failed),
             Source::File { crease, .. } => {
-                let reading = Reading::of(self.file, &table.spec).map_err(failed)?.expect("the source is a file");
+                let reading =
+                    Reading::of(self.file, &table.spec, self.recentre).map_err(failed)?.expect("the source is a file");
                 if !self.read.contains_key(&reading) {
                     let read = self.read_file(&reading, table)?;
                     self.read.insert(reading.clone(), read);
@@ -199,13 +207,9 @@ impl<'a> Placer<'a> {
         let n_loaded = self.scene.n_triangles();
         let first_mesh = self.scene.meshes.len();
         let uv_scale = table.spec.common.uv_scale;
-        let origin = reading.origin.map(|bits| DVec3::from_array(bits.map(f64::from_bits)));
         if let Content::Bytes(bytes) = &content
             && MeshFormat::of(path, bytes) == MeshFormat::Gltf
         {
-            if origin.is_some() {
-                return Err(failed("has `origin`, but coordinates of glTF files are of single precision".to_owned()));
-            }
             let allow_outside = self.file.access.is_anywhere();
             let look = Look { materials: self.images.replaced().to_vec(), ..Look::default() };
             let (scene, progress) = (reading.scene.clone(), self.images.progress().clone());
@@ -221,7 +225,11 @@ impl<'a> Placer<'a> {
                 scale_uvs(mesh, uv_scale).map_err(failed)?;
             }
             self.scene.meshes.append(&mut model.meshes);
-            model.instances.iter_mut().for_each(|instance| instance.mesh_ix += first_mesh);
+            let origin = reading.origin().first();
+            for instance in &mut model.instances {
+                instance.mesh_ix += first_mesh;
+                instance.transform = instance.transform.moved(-origin);
+            }
             let first_image = self.images.adopt(model.images);
             let own = |mut material: Material| {
                 material.maps.change_each(|texture| texture.image_ix += first_image);
@@ -233,18 +241,20 @@ impl<'a> Placer<'a> {
         if let Some(name) = &reading.scene {
             return Err(failed(format!("there is no scene `{name}`: only glTF files name scenes")));
         }
-        let (shading, origin) = reading.shape_options();
+        let (shading, origin) = (reading.shading(), reading.origin());
         let mut loading = Loading { shading, origin, n_loaded, access: self.file.access, images: &mut self.images };
         let loaded = match content {
             Content::Shape(shape) => (*shape)?.loaded(path, &mut loading),
             Content::Bytes(bytes) => parse_mesh(path, bytes, &mut loading),
         };
-        let Loaded { mut mesh, materials, uses_crease } = loaded?;
+        let Loaded { mut mesh, origin: own_origin, materials, uses_crease } = loaded?;
         scale_uvs(&mut mesh, uv_scale).map_err(failed)?;
         self.scene.meshes.push(mesh);
         let materials: Vec<_> = materials.into_iter().map(Some).chain([None]).collect();
         let slots = (0..materials.len() as u32).collect();
-        let instances = vec![Instance { mesh_ix: first_mesh, transform: Transform::IDENTITY, materials: slots }];
+        // A stated origin moves the mesh, one that was chosen does not.
+        let transform = Transform::IDENTITY.moved(own_origin - origin.first());
+        let instances = vec![Instance { mesh_ix: first_mesh, transform, materials: slots }];
         Ok(Read { instances, materials, material_ixs: [None, None], uses_crease })
     }
 
@@ -288,7 +298,7 @@ impl<'a> Placer<'a> {
 
 impl Reading {
     /// Returns how the file of a mesh is read, or `None` for a generator.
-    fn of(file: &File, spec: &MeshSpec) -> Checked<Option<Self>> {
+    fn of(file: &File, spec: &MeshSpec, recentre: bool) -> Checked<Option<Self>> {
         let Source::File { path, crease, scene, origin } = &spec.source else { return Ok(None) };
         Ok(Some(Self {
             path: file.access.beside(file.path).exact(path)?,
@@ -297,20 +307,30 @@ impl Reading {
             crease: crease.unwrap_or(DEFAULT_CREASE).to_bits(),
             uv_scale: spec.common.uv_scale.map(|scale| scale.map(f32::to_bits)),
             origin: origin.map(|origin| origin.map(f64::to_bits)),
+            recentre,
         }))
     }
 
-    /// Returns how normals are computed, and the point of the file that becomes the mesh's origin.
-    fn shape_options(&self) -> (Shading, DVec3) {
-        let shading = Shading { smooth: self.is_smooth, crease: f32::from_bits(self.crease) };
-        (shading, self.origin.map_or(DVec3::ZERO, |bits| DVec3::from_array(bits.map(f64::from_bits))))
+    /// Returns how normals are computed.
+    fn shading(&self) -> Shading {
+        Shading { smooth: self.is_smooth, crease: f32::from_bits(self.crease) }
+    }
+
+    /// Returns which point of the file becomes the mesh's origin.
+    fn origin(&self) -> MeshOrigin {
+        match self.origin {
+            Some(bits) => MeshOrigin::At(DVec3::from_array(bits.map(f64::from_bits))),
+            None if self.recentre => MeshOrigin::Near,
+            None => MeshOrigin::At(DVec3::ZERO),
+        }
     }
 
     /// Makes the mesh of a file's content, if it is a PLY or an STL file.
     fn content(&self, bytes: Vec<u8>) -> Content {
         match MeshFormat::of(&self.path, &bytes) {
             MeshFormat::Ply | MeshFormat::Stl => {
-                let made = Shape::parse(&self.path, bytes, self.shape_options(), (0, &Progress::default()));
+                let how = (self.shading(), self.origin());
+                let made = Shape::parse(&self.path, bytes, how, (0, &Progress::default()));
                 Content::Shape(Box::new(made))
             }
             MeshFormat::Gltf | MeshFormat::Obj => Content::Bytes(bytes),

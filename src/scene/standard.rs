@@ -59,7 +59,7 @@ pub(super) fn fill_in(scene: &mut Scene, lacks: Lacks, options: &LoadOptions) ->
         let frame = |standard| Frame { axes, aspect: f64::from(aspect), vertical_fov_degrees: fov(standard) };
         let (outside, inside) = (frame(framing::VERTICAL_FOV_DEGREES), frame(interior::VERTICAL_FOV_DEGREES));
         let of_interior = if is_interior { interior::camera(scene, bounds, [&outside, &inside]) } else { None };
-        scene.camera = of_interior.unwrap_or_else(|| framing::camera(bounds, &outside));
+        scene.camera = of_interior.unwrap_or_else(|| framing::camera(scene, bounds, &outside));
     }
     look.set_camera(scene)?;
     if look.sky.is_some() {

@@ -53,10 +53,13 @@ pub(super) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result
     let replaced = &options.look.materials[..];
     let mut scene =
         Loader::new(&document, &nodes, LoadedBefore::default(), Some(replaced)).load(path).map_err(failed)?;
+    if options.recentre {
+        extent::recentre(path, &mut scene);
+    }
     let bounds = scene.bounds();
     extent::check(path, bounds)?;
-    scene.lights = lights::lights(&document, &nodes).map_err(failed)?;
-    scene.cameras = cameras::cameras(&document, &nodes, bounds).map_err(failed)?;
+    scene.lights = lights::lights(&document, &nodes, scene.origin).map_err(failed)?;
+    scene.cameras = cameras::cameras(&document, &nodes, (bounds, scene.origin)).map_err(failed)?;
     let lacks_camera = scene.cameras.is_empty();
     scene.camera = scene.cameras.first().map_or(scene.camera, |(_, camera)| *camera);
     // The light of emissive surfaces does not reach others.

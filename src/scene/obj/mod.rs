@@ -13,7 +13,7 @@ pub(super) use self::files::named_files;
 use self::{
     clean::{CleanObj, clean_obj},
     model::Model,
-    quick::quick_obj,
+    quick::{QuickObj, quick_obj},
 };
 use super::{
     error::SceneError,
@@ -26,10 +26,16 @@ use glam::DVec3;
 /// Makes a mesh from an OBJ file's text, and reads its materials.
 pub(super) fn parse_obj(path: &Path, text: &str, loading: &mut Loading) -> Result<Loaded, SceneError> {
     let &mut Loading { shading, origin, n_loaded, access, ref mut images } = loading;
-    let careful = || clean_obj(text, origin).map_err(|(line, what)| SceneError::line(path, line, what));
+    let careful = |origin| clean_obj(text, origin).map_err(|(line, what)| SceneError::line(path, line, what));
     // The quick way keeps points as they are written.
-    let quick = if origin == DVec3::ZERO { quick_obj(text, images.progress()) } else { None };
-    let cleaned = if quick.is_none() { Some(careful()?) } else { None };
+    let mut quick = if origin.first() == DVec3::ZERO { quick_obj(text, images.progress()) } else { None };
+    let mut cleaned = if quick.is_none() { Some(careful(origin.first())?) } else { None };
+    let bounds = quick.as_ref().map(QuickObj::bounds).or(cleaned.as_ref().map(CleanObj::bounds)).unwrap_or_default();
+    let nearer = origin.second(bounds);
+    if let Some(nearer) = nearer {
+        (quick, cleaned) = (None, Some(careful(nearer)?));
+    }
+    let origin = nearer.unwrap_or(origin.first());
     let clean = quick.as_ref().map(|quick| &quick.clean).or(cleaned.as_ref()).expect("the file is read in either way");
     require_for_mesh(n_loaded as u64, &clean.size).map_err(|what| SceneError::file(path, what))?;
     let materials = mtl::load_libraries(path, &clean.libraries, access, images)?;
@@ -46,13 +52,13 @@ pub(super) fn parse_obj(path: &Path, text: &str, loading: &mut Loading) -> Resul
         Some(models) => model::mesh(&models, no_material, by_kind),
         // The quick way has not found what is wrong with a number. The careful way finds it.
         None => {
-            let cleaned = cleaned.map_or_else(careful, Ok)?;
+            let cleaned = cleaned.map_or_else(|| careful(origin), Ok)?;
             let models = parse(&cleaned, &by_name).map_err(|e| SceneError::file(path, e.to_string()))?;
             let models: Vec<Model> = models.iter().map(Model::of_tobj).collect();
             model::mesh(&models, no_material, by_kind)
         }
     };
-    Ok(Loaded { mesh, materials, uses_crease })
+    Ok(Loaded { mesh, origin, materials, uses_crease })
 }
 
 /// Returns the indices of the used materials in the library. A name that differs from that of one material in the case

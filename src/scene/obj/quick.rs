@@ -4,13 +4,17 @@
 
 use std::borrow::Cow;
 
+use glam::Vec3;
 use rayon::prelude::*;
 
 use super::{
     clean::{CleanObj, Cleaner, Corner, FaceKind, FaceShading, split_keyword, statements},
     model::Model,
 };
-use crate::util::progress::{Meter, Progress, Work};
+use crate::{
+    scene::mesh_file::bounds_of,
+    util::progress::{Meter, Progress, Work},
+};
 
 /// Least number of bytes of the text that one thread reads at a time.
 const CHUNK_BYTES: usize = 1 << 20;
@@ -332,6 +336,11 @@ fn joined(mut chunks: Vec<Chunk<'_>>) -> Option<QuickObj<'_>> {
 }
 
 impl QuickObj<'_> {
+    /// Returns the least and the greatest coordinates of all points.
+    pub fn bounds(&self) -> (Vec3, Vec3) {
+        bounds_of(self.positions.par_chunks_exact(3).map(Vec3::from_slice))
+    }
+
     /// Returns the models of the file, as tobj divides it: faces that follow each other, of one kind and one material.
     /// `material_ix` returns the index of a named material. Returns `None` if a face names a number that is not finite.
     pub fn models(&self, material_ix: impl Fn(&str) -> Option<usize>) -> Option<Vec<Model<'_>>> {
