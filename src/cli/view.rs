@@ -8,6 +8,7 @@ use kdray::{
     gpu::{ContextOptions, chosen_device},
     output::{self, Format, OutputError},
     scene::{self, CameraPath, RenderDefaults, Scene},
+    util::progress::Work,
     view::{Display, LoadOptions, LoadedScene, Opened, Opener, Settings, Tour, ViewOptions, ViewReport},
 };
 use serde::Serialize;
@@ -121,7 +122,11 @@ struct Start {
 fn load(args: &ViewArgs, path: &Path, progress: &Progress) -> Result<Start, CliError> {
     let scene_options = args.load.options_for(&args.picture, &args.look);
     let loading = format!("loading {}", path.display());
-    let (scene, _) = progress.stage(&loading, || Scene::load_with(path, &scene_options));
+    let observed = scene::LoadOptions {
+        progress: progress.observer(&loading, &[Work::Reading, Work::Images]),
+        ..scene_options.clone()
+    };
+    let (scene, _) = progress.stage(&loading, || Scene::load_with(path, &observed));
     let scene = scene?;
     scene.warn_of_missing_light(path, args.picture.options(&scene.defaults).integrator);
     args.look.note_up(path, &scene).into_iter().for_each(|note| progress.note(&note));

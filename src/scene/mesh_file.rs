@@ -13,7 +13,7 @@ use super::{
     material::Material,
     mesh::Mesh,
     needs::{require_for_bytes, require_for_text},
-    obj::parse_obj,
+    obj::{ObjFile, obj_mesh, read_obj},
     outside::Access,
     ply::{PlyMesh, ply_mesh},
     read::{lossy_text, read_bytes},
@@ -101,20 +101,21 @@ pub(super) struct Loaded {
     pub uses_crease: bool,
 }
 
-/// The mesh of a file whose materials are not needed to make it. Several can be made at the same time.
+/// The content of a file that is not glTF, as far as it needs no other files. Several can be read at the same time.
 pub(super) struct Shape {
     kind: ShapeKind,
-    /// The point of the file that is the origin of the mesh.
+    /// The point of the file that is the origin of a PLY or STL file's mesh.
     origin: DVec3,
 }
 
 enum ShapeKind {
+    Obj(ObjFile),
     Ply(PlyMesh),
     Stl(Mesh),
 }
 
 impl Shape {
-    /// Makes the mesh of a PLY or STL file. `n_loaded`: the number of triangles that the scene has already.
+    /// Reads a file's content. `n_loaded`: the number of triangles that the scene has already.
     pub fn parse(
         path: &Path,
         bytes: Vec<u8>,
@@ -122,10 +123,18 @@ impl Shape {
         (n_loaded, progress): (usize, &Progress),
     ) -> Result<Self, SceneError> {
         let format = MeshFormat::of(path, &bytes);
+        match format {
+            MeshFormat::Gltf => return Err(SceneError::file(path, "is glTF, which is a whole scene")),
+            MeshFormat::Obj => {
+                let file = read_obj(path, lossy_text(bytes), origin, progress)?;
+                return Ok(Self { kind: ShapeKind::Obj(file), origin: origin.first() });
+            }
+            MeshFormat::Ply | MeshFormat::Stl => {}
+        }
         let parse = |bytes: Vec<u8>, origin: DVec3| {
             let made = match format {
                 MeshFormat::Ply => ply_mesh(&bytes, (shading, origin), n_loaded, progress).map(ShapeKind::Ply),
-                _ => parse_stl(bytes, (shading, origin), n_loaded).map(ShapeKind::Stl),
+                _ => parse_stl(bytes, (shading, origin), (n_loaded, progress)).map(ShapeKind::Stl),
             };
             made.map(|kind| Self { kind, origin }).map_err(|what| SceneError::file(path, what))
         };
@@ -133,6 +142,7 @@ impl Shape {
         let mesh = match &made.kind {
             ShapeKind::Ply(ply) => ply.mesh(),
             ShapeKind::Stl(mesh) => mesh,
+            ShapeKind::Obj(_) => return Ok(made),
         };
         match origin.second(bounds_of(mesh.positions.par_iter().copied())) {
             Some(nearer) => parse(read_mesh(path)?, nearer),
@@ -140,10 +150,11 @@ impl Shape {
         }
     }
 
-    /// Reads the materials.
+    /// Reads the materials, and makes the mesh if that has not been done.
     pub fn loaded(self, path: &Path, loading: &mut Loading) -> Result<Loaded, SceneError> {
         let Self { kind, origin } = self;
         let loaded = match kind {
+            ShapeKind::Obj(file) => obj_mesh(path, file, loading)?,
             ShapeKind::Ply(ply) => Loaded { origin, ..ply.with_materials(path, loading.access, loading.images) },
             ShapeKind::Stl(mesh) => Loaded { mesh, origin, materials: Vec::new(), uses_crease: loading.shading.smooth },
         };
@@ -162,18 +173,7 @@ pub(super) fn bounds_of(points: impl ParallelIterator<Item = Vec3>) -> (Vec3, Ve
 
 /// Makes a mesh from the content of a file that is not glTF, and reads the materials that it names.
 pub(super) fn parse_mesh(path: &Path, bytes: Vec<u8>, loading: &mut Loading) -> Result<Loaded, SceneError> {
-    let failed = |what: String| SceneError::file(path, what);
+    let progress = loading.images.progress().clone();
     let place = (loading.shading, loading.origin);
-    let loaded = match MeshFormat::of(path, &bytes) {
-        MeshFormat::Obj => parse_obj(path, &lossy_text(bytes), loading)?,
-        MeshFormat::Gltf => return Err(failed("is glTF, which is a whole scene".to_owned())),
-        MeshFormat::Ply | MeshFormat::Stl => {
-            let progress = loading.images.progress().clone();
-            return Shape::parse(path, bytes, place, (loading.n_loaded, &progress))?.loaded(path, loading);
-        }
-    };
-    if loaded.mesh.faces.is_empty() {
-        return Err(SceneError::file(path, "has no triangles"));
-    }
-    Ok(loaded)
+    Shape::parse(path, bytes, place, (loading.n_loaded, &progress))?.loaded(path, loading)
 }

@@ -85,8 +85,8 @@ use crate::util::progress::Progress;
 pub struct Scene {
     /// The file's name without its folder and extension.
     pub name: String,
-    /// The point of the file that is the origin of world space, in the file's coordinates. It is 0, unless the scene was
-    /// moved there ([`LoadOptions::recentre`]).
+    /// The point of the file that is the origin of world space, in the file's coordinates. It is 0, unless the scene
+    /// was moved there ([`LoadOptions::recentre`]).
     pub origin: DVec3,
     /// Meshes, each of which may have several instances.
     pub meshes: Vec<Mesh>,

@@ -5,14 +5,14 @@ use std::{
     collections::{HashMap, HashSet},
     fs,
     ops::Range,
-    path::PathBuf,
+    path::{Path, PathBuf},
 };
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::{
-    Instance, LoadOptions, Look, Material, Scene, SceneError, Transform,
+    Instance, LoadOptions, Look, Material, MaterialChoice, Scene, SceneError, Transform,
     assemble::File,
     description::{CommonSpec, MeshSpec, Source},
     error::Checked,
@@ -73,11 +73,38 @@ struct Read {
 enum Content {
     /// A mesh.
     Shape(Box<Result<Shape, SceneError>>),
+    /// A glTF file.
+    Model(Box<Result<gltf::Model, SceneError>>),
     /// Bytes, since their format is not the one that the file's name tells.
     Bytes(Vec<u8>),
 }
 
-/// Bytes of memory that reading a byte of a PLY or STL file takes.
+/// How glTF files are loaded.
+#[derive(Clone, Copy)]
+struct Models<'a> {
+    /// Which materials are replaced.
+    replaced: &'a [MaterialChoice],
+    allow_outside: bool,
+    /// The readings whose materials some table shows.
+    with_materials: &'a HashSet<Reading>,
+}
+
+impl Models<'_> {
+    /// Loads the meshes of a file. `before`: what the scene has already.
+    fn load(
+        &self,
+        reading: &Reading,
+        bytes: Vec<u8>,
+        (before, progress): (gltf::LoadedBefore, &Progress),
+    ) -> Result<gltf::Model, SceneError> {
+        let look = Look { materials: self.replaced.to_vec(), ..Look::default() };
+        let (scene, allow_outside, progress) = (reading.scene.clone(), self.allow_outside, progress.clone());
+        let options = LoadOptions { scene, allow_outside, look, progress, ..LoadOptions::default() };
+        gltf::load_meshes(&reading.path, bytes, &options, self.with_materials.contains(reading), before)
+    }
+}
+
+/// Bytes of memory that reading a byte of a file takes.
 const READING_BYTES: u64 = 10;
 
 /// Adds the meshes of a scene file to its scene.
@@ -123,29 +150,45 @@ impl<'a> Placer<'a> {
         }
     }
 
-    /// Reads the PLY and STL files of all tables at the same time, if there are several and there is memory for them.
-    /// Errors are kept until the table of the file is added, so that the first table with an error decides.
+    /// Reads the files of all tables at the same time, if there are several and there is memory for them. Errors and
+    /// warnings are kept until the table of the file is added, so that they do not depend on the order of reading.
     pub fn read_together(&mut self, tables: &[MeshTable]) {
         let readings = tables.iter().filter_map(|table| Reading::of(self.file, &table.spec, self.recentre).ok()?);
-        let is_shape = |it: &Reading| matches!(MeshFormat::of_name(&it.path), Some(MeshFormat::Ply | MeshFormat::Stl));
         let mut seen = HashSet::new();
-        let readings: Vec<Reading> =
-            readings.filter(|it| is_shape(it) && it.scene.is_none()).filter(|it| seen.insert(it.clone())).collect();
-        let n_bytes: u64 = readings.iter().map(|it| fs::metadata(&it.path).map_or(0, |metadata| metadata.len())).sum();
+        let readings: Vec<Reading> = readings.filter(|it| seen.insert(it.clone())).collect();
+        let n_bytes: u64 = readings.iter().map(|it| it.n_bytes(self.file)).sum();
         if readings.len() < 2 || require("reading files", n_bytes.saturating_mul(READING_BYTES)).is_err() {
             return;
         }
         let meter = self.images.progress().begin(Work::Reading, n_bytes);
+        let (file, models) = (self.file, self.models());
         let content = |reading: Reading| {
-            let read = read_mesh(&reading.path).map(|bytes| {
-                let n_bytes = bytes.len() as u64;
-                let content = reading.content(bytes);
-                meter.add(n_bytes);
-                content
+            let n_bytes = reading.n_bytes(file);
+            let read = read_mesh(&reading.path).map(|bytes| match MeshFormat::of(&reading.path, &bytes) {
+                MeshFormat::Gltf => {
+                    let model = models.load(&reading, bytes, (gltf::LoadedBefore::default(), &Progress::default()));
+                    Content::Model(Box::new(model))
+                }
+                _ if reading.scene.is_some() => Content::Bytes(bytes),
+                _ => {
+                    let how = (reading.shading(), reading.origin());
+                    Content::Shape(Box::new(Shape::parse(&reading.path, bytes, how, (0, &Progress::default()))))
+                }
             });
+            meter.add(n_bytes);
             (reading, read)
         };
-        self.shapes = readings.into_par_iter().map(content).collect::<Vec<_>>().into_iter().collect();
+        let read = readings.into_par_iter().map(content).collect::<Vec<_>>();
+        self.shapes = read.into_iter().collect();
+    }
+
+    /// Returns how glTF files are loaded.
+    fn models(&self) -> Models<'_> {
+        Models {
+            replaced: self.images.replaced(),
+            allow_outside: self.file.access.is_anywhere(),
+            with_materials: &self.with_materials,
+        }
     }
 
     /// Adds the meshes of a table.
@@ -207,17 +250,24 @@ impl<'a> Placer<'a> {
         let n_loaded = self.scene.n_triangles();
         let first_mesh = self.scene.meshes.len();
         let uv_scale = table.spec.common.uv_scale;
-        if let Content::Bytes(bytes) = &content
-            && MeshFormat::of(path, bytes) == MeshFormat::Gltf
-        {
-            let allow_outside = self.file.access.is_anywhere();
-            let look = Look { materials: self.images.replaced().to_vec(), ..Look::default() };
-            let (scene, progress) = (reading.scene.clone(), self.images.progress().clone());
-            let options = LoadOptions { scene, allow_outside, look, progress, ..LoadOptions::default() };
-            let has_materials = self.with_materials.contains(reading);
-            let before = gltf::LoadedBefore { n_triangles: n_loaded as u64, n_pixels: self.images.n_pixels() };
-            let Content::Bytes(bytes) = content else { unreachable!("glTF files are bytes") };
-            let mut model = gltf::load_meshes(path, bytes, &options, has_materials, before)?;
+        let before = gltf::LoadedBefore { n_triangles: n_loaded as u64, n_pixels: self.images.n_pixels() };
+        let progress = self.images.progress().clone();
+        let content = match content {
+            Content::Bytes(bytes) if MeshFormat::of(path, &bytes) == MeshFormat::Gltf => {
+                Content::Model(Box::new(self.models().load(reading, bytes, (before, &progress))))
+            }
+            // Images that were decoded together are limited one by one. If there are too many pixels, those of this
+            // file are left out, with its warnings.
+            Content::Model(model) if model.as_ref().as_ref().is_ok_and(|model| before.exceeds(&model.scene)) => {
+                drop(model);
+                let bytes = read_mesh(path).map_err(|error| failed(error.to_string()))?;
+                Content::Model(Box::new(self.models().load(reading, bytes, (before, &progress))))
+            }
+            content => content,
+        };
+        if let Content::Model(model) = content {
+            let gltf::Model { scene: mut model, warnings } = (*model)?;
+            warnings.iter().for_each(|warning| tracing::warn!("{warning}"));
             for mesh in &mut model.meshes {
                 if !reading.is_smooth {
                     mesh.normals.fill([Vec3::ZERO; 3]);
@@ -246,6 +296,7 @@ impl<'a> Placer<'a> {
         let loaded = match content {
             Content::Shape(shape) => (*shape)?.loaded(path, &mut loading),
             Content::Bytes(bytes) => parse_mesh(path, bytes, &mut loading),
+            Content::Model(_) => unreachable!("models are placed above"),
         };
         let Loaded { mut mesh, origin: own_origin, materials, uses_crease } = loaded?;
         scale_uvs(&mut mesh, uv_scale).map_err(failed)?;
@@ -325,16 +376,15 @@ impl Reading {
         }
     }
 
-    /// Makes the mesh of a file's content, if it is a PLY or an STL file.
-    fn content(&self, bytes: Vec<u8>) -> Content {
-        match MeshFormat::of(&self.path, &bytes) {
-            MeshFormat::Ply | MeshFormat::Stl => {
-                let how = (self.shading(), self.origin());
-                let made = Shape::parse(&self.path, bytes, how, (0, &Progress::default()));
-                Content::Shape(Box::new(made))
-            }
-            MeshFormat::Gltf | MeshFormat::Obj => Content::Bytes(bytes),
-        }
+    /// Returns the size of the file and of the files beside a glTF file that it names.
+    fn n_bytes(&self, file: &File) -> u64 {
+        let size = |path: &Path| fs::metadata(path).map_or(0, |metadata| metadata.len());
+        let is_json = self.path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gltf"));
+        let beside = match is_json {
+            true => gltf::named_files(&self.path, &read_mesh(&self.path).unwrap_or_default(), file.access),
+            false => Vec::new(),
+        };
+        beside.iter().map(|path| size(path)).fold(size(&self.path), u64::saturating_add)
     }
 }
 

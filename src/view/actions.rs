@@ -148,7 +148,8 @@ pub fn save(gpu: &GpuSession, path: &Path) -> Result<(), SaveError> {
     Ok(())
 }
 
-/// Returns the camera in the format of scene files. `origin` is the point of the file that is the origin of world space.
+/// Returns the camera in the format of scene files. `origin` is the point of the file that is the origin of world
+/// space.
 fn to_toml(camera: &Camera, origin: DVec3) -> String {
     let vector = |v: Vec3| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z);
     let point = |p: Vec3| match origin {

@@ -12,7 +12,7 @@ use kdray::{
     engine::{Engine, choices::Workload},
     frame::RenderOptions,
     merge::{MergeError, merge},
-    scene::{Scene, source_files},
+    scene::{LoadOptions, Scene, source_files},
 };
 use tempfile::TempDir;
 use tracing::{
@@ -150,7 +150,8 @@ pub fn check_error(line: &str, files: &[&Path]) {
 fn read_scene(path: &Path) -> Result<(), String> {
     // The viewer watches these files.
     let _ = source_files(path);
-    let scene = Scene::load(path).map_err(|error| error.to_string())?;
+    let options = LoadOptions { recentre: true, ..LoadOptions::default() };
+    let scene = Scene::load_with(path, &options).map_err(|error| error.to_string())?;
     let n_pixels: usize = scene.images.iter().map(|image| image.pixels.len()).sum();
     if scene.n_triangles() > MAX_RENDERED_TRIANGLES || n_pixels > MAX_RENDERED_PIXELS {
         return Ok(());
