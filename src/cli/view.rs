@@ -8,7 +8,7 @@ use kdray::{
     gpu::{ContextOptions, chosen_device},
     output::{self, Format, OutputError},
     scene::{self, CameraPath, RenderDefaults, Scene},
-    util::progress::Work,
+    util::{self, progress::Work},
     view::{Display, LoadOptions, LoadedScene, Opened, Opener, Settings, Tour, ViewOptions, ViewReport},
 };
 use serde::Serialize;
@@ -90,23 +90,26 @@ fn opener(args: &ViewArgs, processor: Processor) -> Opener {
     // The camera and the scene on the command line are those of the first file.
     let look = scene::Look { eye: None, target: None, ..first.look };
     let load_options = scene::LoadOptions { scene: None, camera: None, look, ..first };
-    Arc::new(move |path| open(path, &load_options, &picture, processor).map_err(|error| error.to_string()))
+    Arc::new(move |path, progress| {
+        open(path, (&load_options, progress), &picture, processor).map_err(|error| error.to_string())
+    })
 }
 
 fn open(
     path: &Path,
-    scene_options: &scene::LoadOptions,
+    (scene_options, progress): (&scene::LoadOptions, util::progress::Progress),
     picture: &PictureArgs,
     processor: Processor,
 ) -> Result<Opened, CliError> {
-    let scene = Scene::load_with(path, scene_options)?;
+    let observed = scene::LoadOptions { progress: progress.clone(), ..scene_options.clone() };
+    let scene = Scene::load_with(path, &observed)?;
     let mut options = picture.options(&scene.defaults);
     scene.warn_of_missing_light(path, options.integrator);
     let (request, workload) = (picture.request(), Workload::of_window((options.width, options.height)));
     let accel = request.choose_accel(processor, scene.n_triangles(), &workload);
     build::check_memory(accel, scene.n_triangles())?;
     let load_options = LoadOptions { request, processor, workload, scene: scene_options.clone() };
-    let loaded = LoadedScene::with_tree(path, scene, &load_options);
+    let loaded = LoadedScene::with_tree(path, scene, &load_options, &progress);
     picture.meter(&loaded.world, &mut options);
     Ok(Opened { loaded, options })
 }
@@ -144,7 +147,8 @@ fn load(args: &ViewArgs, path: &Path, progress: &Progress) -> Result<Start, CliE
     let accel = load_options.request.choose_accel(processor, scene.n_triangles(), &workload);
     build::check_memory(accel, scene.n_triangles())?;
     let building = build::building(accel, scene.n_triangles());
-    let (loaded, _) = progress.stage(&building, || LoadedScene::with_tree(path, scene, &load_options));
+    let observer = progress.observer(&building, &[Work::Building]);
+    let (loaded, _) = progress.stage(&building, || LoadedScene::with_tree(path, scene, &load_options, &observer));
     args.picture.meter(&loaded.world, &mut options).into_iter().for_each(|note| progress.note(&note));
     Ok(Start { loaded, options, tour })
 }

@@ -11,6 +11,7 @@ use crate::{
     accel::Statistics,
     engine::choices::{ChosenAccel, Processor, Request, Workload},
     scene::{self, Scene, SceneError},
+    util::progress::Progress,
     world::{FlatScene, World},
 };
 
@@ -49,21 +50,23 @@ impl LoadedScene {
     /// # Errors
     /// The scene cannot be loaded.
     pub fn load(path: &Path, load_options: &LoadOptions) -> Result<Self, SceneError> {
-        Ok(Self::with_tree(path, Scene::load_with(path, &load_options.scene)?, load_options))
+        let scene = Scene::load_with(path, &load_options.scene)?;
+        Ok(Self::with_tree(path, scene, load_options, &Progress::default()))
     }
 
-    /// Builds a scene's acceleration structure, a kd-tree or a grid.
+    /// Builds a scene's acceleration structure, a kd-tree or a grid, and reports its progress.
     ///
     /// # Panics
     /// The scene has a triangle without a material, which no loaded scene has.
-    pub fn with_tree(path: &Path, scene: Scene, load_options: &LoadOptions) -> Self {
+    pub fn with_tree(path: &Path, scene: Scene, load_options: &LoadOptions, progress: &Progress) -> Self {
         let &LoadOptions { request, processor, workload, .. } = load_options;
         let accel = request.choose_accel(processor, scene.n_triangles(), &workload);
         let flat = FlatScene::new(&scene).expect("a loaded scene fits together");
         // The unflattened scene is freed here, because building the structure needs the memory.
         drop(scene);
         let start = Instant::now();
-        let world = World::with_accel(flat, &accel.options(processor)).expect("a material for each triangle");
+        let world = World::with_accel_observed(flat, &accel.options(processor), progress);
+        let world = world.expect("a material for each triangle");
         let build_ms = start.elapsed().as_secs_f64() * 1e3;
         let statistics = world.statistics();
         let path = Some(path.to_owned());
