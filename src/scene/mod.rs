@@ -14,6 +14,7 @@ mod extent;
 mod framing;
 pub mod generate;
 mod gltf;
+pub(crate) mod ground;
 mod image;
 mod image_files;
 mod interior;
@@ -224,6 +225,11 @@ impl Scene {
     /// # Panics
     /// An index of a mesh or of a position is out of range.
     pub fn bounds(&self) -> (Vec3, Vec3) {
+        self.bounds_of(&self.instances)
+    }
+
+    /// Returns the bounds of some instances.
+    pub(super) fn bounds_of(&self, instances: &[Instance]) -> (Vec3, Vec3) {
         // Instances share the list of their mesh's corners, in which each point is once.
         let corners: Vec<Vec<Vec3>> = self.meshes.par_iter().map(Mesh::corners).collect();
         let none = || (Vec3::INFINITY, Vec3::NEG_INFINITY);
@@ -232,7 +238,7 @@ impl Scene {
             let world = corners[*mesh_ix].par_iter().map(|p| transform.point(*p));
             world.map(|p| (p, p)).reduce(none, joined)
         };
-        self.instances.par_iter().map(of_instance).reduce(none, joined)
+        instances.par_iter().map(of_instance).reduce(none, joined)
     }
 
     /// Adds a mesh and one instance of it. `materials` becomes [`Instance::materials`].
@@ -305,7 +311,7 @@ fn load_mesh_file(path: &Path, options: &LoadOptions) -> Result<(Scene, Lacks), 
     scene.push_mesh(mesh, Transform::IDENTITY, slots).map_err(|what| SceneError::file(path, what))?;
     extent::check(path, scene.bounds())?;
     scene.defaults.samples = standard::SAMPLES;
-    Ok((scene, Lacks { camera: true, up: guess.up, light: true, background: true, integrator: true }))
+    Ok((scene, Lacks { camera: true, up: guess.up, ground: true, light: true, background: true, integrator: true }))
 }
 
 /// Refuses the choice of a scene for a file that has only one.

@@ -10,7 +10,7 @@ use glam::Vec3;
 use crate::{
     accel::Statistics,
     engine::choices::{ChosenAccel, Processor, Request, Workload},
-    scene::{self, Scene, SceneError},
+    scene::{self, Scene, SceneError, ground::GROUND},
     util::progress::Progress,
     world::{FlatScene, World},
 };
@@ -95,8 +95,15 @@ impl LoadedScene {
     }
 
     /// Returns the minimum and the maximum corner of the scene, world space. Those of a scene without triangles are
-    /// the corners of a cube around the origin.
+    /// the corners of a cube around the origin. The ground that a mesh gets under a sky does not count.
     pub fn bounds(&self) -> (Vec3, Vec3) {
-        if self.scene().triangles.is_empty() { (Vec3::NEG_ONE, Vec3::ONE) } else { self.scene().bounds() }
+        let scene = self.scene();
+        let ground = scene.material_names.iter().position(|name| name == GROUND);
+        let Some(ground) = ground.filter(|ix| scene.triangle_materials.first() != Some(&(*ix as u32))) else {
+            return if scene.triangles.is_empty() { (Vec3::NEG_ONE, Vec3::ONE) } else { scene.bounds() };
+        };
+        let of_mesh = scene.triangles.iter().zip(&scene.triangle_materials).filter(|(_, ix)| **ix as usize != ground);
+        let corners = of_mesh.flat_map(|(t, _)| [t.v0, t.v1, t.v2]);
+        corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)))
     }
 }

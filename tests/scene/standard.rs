@@ -375,6 +375,56 @@ fn the_users_sky_replaces_all_light() {
     assert!(z.up == Up::Z && z.towards_sun.distance(Vec3::new(x, -depth, y)) < 1e-4, "{z:?}");
 }
 
+/// A bare mesh stands on a ground, which no scene file and no interior gets. A scene file that is made of the mesh has it.
+#[test]
+fn a_mesh_under_the_users_sky_stands_on_a_ground() {
+    let sky = Some(SkyChoice { elevation: 40.0, azimuth: None, turbidity: 4.0 });
+    let gold = vec!["gold".parse().unwrap()];
+    let (min, size) = (Vec3::new(3.0, -2.0, 1.0), Vec3::new(2.0, 3.0, 4.0));
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    fs::write(path("a.obj"), box_obj(min, size)).unwrap();
+    for (up, axis) in [(Up::Y, 1), (Up::Z, 2)] {
+        let look = Look { sky, up: Some(up), ..Look::default() };
+        let bare = Scene::load_with(&path("a.obj"), &with_look(Look { sky: None, ..look.clone() })).unwrap();
+        let scene = Scene::load_with(&path("a.obj"), &with_look(look.clone())).unwrap();
+        assert_eq!((scene.camera, scene.instances.len()), (bare.camera, 2));
+        let (least, greatest) = scene.bounds();
+        let gap = min[axis] - least[axis];
+        assert!(gap > 0.0 && gap < 1e-3 && greatest[axis] == (min + size)[axis], "{least} {greatest}");
+        let middle = min + size / 2.0;
+        for other in (0..3).filter(|other| *other != axis) {
+            let radius = 10.0 * size.length();
+            assert!((greatest[other] - middle[other] - radius).abs() < 0.01 * radius, "{least} {greatest}");
+        }
+        let flat = kdray::world::FlatScene::new(&scene).unwrap();
+        let ground = flat.triangles.last().unwrap();
+        let normal = (ground.v1 - ground.v0).cross(ground.v2 - ground.v0).normalize();
+        assert!(normal.dot(up.vector()) > 0.9999, "{normal}");
+        for look in [look.clone(), Look { materials: gold.clone(), ..look }] {
+            let before = Scene::load_with(&path("a.obj"), &with_look(look.clone())).unwrap();
+            let text = scene_file_of(&path("a.obj"), &path("b.toml"), &with_look(look)).unwrap();
+            fs::write(path("b.toml"), &text).unwrap();
+            let after = Scene::load(&path("b.toml")).unwrap();
+            let [before, after] = [before, after].map(|scene| kdray::world::FlatScene::new(&scene).unwrap());
+            assert_eq!(before.triangles, after.triangles, "{text}");
+            let material =
+                |flat: &kdray::world::FlatScene| flat.materials[*flat.triangle_materials.last().unwrap() as usize];
+            assert_eq!(material(&before), material(&after), "{text}");
+            assert_eq!(material(&before).kd, Vec3::splat(0.2));
+        }
+    }
+    let toml = "[[mesh]]\nfile = 'a.obj'\n";
+    fs::write(path("c.toml"), toml).unwrap();
+    let look = || with_look(Look { sky, ..Look::default() });
+    assert_eq!(Scene::load_with(&path("c.toml"), &look()).unwrap().instances.len(), 1);
+    // A room: a box whose faces are turned inwards.
+    let room = box_obj(min, size).replace("f 1 5 7 3", "f 3 7 5 1").replace("f 6 2 4 8", "f 8 4 2 6");
+    let room = room.replace("f 1 2 6 5", "f 5 6 2 1").replace("f 7 8 4 3", "f 3 4 8 7");
+    let room = room.replace("f 2 1 3 4", "f 4 3 1 2").replace("f 5 6 8 7", "f 7 8 6 5");
+    assert_eq!(load(&[("a.obj", &room)], &look()).instances.len(), 1);
+}
+
 /// `--light` takes the place of the sun; the sky stays.
 #[test]
 fn the_users_light_replaces_the_sun() {

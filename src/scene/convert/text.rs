@@ -10,6 +10,7 @@ use crate::{
     scene::{
         Camera, Ground, Light, Material, MaterialChoice, Projection, RenderDefaults, Scene, Sky,
         assemble::DEFAULT_MATERIAL,
+        ground::{self, GENERATOR, GROUND},
         material_spec::MaterialSpec,
         overrides::override_terms,
         preset::is_replaced,
@@ -56,6 +57,14 @@ pub(super) fn scene_file(scene: &Scene, mesh: &MeshTable) -> String {
     }
     if !materials.is_empty() {
         text += "override = true\n";
+    }
+    if let Some(ground::Ground { radius, turn, centre }) = ground::Ground::of(scene) {
+        let (albedo, radius, turn) = (vector(Vec3::splat(Sky::GROUND_ALBEDO)), number(radius), number(turn));
+        text += &format!(
+            "\n[materials.{GROUND:?}]\nKd = {albedo}\n\n[[mesh]]\n{GENERATOR}material = {GROUND:?}\n\
+             transform = {{ scale = {radius}, rotate = [{turn}, 0.0, 0.0], translate = {} }}\n",
+            vector(centre)
+        );
     }
     text
 }
@@ -164,7 +173,7 @@ fn render(defaults: &RenderDefaults) -> String {
 /// Returns the tables of the file's materials that are not replaced, a table for each name.
 fn materials(scene: &Scene, replaced: &[MaterialChoice]) -> String {
     let mut by_name: HashMap<&str, Vec<&Material>> = HashMap::new();
-    let is_shown = |name: &str| name != DEFAULT_MATERIAL && !is_replaced(replaced, name);
+    let is_shown = |name: &str| ![DEFAULT_MATERIAL, GROUND].contains(&name) && !is_replaced(replaced, name);
     let of_file = || scene.materials.iter().filter(|material| is_shown(&material.name));
     of_file().for_each(|material| by_name.entry(&material.name).or_default().push(material));
     let tables = of_file().filter_map(|material| {

@@ -68,8 +68,14 @@ pub(super) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result
     scene.defaults.is_metered = !lacks_light;
     scene.defaults.samples = SAMPLES;
     document.warnings(path).iter().for_each(|warning| tracing::warn!("{warning}"));
-    let lacks =
-        Lacks { camera: lacks_camera, up: Up::Y, light: lacks_light, background: lacks_light, integrator: true };
+    let lacks = Lacks {
+        camera: lacks_camera,
+        up: Up::Y,
+        ground: true,
+        light: lacks_light,
+        background: lacks_light,
+        integrator: true,
+    };
     Ok((scene, lacks))
 }
 
