@@ -63,6 +63,7 @@
 //! engine   a device or the CPU: chooses the methods that the user leaves open, renders, casts
 //! output   picture -> file
 //! merge    files of parts -> picture
+//! pack     a scene and all of its files -> one file
 //! bench    all of it, timed
 //! view     all of it, in a window
 //!
@@ -109,6 +110,8 @@ pub mod engine;
 pub mod output;
 
 pub mod merge;
+
+pub mod pack;
 
 #[cfg(feature = "bench")]
 #[doc(hidden)]

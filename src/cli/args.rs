@@ -8,7 +8,7 @@ use kdray::{
     engine::choices::{BuildPolicy, Request},
     frame::{Aov, Crop, Denoise, Integrator, RenderOptions, SampleRange},
     gpu::DeviceSelector,
-    scene::Scene,
+    scene::{Scene, packed_path},
 };
 
 #[cfg(feature = "bench")]
@@ -16,6 +16,7 @@ use super::bench::Suite;
 #[cfg(feature = "view")]
 pub use super::view_args::ViewArgs;
 use super::{
+    device_args::{DeviceList, device},
     error::CliError,
     load_args::LoadArgs,
     look_args::LookArgs,
@@ -49,6 +50,8 @@ pub enum Command {
     Cast(CastArgs),
     /// Join the parts of a picture that were rendered with --crop, --tile or --samples
     Merge(MergeArgs),
+    /// Put a scene and all files that it needs into one file, which is a scene file itself
+    Pack(PackArgs),
     /// List the Vulkan devices
     Devices,
     /// Describe a scene and its acceleration structure
@@ -63,7 +66,7 @@ pub enum Command {
 
 #[derive(clap::Args)]
 pub struct RenderArgs {
-    /// Scene file (TOML), or mesh file (glTF, OBJ, PLY, STL)
+    /// Scene file (TOML), mesh file (glTF, OBJ, PLY, STL), or pack
     pub scene: PathBuf,
     /// Picture to write: .png, or .exr for linear radiance; with --path, #### in the name stands for the frame's
     /// number [default: the scene's name with .png, or with .####.png, in the working directory]
@@ -72,9 +75,9 @@ pub struct RenderArgs {
     /// Move the camera along the keyframes of this TOML file, and write one picture per frame
     #[arg(long, value_name = "FILE", conflicts_with = "repeat")]
     pub path: Option<PathBuf>,
-    /// Frames of the path to render, both ends included, for example 0-99, 7, or 0-99x4 for every fourth [default: from
-    /// the first keyframe to the last]
-    #[arg(long, value_name = "A-BxS", requires = "path")]
+    /// Frames of the path to render, both ends included, for example 0-99, 7, or 0-99x4 for every fourth; the path is
+    /// that of --path, or the one in a pack [default: from the first keyframe to the last]
+    #[arg(long, value_name = "A-BxS", conflicts_with = "repeat")]
     pub frames: Option<Frames>,
     /// Leave out pictures whose files exist already, whatever they show, so that a film that was interrupted goes on
     /// where it ended
@@ -93,7 +96,7 @@ pub struct RenderArgs {
     /// Draw as many samples of each pixel as fit into this time, at least one, for example 30s or 5m; loading and
     /// building do not count
     #[arg(long, value_name = "TIME", value_parser = time)]
-    #[arg(conflicts_with_all = ["spp", "samples", "repeat", "trace", "path", "tile"])]
+    #[arg(conflicts_with_all = ["spp", "samples", "repeat", "trace", "path", "frames", "tile"])]
     pub time: Option<Duration>,
     /// Render only some of the samples of each pixel to an .exr file, from A on up to but without B, for example 0-32;
     /// both are multiples of 16, or B is the number of all samples; `kdray merge` joins such files; for --integrator
@@ -115,10 +118,10 @@ pub struct RenderArgs {
     /// Number of CPU threads for loading, building and --cpu, 1 to 1024 [default: one per processor]
     #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
-    /// Vulkan device to use: its index in `kdray devices`, or a part of its name [default: a
-    /// discrete GPU, else an integrated one, else a software driver]
-    #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
-    pub device: Option<DeviceSelector>,
+    /// Vulkan devices that share the drawing: indices in `kdray devices` or parts of names, separated by commas, or `all`
+    /// for all devices of the best one's kind [default: a discrete GPU, else an integrated one, else a software driver]
+    #[arg(long, value_name = "LIST|all")]
+    pub device: Option<DeviceList>,
     /// Number of times to draw the frame, 1 to 10000; the report shows the frame of median time
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u16).range(1..=10_000))]
     pub repeat: u16,
@@ -222,6 +225,23 @@ pub struct ConvertArgs {
 }
 
 #[derive(clap::Args)]
+pub struct PackArgs {
+    /// Scene file (TOML), or mesh file (glTF, OBJ, PLY, STL)
+    pub scene: PathBuf,
+    /// Pack to write, a .kdpack file [default: the scene's name with .kdpack, in the working directory]
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Path of the camera to pack with the scene: the TOML file of its keyframes
+    #[arg(long, value_name = "FILE")]
+    pub path: Option<PathBuf>,
+    #[command(flatten)]
+    pub load: LoadArgs,
+    /// Print errors only
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+#[derive(clap::Args)]
 pub struct MergeArgs {
     /// Parts of one picture, in any order: .exr files that `kdray render` wrote
     #[arg(required = true, value_name = "PART")]
@@ -235,6 +255,17 @@ pub struct MergeArgs {
 }
 
 impl RenderArgs {
+    /// Returns the arguments with the path in the scene's pack, if the user wants frames and names no path.
+    pub fn with_packed_path(self) -> Result<Self, CliError> {
+        if self.frames.is_none() || self.path.is_some() {
+            return Ok(self);
+        }
+        match packed_path(&self.scene)? {
+            Some(path) => Ok(Self { path: Some(path), ..self }),
+            None => Err(CliError::Usage("--frames needs --path FILE, or a pack with a path".into())),
+        }
+    }
+
     /// Refuses arguments that contradict each other.
     pub fn check(&self) -> Result<(), CliError> {
         self.picture.check()?;
@@ -248,6 +279,15 @@ impl RenderArgs {
             return Err(CliError::Usage("--samples needs --output FILE.exr: `kdray merge` joins .exr files".into()));
         }
         Ok(())
+    }
+
+    /// Refuses arguments that several devices cannot serve.
+    pub fn check_devices(&self, n_devices: usize) -> Result<(), CliError> {
+        let refused = [(self.time.is_some(), "--time"), (self.trace.is_some(), "--trace")];
+        match refused.iter().find(|(is_given, _)| *is_given && n_devices > 1) {
+            Some((_, name)) => Err(CliError::Usage(format!("{name} needs a single device, and there are {n_devices}"))),
+            None => Ok(()),
+        }
     }
 
     /// Returns the number of samples per pixel of the whole picture: the user's, else the scene's.
@@ -424,15 +464,6 @@ fn time(word: &str) -> Result<Duration, String> {
         Ok(time) if time > Duration::from_secs(30 * 24 * 3600) => Err("expected at most 30 days".to_owned()),
         Ok(time) => Ok(time),
         Err(_) => Err("expected a number with a unit, such as 30s, 5m or 1h".to_owned()),
-    }
-}
-
-/// Parses a device selector: an index if the word is a number, else a part of a name.
-pub fn device(word: &str) -> Result<DeviceSelector, String> {
-    match word.parse() {
-        Ok(index) => Ok(DeviceSelector::Index(index)),
-        Err(_) if word.trim().is_empty() => Err("expected an index or a name".into()),
-        Err(_) => Ok(DeviceSelector::Name(word.to_owned())),
     }
 }
 

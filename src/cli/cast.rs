@@ -15,9 +15,10 @@ use super::{
     args::CastArgs,
     build,
     cast_report::{CastReport, Times},
+    device_args::open_device,
     error::CliError,
     file_roles::FileRoles,
-    open_device, print,
+    print,
     progress::Progress,
     render::{report_validation, set_threads},
 };

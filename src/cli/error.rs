@@ -3,7 +3,7 @@
 use std::io;
 
 use kdray::{
-    cast::RayFileError, gpu::GpuError, merge::MergeError, output::OutputError, scene::SceneError,
+    cast::RayFileError, gpu::GpuError, merge::MergeError, output::OutputError, pack::PackError, scene::SceneError,
     util::memory::OutOfMemory, view::ViewError,
 };
 
@@ -18,6 +18,8 @@ pub enum CliError {
     Rays(#[from] RayFileError),
     #[error(transparent)]
     Merge(#[from] MergeError),
+    #[error(transparent)]
+    Pack(PackError),
     #[error(transparent)]
     Device(#[from] GpuError),
     #[error(transparent)]
@@ -42,7 +44,7 @@ impl CliError {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) | Self::Output(OutputError::UnknownEnding { .. }) => 2,
-            Self::Scene(_) | Self::Rays(_) | Self::Merge(_) | Self::Memory(_) => 3,
+            Self::Scene(_) | Self::Rays(_) | Self::Merge(_) | Self::Pack(_) | Self::Memory(_) => 3,
             Self::Device(_) | Self::DeviceMemory(_) | Self::Window(_) | Self::Validation(_) | Self::WrongHits(_) => 4,
             Self::Output(_) | Self::Stdout(_) => 5,
         }
@@ -55,6 +57,15 @@ impl CliError {
         match self {
             Self::Device(error) if error.is_out_of_memory() => Self::DeviceMemory(error),
             other => other,
+        }
+    }
+}
+
+impl From<PackError> for CliError {
+    fn from(error: PackError) -> Self {
+        match error {
+            PackError::Output(error) => Self::Output(error),
+            other => Self::Pack(other),
         }
     }
 }

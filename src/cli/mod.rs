@@ -9,6 +9,7 @@ mod build;
 mod cast;
 mod cast_report;
 mod convert;
+mod device_args;
 mod devices;
 mod error;
 mod file_roles;
@@ -18,6 +19,7 @@ mod log;
 mod look_args;
 mod merge;
 mod or_auto;
+mod pack;
 mod picture_args;
 mod progress;
 mod render;
@@ -36,17 +38,12 @@ use std::{
     ffi::OsString,
     io::{self, Write},
     process::ExitCode,
-    sync::Arc,
 };
 
 use args::{Args, Command};
 use clap::Parser;
 use error::CliError;
-use kdray::{
-    gpu::{Context, ContextOptions, GpuError},
-    util::text::{escape_controls, one_line},
-};
-use progress::Progress;
+use kdray::util::text::{escape_controls, one_line};
 
 /// Runs the command that `arguments` describe. The first argument is the program's name.
 pub fn main(arguments: impl Iterator<Item = OsString>) -> ExitCode {
@@ -69,26 +66,18 @@ pub fn main(arguments: impl Iterator<Item = OsString>) -> ExitCode {
 
 fn run(args: Args) -> Result<(), CliError> {
     match args.command {
-        Command::Render(args) => render::run(&args),
+        Command::Render(args) => render::run(args),
         #[cfg(feature = "view")]
         Command::View(args) => view::run(&args),
         Command::Cast(args) => cast::run(&args),
         Command::Merge(args) => merge::run(&args),
+        Command::Pack(args) => pack::run(&args),
         Command::Devices => devices::run(),
         Command::Inspect(args) => inspect::run(&args),
         Command::Convert(args) => convert::run(&args),
         #[cfg(feature = "bench")]
         Command::Bench(suite) => bench::run(&suite),
     }
-}
-
-/// Opens the selected device. If the user selected none and the best device is a software driver, a note says so.
-fn open_device(options: &ContextOptions, progress: &Progress) -> Result<Arc<Context>, GpuError> {
-    let context = Context::new(options)?;
-    if options.device.is_none() && context.is_software() {
-        progress.note(&format!("no GPU found, rendering in software on {}", context.info().name));
-    }
-    Ok(context)
 }
 
 /// Writes a report to standard output. Control characters are escaped within each line, since a report quotes names

@@ -33,6 +33,9 @@ pub struct Report {
     pub choices: Choices,
     /// Samples per pixel.
     pub samples: u32,
+    /// Number of devices that have drawn the pictures, or 1 for the CPU. The times of passes are sums over all of them,
+    /// and the time of the frame is what the clock shows.
+    pub devices: usize,
     pub triangles: usize,
     /// Statistics of the acceleration structure, serialized under the key `tree` or `grid`.
     #[serde(flatten)]
@@ -224,6 +227,11 @@ impl Report {
         );
         if self.frame.frame_ms.is_none() {
             text += "This device has no timestamps: where the time went is unknown.\n\n";
+        }
+        if self.devices > 1 {
+            let n = self.devices;
+            text +=
+                &format!("{n} devices: the times of passes are sums over all, the frame's is that of the clock\n\n");
         }
         if let Some(FrameTimeRange { n_frames, min_ms, max_ms }) = &self.repeated {
             text += &format!("the median of {n_frames} frames, which took {min_ms:.3} to {max_ms:.3} ms:\n\n");

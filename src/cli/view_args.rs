@@ -6,7 +6,7 @@ use clap::{ValueEnum, value_parser};
 use kdray::{gpu::DeviceSelector, view::InMotion};
 
 use super::{
-    args::device,
+    device_args::device,
     load_args::LoadArgs,
     look_args::LookArgs,
     picture_args::{PictureArgs, listed, positive, with_words},

@@ -8,6 +8,7 @@
 
 mod caster;
 pub mod choices;
+mod group;
 mod renderer;
 
 use std::sync::Arc;
@@ -33,6 +34,8 @@ use crate::{
 pub struct Engine {
     /// The Vulkan device; none on the CPU.
     context: Option<Arc<Context>>,
+    /// Further devices, which draw parts of pictures.
+    others: Vec<Arc<Context>>,
     request: Request,
     cache: Cache,
     progress: Progress,
@@ -61,9 +64,26 @@ impl Engine {
         Self { context: Some(context), ..Self::on_cpu() }
     }
 
+    /// Uses several Vulkan devices that are already open. They share the drawing of each picture; everything else is
+    /// done by the first one.
+    ///
+    /// # Panics
+    /// There are no devices.
+    pub fn on_devices(contexts: Vec<Arc<Context>>) -> Self {
+        let mut contexts = contexts.into_iter();
+        let first = contexts.next().expect("at least one device");
+        Self { others: contexts.collect(), ..Self::on_device(first) }
+    }
+
     /// Uses the CPU without Vulkan, on the current rayon pool.
     pub fn on_cpu() -> Self {
-        Self { context: None, request: Request::default(), cache: Cache::open(), progress: Progress::default() }
+        Self {
+            context: None,
+            others: Vec::new(),
+            request: Request::default(),
+            cache: Cache::open(),
+            progress: Progress::default(),
+        }
     }
 
     /// Returns the same engine with the choices that `request` specifies. The engine makes all other choices.
@@ -76,6 +96,11 @@ impl Engine {
     #[must_use]
     pub fn with_progress(self, progress: Progress) -> Self {
         Self { progress, ..self }
+    }
+
+    /// Returns all Vulkan devices, none on the CPU.
+    pub fn contexts(&self) -> impl Iterator<Item = &Arc<Context>> {
+        self.context.iter().chain(&self.others)
     }
 
     /// Returns the Vulkan device, or none on the CPU.
@@ -138,7 +163,8 @@ impl Engine {
     /// # Errors
     /// The scene or a row of the picture is beyond the device's limits or memory.
     pub fn renderer(&self, world: &World, options: &RenderOptions) -> Result<Renderer, GpuError> {
-        Renderer::new(self.context.as_ref(), world, options)
+        let contexts: Vec<_> = self.contexts().cloned().collect();
+        Renderer::new(&contexts, world, options)
     }
 
     /// Creates a caster, which can cast many sets of rays through the same triangles.

@@ -4,6 +4,7 @@ use std::{borrow::Cow, sync::Arc};
 
 use tracing::info_span;
 
+use super::group::RendererGroup;
 use crate::{
     cpu::{self, Batching},
     frame::{Drawn, Goal, Integrator, Pacer, Picture, RenderOptions, SampleRange, SampleSums, Watcher},
@@ -27,19 +28,17 @@ pub struct Renderer(Backend);
 
 enum Backend {
     Device(Box<BandedRenderer>),
+    Group(Box<RendererGroup>),
     Cpu(Box<cpu::Renderer>),
 }
 
 impl Renderer {
-    /// Creates a renderer on the device. If `context` is none, the renderer runs on the CPU.
-    pub(super) fn new(
-        context: Option<&Arc<Context>>,
-        world: &World,
-        options: &RenderOptions,
-    ) -> Result<Self, GpuError> {
-        Ok(Self(match context {
-            Some(context) => Backend::Device(Box::new(BandedRenderer::new(Arc::clone(context), world, options)?)),
-            None => Backend::Cpu(Box::new(cpu::Renderer::new(world, options, Batching::default()))),
+    /// Creates a renderer on the devices. If there are none, the renderer runs on the CPU.
+    pub(super) fn new(contexts: &[Arc<Context>], world: &World, options: &RenderOptions) -> Result<Self, GpuError> {
+        Ok(Self(match contexts {
+            [] => Backend::Cpu(Box::new(cpu::Renderer::new(world, options, Batching::default()))),
+            [context] => Backend::Device(Box::new(BandedRenderer::new(Arc::clone(context), world, options)?)),
+            contexts => Backend::Group(Box::new(RendererGroup::new(contexts, world, options)?)),
         }))
     }
 
@@ -47,7 +46,7 @@ impl Renderer {
     pub fn n_bands(&self) -> u32 {
         match &self.0 {
             Backend::Device(renderer) => renderer.n_bands(),
-            Backend::Cpu(_) => 1,
+            Backend::Group(_) | Backend::Cpu(_) => 1,
         }
     }
 
@@ -75,6 +74,7 @@ impl Renderer {
         for block in samples.blocks() {
             match &mut self.0 {
                 Backend::Device(renderer) => renderer.set_first_sample(block.first)?,
+                Backend::Group(group) => group.set_first_sample(block.first)?,
                 Backend::Cpu(renderer) => renderer.set_first_sample(block.first),
             }
             let next = self.draw_watched(camera, Goal::Samples(block.len()), &mut watcher)?;
@@ -97,6 +97,10 @@ impl Renderer {
                 renderer.set_camera(camera);
                 renderer.draw(goal, watcher)
             }
+            Backend::Group(group) => {
+                group.set_camera(camera);
+                group.draw(goal, watcher)
+            }
             Backend::Cpu(renderer) => {
                 renderer.set_camera(camera);
                 Ok(draw_on_cpu(renderer, goal, watcher))
@@ -109,7 +113,7 @@ impl Renderer {
     /// not wait for the copy.
     ///
     /// # Errors
-    /// The renderer runs on the CPU. The picture was drawn in several bands, so it is not on the device. The image is
+    /// The renderer runs on the CPU or on several devices. The picture was drawn in several bands, so it is not on the device. The image is
     /// smaller than the picture. A call fails. In all these cases nothing is signalled.
     pub fn copy_picture_to(
         &self,
@@ -119,8 +123,10 @@ impl Renderer {
     ) -> Result<(), GpuError> {
         match &self.0 {
             Backend::Device(renderer) => renderer.copy_picture_to(image, after, then),
-            Backend::Cpu(_) => {
-                Err(GpuError::Lacks { device: "CPU".to_owned(), missing: "images to copy a picture into".to_owned() })
+            Backend::Group(_) | Backend::Cpu(_) => {
+                let device = if matches!(self.0, Backend::Cpu(_)) { "CPU" } else { "several devices" };
+                let missing = "images to copy a picture into".to_owned();
+                Err(GpuError::Lacks { device: device.to_owned(), missing })
             }
         }
     }
@@ -132,6 +138,7 @@ impl Renderer {
     pub fn picture(&self) -> Result<Cow<'_, Picture>, GpuError> {
         match &self.0 {
             Backend::Device(renderer) => renderer.picture(),
+            Backend::Group(group) => Ok(Cow::Borrowed(group.picture())),
             Backend::Cpu(renderer) => Ok(Cow::Owned(renderer.picture())),
         }
     }

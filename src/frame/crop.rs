@@ -1,6 +1,6 @@
 //! Rectangular parts of a picture.
 
-use std::{fmt, str::FromStr};
+use std::{borrow::Cow, fmt, str::FromStr};
 
 use super::{Denoise, RenderOptions};
 use crate::layout::EDGE_BORDER;
@@ -47,7 +47,11 @@ impl Crop {
 
     /// Copies the pixels of `crop` out of those of this rectangle, which must contain it. `pixels`: the pixels of
     /// this rectangle, rows from the top.
-    pub(crate) fn part<T: Copy>(&self, pixels: &[T], crop: &Crop) -> Vec<T> {
+    pub(crate) fn part<'a, T: Copy + 'a>(&self, pixels: impl Into<Cow<'a, [T]>>, crop: &Crop) -> Vec<T> {
+        let pixels = pixels.into();
+        if self == crop {
+            return pixels.into_owned();
+        }
         let (left, width) = ((crop.x0 - self.x0) as usize, crop.width() as usize);
         let rows = pixels.chunks_exact(self.width() as usize).skip((crop.y0 - self.y0) as usize);
         rows.take(crop.height() as usize).flat_map(|row| &row[left..left + width]).copied().collect()

@@ -40,6 +40,8 @@ pub use self::{
     sample_range::{BlockSum, SampleRange, SampleSums, variance_of_joined},
     view::View,
 };
+use rayon::prelude::*;
+
 use crate::{accel::kdtree::Traversal, layout};
 
 /// How a frame is rendered. For each option that the user does not set, the command takes the value of the scene's
@@ -244,7 +246,7 @@ pub struct Picture {
 
 /// Sets the fourth component of pixels to 1. In frames of paths, kernels use it for the noise of the samples.
 pub(crate) fn opaque(mut radiance: Vec<[f32; 4]>) -> Vec<[f32; 4]> {
-    radiance.iter_mut().for_each(|pixel| pixel[3] = 1.0);
+    radiance.par_iter_mut().for_each(|pixel| pixel[3] = 1.0);
     radiance
 }
 

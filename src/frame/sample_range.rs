@@ -6,6 +6,8 @@
 
 use std::{fmt, str::FromStr};
 
+use rayon::prelude::*;
+
 use crate::layout::MOST_SAMPLES_LOG2;
 
 /// Samples of each pixel: those from `first` on, up to but without `end`.
@@ -104,6 +106,11 @@ impl SampleSums {
         &self.0
     }
 
+    /// Returns the blocks, in order.
+    pub fn into_blocks(self) -> Vec<BlockSum> {
+        self.0
+    }
+
     /// Returns the range of all samples.
     pub fn samples(&self) -> SampleRange {
         let ends = (self.0.first().zip(self.0.last())).map(|(first, last)| (first.samples.first, last.samples.end));
@@ -137,18 +144,22 @@ impl SampleSums {
     /// As [`SampleSums::push`].
     pub fn push_mean(&mut self, samples: SampleRange, radiance: &[[f32; 4]]) {
         let n = samples.len() as f32;
-        let sums = radiance.iter().map(|&[r, g, b, _]| [r * n, g * n, b * n]).collect();
+        let sums = radiance.par_iter().map(|&[r, g, b, _]| [r * n, g * n, b * n]).collect();
         self.push(BlockSum { samples, sums });
     }
 
     /// Returns the means of all samples as the kernel computes them: the sums are added from the last block to the
     /// first one, and multiplied by the reciprocal of their number. The fourth component is 1.
     pub fn mean(&self) -> Vec<[f32; 4]> {
+        self.clone().into_mean()
+    }
+
+    /// Returns what [`SampleSums::mean`] does.
+    pub fn into_mean(mut self) -> Vec<[f32; 4]> {
         let reciprocal = 1.0 / self.samples().len() as f32;
-        let Some((last, earlier)) = self.0.split_last() else { return Vec::new() };
-        let mut sums = last.sums.clone();
-        earlier.iter().rev().for_each(|block| add(&mut sums, &block.sums));
-        sums.into_iter().map(|[r, g, b]| [r * reciprocal, g * reciprocal, b * reciprocal, 1.0]).collect()
+        let Some(BlockSum { mut sums, .. }) = self.0.pop() else { return Vec::new() };
+        self.0.iter().rev().for_each(|block| add(&mut sums, &block.sums));
+        sums.into_par_iter().map(|[r, g, b]| [r * reciprocal, g * reciprocal, b * reciprocal, 1.0]).collect()
     }
 }
 
@@ -164,7 +175,7 @@ pub fn variance_of_joined(ranges: impl Iterator<Item = (u32, f32)>) -> f32 {
 }
 
 fn add(sums: &mut [[f32; 3]], others: &[[f32; 3]]) {
-    sums.as_flattened_mut().iter_mut().zip(others.as_flattened()).for_each(|(sum, other)| *sum += other);
+    sums.as_flattened_mut().par_iter_mut().zip(others.as_flattened()).for_each(|(sum, other)| *sum += other);
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@
 
 use std::{
     error::Error,
+    ffi::OsString,
     fs::{self, File, OpenOptions},
     io::{self, Seek, Write},
     path::{Path, PathBuf},
@@ -169,6 +170,25 @@ pub fn write_with(path: &Path, body: impl FnOnce(&mut File) -> io::Result<()>) -
     .map_err(|source| OutputError::Write { path: path.to_owned(), source })
 }
 
+/// Writes a file as [`write_with`] does, and lets `check` read it before it takes its name. The name of the file that
+/// is checked ends as `path` does. If the check fails, nothing is written.
+pub fn write_checked<E: From<OutputError>>(
+    path: &Path,
+    body: impl FnOnce(&mut File) -> io::Result<()>,
+    check: impl FnOnce(&Path) -> Result<(), E>,
+) -> Result<(), E> {
+    let failed = |source| OutputError::Write { path: path.to_owned(), source };
+    let Destination::File { directory, file } = Destination::at(path)? else {
+        return Err(failed(io::Error::other("it is a device or a pipe, from which it cannot be read again")).into());
+    };
+    let mut suffix = OsString::from(".");
+    suffix.push(path.extension().unwrap_or_default());
+    let mut temporary = Temporary::create_named(&directory, &suffix).map_err(failed)?;
+    body(temporary.as_file_mut()).map_err(failed)?;
+    check(temporary.path())?;
+    Ok(settle(temporary, &file).map_err(failed)?)
+}
+
 /// Makes a spool: a temporary file for data that will be written to the file at `path`. It is in memory while it is
 /// small, then on the same disk as the file. For a device or a pipe, it is then in the system's temporary directory.
 pub fn spool(path: &Path) -> Result<SpooledTempFile, OutputError> {
@@ -194,8 +214,13 @@ fn write_stream(path: &Path, body: impl FnOnce(&mut File) -> io::Result<()>) -> 
 /// Lets `body` write a temporary file, which then takes the place of `file`.
 fn replace(directory: &Path, file: &Path, body: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
     let mut temporary = Temporary::create_in(directory)?;
+    body(temporary.as_file_mut())?;
+    settle(temporary, file)
+}
+
+/// Lets a temporary file take the place of `file`.
+fn settle(mut temporary: Temporary, file: &Path) -> io::Result<()> {
     let written = temporary.as_file_mut();
-    body(written)?;
     if let Ok(replaced) = fs::metadata(file) {
         written.set_permissions(replaced.permissions())?;
     }

@@ -9,6 +9,7 @@
 use std::os::unix::fs::PermissionsExt;
 use std::{
     collections::BTreeSet,
+    ffi::OsStr,
     fs::{self, File},
     io, mem,
     path::{Path, PathBuf},
@@ -47,8 +48,13 @@ pub struct Temporary {
 impl Temporary {
     /// Creates a file in a directory, with the permissions that the umask leaves.
     pub fn create_in(directory: &Path) -> io::Result<Self> {
+        Self::create_named(directory, OsStr::new(""))
+    }
+
+    /// Creates a file in a directory whose name ends in `suffix`.
+    pub fn create_named(directory: &Path, suffix: &OsStr) -> io::Result<Self> {
         let mut builder = tempfile::Builder::new();
-        builder.prefix(".kdray-");
+        builder.prefix(".kdray-").suffix(suffix);
         #[cfg(unix)]
         builder.permissions(PermissionsExt::from_mode(0o666)); // less the umask
         let mut paths = registry();
@@ -61,6 +67,11 @@ impl Temporary {
     /// Returns the open file.
     pub fn as_file_mut(&mut self) -> &mut File {
         self.file.as_mut().expect("only `persist` takes the file").as_file_mut()
+    }
+
+    /// Returns the file's path.
+    pub fn path(&self) -> &Path {
+        self.file.as_ref().expect("only `persist` takes the file").path()
     }
 
     /// Gives the file its final name. It replaces any file that had this name.

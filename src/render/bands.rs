@@ -63,6 +63,24 @@ impl BandedRenderer {
         self.renderer.set_camera(camera);
     }
 
+    /// Sets the part of the picture that is drawn next. Buffers are kept as [`Renderer::set_crop`] keeps them.
+    ///
+    /// # Panics
+    /// The crop exceeds the picture.
+    ///
+    /// # Errors
+    /// The part exceeds the device's limits or memory.
+    pub fn set_crop(&mut self, crop: Crop) -> Result<(), GpuError> {
+        if self.bands == [crop] {
+            return Ok(());
+        }
+        let options = RenderOptions { crop: Some(crop), ..self.renderer.options().clone() };
+        let bands = bands(self.renderer.context.limits(), &options);
+        self.renderer.set_crop(largest(&bands, &options).unwrap_or(crop))?;
+        (self.bands, self.joined) = (bands, None);
+        Ok(())
+    }
+
     /// Sets the index of the next picture's first sample, a multiple of `2^MOST_SAMPLES_LOG2`. Only frames of paths
     /// know it.
     ///
@@ -70,6 +88,9 @@ impl BandedRenderer {
     /// A Vulkan call fails.
     pub fn set_first_sample(&mut self, first_sample: u32) -> Result<(), GpuError> {
         let options = self.renderer.options();
+        if options.paths.first_sample == first_sample {
+            return Ok(());
+        }
         let paths = PathOptions { first_sample, ..options.paths };
         self.renderer.set_options(&RenderOptions { paths, ..options.clone() })
     }
@@ -106,6 +127,31 @@ impl BandedRenderer {
         }
         self.joined = Some(joined);
         Ok(all)
+    }
+
+    /// Returns the mean of the samples before the noise filter, of the crop and the border that the filter reads.
+    ///
+    /// # Panics
+    /// There are several bands.
+    ///
+    /// # Errors
+    /// A copy fails.
+    pub fn window_mean(&self) -> Result<Vec<[f32; 4]>, GpuError> {
+        assert_eq!(self.bands.len(), 1, "one band");
+        self.renderer.window_mean()
+    }
+
+    /// Replaces the mean of the samples, which [`BandedRenderer::window_mean`] returns, and returns the picture of it,
+    /// filtered and encoded. The next sample is the first of a new picture.
+    ///
+    /// # Panics
+    /// There are several bands, or the mean has another number of pixels.
+    ///
+    /// # Errors
+    /// A copy fails.
+    pub fn picture_of(&mut self, mean: Vec<[f32; 4]>) -> Result<Picture, GpuError> {
+        assert_eq!(self.bands.len(), 1, "one band");
+        self.renderer.picture_of(mean)
     }
 
     /// Returns the picture that was drawn last. It is downloaded if it is still on the device.

@@ -32,7 +32,7 @@ use self::{
 };
 use crate::{
     buffers::{Needs, Resources},
-    frame::{FrameKind, Integrator, Pass, Picture, Plan, Primary, Profile, RenderOptions, Step, opaque, plan},
+    frame::{Denoise, FrameKind, Integrator, Pass, Picture, Plan, Primary, Profile, RenderOptions, Step, opaque, plan},
     gpu::{Access, AnyBuffer, CommandBuffer, Commands, Context, GpuError},
     layout::{Batch, FalseColor, Feature, MATERIAL_REFLECT, MATERIAL_REFRACT},
     passes::{FramePasses, Inputs, Rasterize},
@@ -207,6 +207,34 @@ impl Renderer {
         Ok(())
     }
 
+    /// Downloads the mean of the samples before the noise filter, of the whole window.
+    ///
+    /// # Errors
+    /// A copy fails.
+    fn window_mean(&self) -> Result<Vec<[f32; 4]>, GpuError> {
+        self.resources.pixels.pixel_radiance.download_first(self.resources.n_pixels())
+    }
+
+    /// Replaces the mean of the samples, and returns the picture of it, filtered and encoded. The next sample is the
+    /// first of a new picture.
+    ///
+    /// # Panics
+    /// The mean does not have one value for each pixel of the window.
+    ///
+    /// # Errors
+    /// A copy fails, or a Vulkan call.
+    fn picture_of(&mut self, mean: Vec<[f32; 4]>) -> Result<Picture, GpuError> {
+        assert_eq!(mean.len(), self.resources.n_pixels(), "pixels of the window");
+        self.resources.pixels.pixel_radiance.upload(&mean)?;
+        self.show()?;
+        self.reset_samples();
+        match self.in_use.noise_filter() {
+            // What is displayed is the mean itself.
+            Denoise::Off => self.picture_with(mean),
+            _ => self.picture(),
+        }
+    }
+
     /// Downloads the picture as it was last drawn or shown. The last sample must be complete: one that was drawn in
     /// part, even if it has been dropped, has overwritten some of the radiance.
     ///
@@ -214,14 +242,19 @@ impl Renderer {
     /// A copy fails.
     pub fn picture(&self) -> Result<Picture, GpuError> {
         let _fetching = info_span!("fetch picture").entered();
+        self.picture_with(self.resources.pixels.filtered().download_first(self.resources.n_pixels())?)
+    }
+
+    /// Downloads what a display shows of the picture. `radiance`: the radiance of the window's pixels.
+    fn picture_with(&self, radiance: Vec<[f32; 4]>) -> Result<Picture, GpuError> {
         let (pixels, n_pixels) = (&self.resources.pixels, self.resources.n_pixels());
         let (window, crop) = (self.in_use.window(), self.in_use.crop_or_whole());
         let display = pixels.pixel_display.download_first(n_pixels)?;
         Ok(Picture {
             width: crop.width(),
             height: crop.height(),
-            radiance: opaque(window.part(&pixels.filtered().download_first(n_pixels)?, &crop)),
-            display: window.part(&display, &crop).into_iter().map(u32::to_le_bytes).collect(),
+            radiance: opaque(window.part(radiance, &crop)),
+            display: window.part(display, &crop).into_iter().map(u32::to_le_bytes).collect(),
         })
     }
 
@@ -235,7 +268,7 @@ impl Renderer {
     pub fn features(&self) -> Result<Vec<Feature>, GpuError> {
         assert!(self.in_use.features, "the options ask for features");
         let features = self.resources.pixels.pixel_features.download_first(self.resources.n_pixels())?;
-        Ok(self.in_use.window().part(&features, &self.in_use.crop_or_whole()))
+        Ok(self.in_use.window().part(features, &self.in_use.crop_or_whole()))
     }
 
     /// Adds to features what the samples of each pixel tell of its noise. The frames must trace paths.
@@ -243,8 +276,7 @@ impl Renderer {
     /// # Errors
     /// A copy fails.
     fn note_noise(&self, features: &mut [Feature]) -> Result<(), GpuError> {
-        let means = self.resources.pixels.pixel_radiance.download_first(self.resources.n_pixels())?;
-        let means = self.in_use.window().part(&means, &self.in_use.crop_or_whole());
+        let means = self.in_use.window().part(self.window_mean()?, &self.in_use.crop_or_whole());
         features.iter_mut().zip(means).for_each(|(feature, mean)| feature.set_noise(mean, self.n_samples));
         Ok(())
     }

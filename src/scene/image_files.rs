@@ -4,6 +4,7 @@ use std::{collections::HashMap, path::PathBuf};
 
 use super::{
     error::Checked,
+    files,
     image::{Encoded, Examined, MAX_PIXELS, decode_all, normals_of_heights},
     needs::{require_for_bytes, require_for_images},
     preset::{MaterialChoice, is_replaced},
@@ -80,7 +81,7 @@ impl Images {
     /// Returns the index of a file.
     pub fn add(&mut self, path: PathBuf) -> usize {
         // One file can have several names. A file that does not exist has those that are stated.
-        let canonical = path.canonicalize().unwrap_or_else(|_| path.clone());
+        let canonical = files::canonical(&path).unwrap_or_else(|_| path.clone());
         *self.by_path.entry(canonical).or_insert_with(|| {
             self.files.push(File { path, image: None });
             self.files.len() - 1

@@ -1,7 +1,8 @@
 //! Scenes as files and programs describe them: meshes, their instances in the world, materials, lights, a camera.
 //! Nothing here depends on how kernels lay data out; `world` flattens a scene for tracing.
 //!
-//! A scene file is a TOML file, whose keys `description` lists, a glTF file, or a mesh file: OBJ, PLY or STL.
+//! A scene file is a TOML file, whose keys `description` lists, a glTF file, a mesh file, OBJ, PLY or STL, or a pack of
+//! any of them with all that it names.
 
 mod assemble;
 mod camera;
@@ -11,6 +12,7 @@ mod description;
 mod environment;
 mod error;
 mod extent;
+mod files;
 mod framing;
 pub mod generate;
 mod gltf;
@@ -30,6 +32,7 @@ mod needs;
 mod obj;
 mod outside;
 mod overrides;
+pub(crate) mod pack;
 mod path;
 mod placed;
 mod ply;
@@ -63,6 +66,7 @@ pub use self::{
     look::{LightChoice, Look, SkyChoice, Up},
     material::{Alpha, Clearcoat, Conductor, Lobes, Maps, Material, Microfacet, Sheen},
     mesh::Mesh,
+    pack::packed_path,
     path::CameraPath,
     preset::{MaterialChoice, Preset},
     sky::Sky,
@@ -154,8 +158,8 @@ pub struct Instance {
 }
 
 impl Scene {
-    /// Loads a scene file, `.toml`, a glTF file, `.gltf` or `.glb`, or a mesh file, `.obj`, `.ply` or `.stl`. The
-    /// content of a glTF or mesh file says which of the four it is. Emits `tracing` warnings for unknown OBJ
+    /// Loads a scene file, `.toml`, a glTF file, `.gltf` or `.glb`, a mesh file, `.obj`, `.ply` or `.stl`, or a pack,
+    /// `.kdpack`. The content of a glTF or mesh file says which of the four it is. Emits `tracing` warnings for unknown OBJ
     /// statements, material libraries and images that are missing or leave the folder of the mesh file, undefined
     /// materials, names in the wrong case, normals that an OBJ file names and does not have, terms of MTL files that
     /// are not taken as they are, what is not shown of a file, creases and overrides without effect, and coordinates
@@ -175,13 +179,25 @@ impl Scene {
     /// Those of [`Scene::load`]; the file does not have the scene or the camera that `options` names, or its camera
     /// with the changes of `options` shows nothing.
     pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
+        // A pack stays open until all of its files are read.
+        let pack = pack::opened(path)?;
+        let scene = match pack::scene_of(path, options)? {
+            Some(packed) => Self::load_file(&packed.path, &packed.options),
+            None => Self::load_file(path, options),
+        };
+        pack.map_or(Ok(()), |pack| pack.check())?;
+        scene
+    }
+
+    /// Loads a scene from a file that is no pack.
+    fn load_file(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
         let (mut scene, lacks) = if is_scene_file(path) {
             check_only_scene(path, options)?;
             assemble::load_toml(path, options)?
         } else if MeshFormat::of_name(path).is_some() {
             load_mesh_file(path, options)?
         } else {
-            let endings = "its name ends in none of .toml, .gltf, .glb, .obj, .ply and .stl";
+            let endings = "its name ends in none of .toml, .gltf, .glb, .obj, .ply, .stl and .kdpack";
             return Err(SceneError::file(path, format!("is no scene: {endings}")));
         };
         preset::replace(&mut scene, &options.look.materials).map_err(|what| SceneError::file(path, what))?;

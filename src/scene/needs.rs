@@ -1,8 +1,8 @@
 //! Estimates of the memory that a scene needs, checked before it is allocated.
 
-use std::{cmp::Reverse, fs, path::Path};
+use std::{cmp::Reverse, path::Path};
 
-use super::error::Checked;
+use super::{error::Checked, files};
 use crate::util::memory::require;
 
 /// Size of a loaded triangle in bytes without its points: three indices of corners (12), three normals (36) and a slot
@@ -96,8 +96,7 @@ pub(super) fn require_for_rows(n_bytes: u64) -> Checked<()> {
 }
 
 fn require_for_copies(path: &Path, n_copies: u64) -> Checked<()> {
-    let n_bytes = fs::metadata(path).map_or(0, |metadata| metadata.len());
-    require("reading it", n_bytes.saturating_mul(n_copies)).map_err(|error| error.to_string())
+    require("reading it", files::n_bytes(path).saturating_mul(n_copies)).map_err(|error| error.to_string())
 }
 
 #[cfg(test)]

@@ -2,11 +2,11 @@
 //! elsewhere cannot show other files of the computer. Here alone, a name becomes a path.
 
 use std::{
-    fs, io,
+    io,
     path::{Component, Path, PathBuf},
 };
 
-use super::{LoadOptions, error::Checked};
+use super::{LoadOptions, error::Checked, files, pack};
 
 /// Whether the files of a scene may name files outside of their folders.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -64,7 +64,8 @@ impl<'a> Reach<'a> {
         if name.is_empty() {
             return Err("the name of a file is empty".to_owned());
         }
-        let path = self.root.join(name);
+        let is_absolute = Path::new(name).is_absolute();
+        let path = self.absolute(name).filter(|_| is_absolute).unwrap_or_else(|| self.root.join(name));
         if !self.access.is_anywhere && !stays_below(name) {
             return Err(format!("`{name}` is not below the folder of the file that names it; {HINT}"));
         }
@@ -83,7 +84,8 @@ impl<'a> Reach<'a> {
         let parts = name.replace('\\', "/");
         let is_absolute = parts.starts_with('/') || parts.chars().nth(1) == Some(':');
         if is_absolute && self.access.is_anywhere {
-            return Ok(NamedFile { path: PathBuf::from(name), is_other_case: false });
+            let path = self.absolute(name).unwrap_or_else(|| PathBuf::from(name));
+            return Ok(NamedFile { path, is_other_case: false });
         }
         if is_absolute {
             return leaves();
@@ -102,7 +104,7 @@ impl<'a> Reach<'a> {
                 continue;
             }
             let exact = found.path.join(part);
-            match exact.exists() {
+            match files::exists(&exact) {
                 true => found.path = exact,
                 false => {
                     // Not even a list of other folders is read.
@@ -118,18 +120,23 @@ impl<'a> Reach<'a> {
         Ok(found)
     }
 
+    /// Returns the path of an absolute name, if the folder is in a pack.
+    fn absolute(self, name: &str) -> Option<PathBuf> {
+        pack::absolute(self.root, Path::new(name))
+    }
+
     /// Refuses a path that leads out of the folder by symbolic links.
     fn check_links(self, path: &Path, name: &str) -> Checked<()> {
         if self.access.is_anywhere {
             return Ok(());
         }
-        let found = match canonical(path) {
+        let found = match files::canonical(path) {
             Ok(found) => found,
             // A file that does not exist has no links to resolve.
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
             Err(error) => return Err(format!("`{name}` cannot be read: {error}")),
         };
-        match canonical(self.root) {
+        match files::canonical(self.root) {
             Ok(root) if found.starts_with(&root) => Ok(()),
             _ => Err(format!("`{name}` leads out of the folder of the file that names it; {HINT}")),
         }
@@ -138,10 +145,6 @@ impl<'a> Reach<'a> {
 
 /// How to read such a file.
 const HINT: &str = "--allow-outside reads it";
-
-fn canonical(path: &Path) -> io::Result<PathBuf> {
-    fs::canonicalize(if path.as_os_str().is_empty() { Path::new(".") } else { path })
-}
 
 /// Returns whether a name is that of a file below a folder, unless a link leads out of it.
 fn stays_below(name: &str) -> bool {
@@ -157,9 +160,8 @@ fn stays_below(name: &str) -> bool {
 
 /// Returns the only entry of a folder whose name differs from `name` in the case of letters alone.
 fn only_other_case(folder: &Path, name: &str) -> Option<PathBuf> {
-    let folder_or_here = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let lower = name.to_lowercase();
-    let names = fs::read_dir(folder_or_here).ok()?.flatten().map(|entry| entry.file_name());
+    let names = files::names_in(folder).into_iter();
     let mut same = names.filter(|entry| entry.to_str().is_some_and(|entry| entry.to_lowercase() == lower));
     match (same.next(), same.next()) {
         (Some(only), None) => Some(folder.join(only)),
@@ -169,6 +171,8 @@ fn only_other_case(folder: &Path, name: &str) -> Option<PathBuf> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use tempfile::TempDir;
 
     use super::*;

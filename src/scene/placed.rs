@@ -3,9 +3,8 @@
 
 use std::{
     collections::{HashMap, HashSet},
-    fs,
     ops::Range,
-    path::{Path, PathBuf},
+    path::PathBuf,
 };
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
@@ -17,6 +16,7 @@ use super::{
     description::{CommonSpec, MeshSpec, Source},
     error::Checked,
     extent::MeshOrigin,
+    files,
     generate::{Generator, TriangleBudget},
     gltf,
     image_files::Images,
@@ -378,13 +378,12 @@ impl Reading {
 
     /// Returns the size of the file and of the files beside a glTF file that it names.
     fn n_bytes(&self, file: &File) -> u64 {
-        let size = |path: &Path| fs::metadata(path).map_or(0, |metadata| metadata.len());
         let is_json = self.path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gltf"));
         let beside = match is_json {
             true => gltf::named_files(&self.path, &read_mesh(&self.path).unwrap_or_default(), file.access),
             false => Vec::new(),
         };
-        beside.iter().map(|path| size(path)).fold(size(&self.path), u64::saturating_add)
+        beside.iter().map(|path| files::n_bytes(path)).fold(files::n_bytes(&self.path), u64::saturating_add)
     }
 }
 

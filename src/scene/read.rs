@@ -1,8 +1,8 @@
 //! Functions that read a whole file of a scene, as text or as bytes.
 
-use std::{fs, path::Path};
+use std::path::Path;
 
-use super::error::SceneError;
+use super::{error::SceneError, files};
 
 /// Reads text that need not be UTF-8. Invalid bytes become U+FFFD, so that a mesh with comments in an old encoding is
 /// not refused.
@@ -30,12 +30,7 @@ pub(super) fn read_utf8(path: &Path) -> Result<String, SceneError> {
 
 /// Reads a regular file.
 pub(super) fn read_bytes(path: &Path) -> Result<Vec<u8>, SceneError> {
-    let failed = |e: std::io::Error| SceneError::file(path, format!("cannot be read: {e}"));
-    // Reading a device or a pipe might never end.
-    if !fs::metadata(path).map_err(failed)?.is_file() {
-        return Err(SceneError::file(path, "is not a regular file"));
-    }
-    fs::read(path).map_err(failed)
+    files::read(path).map_err(|error| SceneError::file(path, format!("cannot be read: {error}")))
 }
 
 fn without_bom(text: String) -> String {

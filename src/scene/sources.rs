@@ -10,19 +10,24 @@ use super::{
     mesh_file::MeshFormat,
     obj::named_files,
     outside::Access,
+    pack::pack_of,
     ply::named_images,
     read::{lossy_text, read_bytes, read_utf8},
 };
 
 /// Returns the sorted paths of the scene file, the mesh files that it names, the material libraries and buffers that
 /// the mesh files name, and the images that any of them names. The files need not exist. A file that cannot be read
-/// contributes no names. Names that are refused when the scene is loaded are left out.
+/// contributes no names. Names that are refused when the scene is loaded are left out. The only source of a scene in a
+/// pack is the pack.
 pub fn source_files(path: &Path) -> Vec<PathBuf> {
     source_files_with(path, &LoadOptions::default())
 }
 
 /// Returns the files as [`source_files`] does, of a scene that is loaded with options.
 pub fn source_files_with(path: &Path, options: &LoadOptions) -> Vec<PathBuf> {
+    if let Some(pack) = pack_of(path) {
+        return vec![pack.to_owned()];
+    }
     let access = Access::of(options);
     let (meshes, maps) = if is_scene_file(path) { named(path, access) } else { (vec![path.to_owned()], Vec::new()) };
     let libraries: Vec<_> = meshes.iter().flat_map(|mesh| libraries(mesh, access)).collect();

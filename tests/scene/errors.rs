@@ -162,7 +162,7 @@ fn bad_scene_files_are_refused() {
         (mesh(""), "a.toml:2", "mesh 1: has neither `file` nor `generator`"),
         (mesh("file = 'x.obj'\ngenerator = 'disc'"), "a.toml:2", "mesh 1: has both"),
         (mesh("file = 'x.obj'"), "a.toml:2", "/x.obj: cannot be read"),
-        (format!("{DISC}{}", mesh("file = '.'")), "a.toml:6", "/.: is not a regular file"),
+        (format!("{DISC}{}", mesh("file = '.'")), "a.toml:6", "/.: cannot be read: it is not a regular file"),
         (mesh("file = 'x.obj'\nradius = 1"), "a.toml:2", "mesh 1: unknown field `radius`"),
         (mesh("file = 'x.obj'\ncrease = 200"), "a.toml:2", "mesh 1: crease = 200"),
         (mesh("generator = 'cone'"), "a.toml:2", "mesh 1: unknown variant `cone`"),
@@ -208,11 +208,14 @@ fn bad_scene_files_are_refused() {
 #[test]
 fn files_that_are_no_scenes_are_refused() {
     assert!(error("a.toml", b"\n\xff").ends_with("a.toml:2: is not UTF-8"));
-    assert!(error("a.fbx", b"").ends_with("in none of .toml, .gltf, .glb, .obj, .ply and .stl"));
+    assert!(error("a.fbx", b"").ends_with("in none of .toml, .gltf, .glb, .obj, .ply, .stl and .kdpack"));
     let folder = tempfile::tempdir().unwrap();
     fs::create_dir(folder.path().join("x.obj")).unwrap();
     assert!(
-        Scene::load(&folder.path().join("x.obj")).unwrap_err().to_string().ends_with("x.obj: is not a regular file")
+        Scene::load(&folder.path().join("x.obj"))
+            .unwrap_err()
+            .to_string()
+            .ends_with("x.obj: cannot be read: it is not a regular file")
     );
     let missing = Scene::load(Path::new("no\nsuch\u{7}.toml")).unwrap_err().to_string();
     assert!(missing.starts_with("no such\\u{7}.toml: cannot be read"), "{missing}");

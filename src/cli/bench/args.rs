@@ -15,7 +15,8 @@ use kdray::{
 };
 
 use crate::cli::{
-    args::{Size, device},
+    args::Size,
+    device_args::device,
     error::CliError,
     file_roles::FileRoles,
     load_args::LoadArgs,

@@ -16,8 +16,8 @@ use kdray::{
 
 use super::args::SizeArgs;
 use crate::cli::{
+    device_args::open_device,
     error::CliError,
-    open_device,
     picture_args::check_traversal,
     print,
     progress::Progress,

@@ -17,8 +17,9 @@ use kdray::{
 
 use super::args::TraversalArgs;
 use crate::cli::{
+    device_args::open_device,
     error::CliError,
-    open_device, print,
+    print,
     progress::Progress,
     table::{decimal, table},
 };

@@ -12,7 +12,7 @@ use kdray::{
         choices::{Choices, ChosenAccel, Workload},
     },
     frame::{Goal, Profile, RenderOptions, SampleRange},
-    gpu::{Context, ContextOptions, GpuError},
+    gpu::{Context, DeviceInfo, GpuError},
     output::{self, Record, WholeRecord},
     scene::{CameraPath, LoadOptions, Scene},
     util::progress::Work,
@@ -28,9 +28,10 @@ use self::{
 use super::{
     args::{Frames, RenderArgs},
     build,
+    device_args::open_devices,
     error::CliError,
     file_roles::FileRoles,
-    open_device, print, print_line,
+    print, print_line,
     progress::Progress,
     report::{FrameTimeRange, Report},
     spans::Spans,
@@ -39,7 +40,8 @@ use super::{
 
 /// Runs `kdray render`: loads the scene, builds its structure, renders, writes and reports. Arguments, files and
 /// memory are checked before the work that an error would waste.
-pub fn run(args: &RenderArgs) -> Result<(), CliError> {
+pub fn run(args: RenderArgs) -> Result<(), CliError> {
+    let args = &args.with_packed_path()?;
     args.check()?;
     let roles = roles(args)?;
     check_outputs(args)?;
@@ -61,11 +63,12 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     let some_samples = args.some_samples(&scene, &options)?;
     let n_drawn = some_samples.map_or(n_samples, |range| range.len());
     check_memory(&options, n_drawn, args.cpu)?;
-    let device = ContextOptions::new(args.device.clone(), args.validate);
-    let opening = || info_span!("create device").in_scope(|| open_device(&device, &progress));
-    let context = if args.cpu { None } else { Some(opening()?) };
+    let open = || open_devices(args.device.as_ref(), args.validate, &progress);
+    let contexts = if args.cpu { Vec::new() } else { info_span!("create device").in_scope(open)? };
+    args.check_devices(contexts.len())?;
 
-    let engine = context.clone().map_or_else(Engine::on_cpu, Engine::on_device).with_request(args.picture.request());
+    let engine = if args.cpu { Engine::on_cpu() } else { Engine::on_devices(contexts.clone()) };
+    let engine = engine.with_request(args.picture.request());
     let n_triangles = scene.n_triangles();
     // A part of a picture gets the structure that the whole picture gets.
     let n_pictures = u64::from(n_samples) * views.len() as u64;
@@ -107,6 +110,7 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
         options: (&options).into(),
         choices: Choices::of_pictures(accel, methods),
         samples: n_samples,
+        devices: contexts.len().max(1),
         triangles: n_triangles,
         accel: world.statistics(),
         grid_build: world.grid_build().cloned(),
@@ -122,7 +126,7 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     if !args.quiet {
         print(&report.text())?;
     }
-    context.map_or(Ok(()), |context| report_validation(&context))
+    contexts.iter().try_for_each(|context| report_validation(context))
 }
 
 /// Returns the record of the pictures, from the scene's own camera.
@@ -133,14 +137,19 @@ fn record(
     accel: ChosenAccel,
     (n_samples, some_samples): (u32, Option<SampleRange>),
 ) -> Record {
-    let device = engine.context().map(|context| context.info());
+    // Devices of one kind round alike, so they are named once.
+    let of_devices = |of: fn(&DeviceInfo) -> &String| {
+        let mut words: Vec<&str> = engine.contexts().map(|context| of(context.info()).as_str()).collect();
+        words.dedup();
+        words.join("; ")
+    };
     Record {
         scene: world.scene().name.clone(),
         whole: WholeRecord::new(world.scene(), options, n_samples),
         crop: options.crop_or_whole(),
         samples: some_samples.unwrap_or(SampleRange::whole(n_samples)),
-        device: device.map_or_else(|| "CPU".to_owned(), |device| device.name.clone()),
-        driver: device.map_or_else(String::new, |device| device.driver.clone()),
+        device: if engine.context().is_some() { of_devices(|it| &it.name) } else { "CPU".to_owned() },
+        driver: of_devices(|it| &it.driver),
         accel: match accel.tree_kind() {
             Some(tree) => format!("{}, {}, {}", accel.kind(), tree.value, options.traversal),
             None => accel.kind().to_string(),

@@ -10,7 +10,8 @@ use toml::{Table, Value};
 
 use self::relative::Places;
 use super::{
-    LoadOptions, Look, Scene, SceneError, is_scene_file, material_spec::MAP_KEYS, outside::Access, read::read_utf8,
+    LoadOptions, Look, Scene, SceneError, is_scene_file, material_spec::MAP_KEYS, outside::Access, pack::pack_of,
+    read::read_utf8,
 };
 
 /// Returns the text of a scene file that shows what `input` shows. The names of files in it are relative to the folder
@@ -21,6 +22,10 @@ use super::{
 /// The input cannot be loaded, or a file does not lie below the folder of `output` and `options` do not allow it.
 pub fn scene_file_of(input: &Path, output: &Path, options: &LoadOptions) -> Result<String, SceneError> {
     let scene = Scene::load_with(input, options)?;
+    if pack_of(input).is_some() {
+        let what = "is in a pack: it can be converted before it is packed, or once `unzip` has unpacked it";
+        return Err(SceneError::file(input, what));
+    }
     let places = Places::new(output, Access::of(options))?;
     if is_scene_file(input) {
         return moved(input, &places, (&scene, options));

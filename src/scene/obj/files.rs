@@ -8,6 +8,7 @@ use super::{
 };
 use crate::scene::{
     error::Checked,
+    files,
     outside::{Access, NamedFile, Reach},
     read::read_lossy,
 };
@@ -44,7 +45,7 @@ fn named_images(reach: Reach, mtl: &Path) -> Vec<PathBuf> {
 pub fn library_files(reach: Reach, rest: &str) -> Vec<Checked<NamedFile>> {
     let find = |name: &str| reach.find(reach.root, name.trim_matches('"'));
     match find(rest) {
-        Ok(whole) if whole.path.is_file() => vec![Ok(whole)],
+        Ok(whole) if files::is_file(&whole.path) => vec![Ok(whole)],
         _ => rest.split_whitespace().map(find).collect(),
     }
 }
@@ -52,7 +53,7 @@ pub fn library_files(reach: Reach, rest: &str) -> Vec<Checked<NamedFile>> {
 /// Returns the file of a map. Writers often state absolute names of their own machine: where a name leaves the folder
 /// of the OBJ file, a file of the same name beside the MTL file is taken. A comment may follow the name.
 pub fn map_file(reach: Reach, folder: &Path, name: &str) -> Checked<NamedFile> {
-    let exists = |file: &Checked<NamedFile>| file.as_ref().is_ok_and(|file| file.path.is_file());
+    let exists = |file: &Checked<NamedFile>| file.as_ref().is_ok_and(|file| files::is_file(&file.path));
     let whole = reach.find(folder, name);
     if exists(&whole) {
         return whole;

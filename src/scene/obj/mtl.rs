@@ -15,6 +15,7 @@ use super::{
 };
 use crate::scene::{
     error::{Checked, SceneError},
+    files,
     image_files::Images,
     material::{Alpha, Clearcoat, Material, MaterialSpec, Microfacet, Sheen},
     outside::{Access, NamedFile, Reach},
@@ -70,7 +71,7 @@ pub fn load_libraries(
             let warn = |what: &str| tracing::warn!("{}:{line}: {what}", obj.display());
             match file {
                 Err(what) => warn(&format!("mtllib {}", what.escape_debug())),
-                Ok(NamedFile { path, .. }) if !path.is_file() => {
+                Ok(NamedFile { path, .. }) if !files::is_file(&path) => {
                     warn(&format!("{} does not exist: its materials become the default one", shown(&path)));
                 }
                 Ok(NamedFile { path, is_other_case }) => {

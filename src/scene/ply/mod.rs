@@ -7,7 +7,6 @@ mod quick;
 mod vertex;
 
 use std::{
-    fs,
     io::{self, BufRead, BufReader, Read},
     path::{Path, PathBuf},
 };
@@ -23,6 +22,7 @@ use self::{
 };
 use super::{
     error::Checked,
+    files,
     image_files::{Images, View},
     material::{Material, MaterialSpec},
     mesh::Mesh,
@@ -361,9 +361,7 @@ fn check_indices(mut indices: impl Iterator<Item = i64>, n: usize, what: impl Fn
 
 /// Returns the images that the comments of a file's header name. Names that are refused are left out.
 pub(super) fn named_images(path: &Path, access: Access) -> Vec<PathBuf> {
-    // Reading a device or a pipe might never end.
-    let file = fs::metadata(path).ok().filter(fs::Metadata::is_file).and_then(|_| fs::File::open(path).ok());
-    let reader = file.and_then(|file| PlyReader::from_reader(BufReader::new(file)).ok());
+    let reader = files::open(path).ok().and_then(|file| PlyReader::from_reader(BufReader::new(file)).ok());
     let reach = access.beside(path);
     let comments = reader.map(|reader| reader.header().comments.clone()).unwrap_or_default();
     texture_files(&comments).filter_map(|name| Some(reach.find(reach.root, name).ok()?.path)).collect()

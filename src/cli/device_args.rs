@@ -1,0 +1,89 @@
+//! The argument `--device`, and the devices that it opens.
+
+use std::{collections::BTreeSet, str::FromStr, sync::Arc};
+
+use kdray::gpu::{Context, ContextOptions, DeviceSelector, GpuError, chosen_device, devices};
+
+use super::progress::Progress;
+
+/// Value of `--device` of commands that can use several devices.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum DeviceList {
+    /// All devices of the best one's kind.
+    All,
+    /// The named devices, at least one. A device may be named several times.
+    Named(Vec<DeviceSelector>),
+}
+
+impl FromStr for DeviceList {
+    type Err = String;
+
+    fn from_str(word: &str) -> Result<Self, Self::Err> {
+        match word {
+            "all" => Ok(Self::All),
+            list => list.split(',').map(device).collect::<Result<_, _>>().map(Self::Named),
+        }
+    }
+}
+
+/// Parses a device selector: an index if the word is a number, else a part of a name.
+pub fn device(word: &str) -> Result<DeviceSelector, String> {
+    match word.parse() {
+        Ok(index) => Ok(DeviceSelector::Index(index)),
+        Err(_) if word.trim().is_empty() => Err("expected an index or a name".into()),
+        Err(_) => Ok(DeviceSelector::Name(word.to_owned())),
+    }
+}
+
+/// Opens the selected device. If the user selected none and the best device is a software driver, a note says so.
+pub fn open_device(options: &ContextOptions, progress: &Progress) -> Result<Arc<Context>, GpuError> {
+    let context = Context::new(options)?;
+    if options.device.is_none() && context.is_software() {
+        progress.note(&format!("no GPU found, rendering in software on {}", context.info().name));
+    }
+    Ok(context)
+}
+
+/// Opens the devices of the list, or the best device if there is no list. If they are of several kinds, a note says
+/// what follows from that.
+pub fn open_devices(
+    list: Option<&DeviceList>,
+    validate: bool,
+    progress: &Progress,
+) -> Result<Vec<Arc<Context>>, GpuError> {
+    let selectors = match list {
+        None => vec![None],
+        Some(DeviceList::Named(named)) => named.iter().cloned().map(Some).collect(),
+        Some(DeviceList::All) => {
+            let best = chosen_device(None)?;
+            let is_equal = |(name, driver)| name == best.name && driver == best.driver;
+            let equal = devices()?.into_iter().filter(|it| it.missing.is_empty());
+            let equal = equal.filter(|it| is_equal((it.name.clone(), it.driver.clone())));
+            equal.map(|it| Some(DeviceSelector::Index(it.index))).collect()
+        }
+    };
+    let open = |selector| open_device(&ContextOptions::new(selector, validate), progress);
+    let contexts = selectors.into_iter().map(open).collect::<Result<Vec<_>, _>>()?;
+    let kinds: BTreeSet<String> =
+        contexts.iter().map(|it| format!("{}, {}", it.info().name, it.info().driver)).collect();
+    if kinds.len() > 1 {
+        let kinds = kinds.into_iter().collect::<Vec<_>>().join("; ");
+        progress.note(&format!("the devices are of several kinds, which may round in different ways: {kinds}"));
+    }
+    Ok(contexts)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lists_of_devices() {
+        let list = |word: &str| word.parse::<DeviceList>();
+        let named = |word: &str| DeviceSelector::Name(word.to_owned());
+        assert_eq!(list("all"), Ok(DeviceList::All));
+        assert_eq!(list("0"), Ok(DeviceList::Named(vec![DeviceSelector::Index(0)])));
+        assert_eq!(list("1,RTX"), Ok(DeviceList::Named(vec![DeviceSelector::Index(1), named("RTX")])));
+        assert!(list("").is_err() && list("0,,1").is_err());
+    }
+}

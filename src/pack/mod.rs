@@ -1,0 +1,173 @@
+//! Makes a pack: one file with everything that a scene is read from. What a pack is, and how it is read, is in
+//! `src/scene/pack`.
+
+use std::{
+    fs::File,
+    io::{self, Read, Write},
+    path::{Path, PathBuf},
+};
+
+use zip::{CompressionMethod, ZipWriter, write::SimpleFileOptions};
+
+use crate::{
+    output::{self, OutputError},
+    scene::{
+        CameraPath, LoadOptions, Scene, SceneError,
+        pack::{MANIFEST, Manifest, PackedFile, name_of, normalized, pack_of},
+        source_files_with,
+    },
+};
+
+/// Endings of files that do not become smaller.
+const COMPRESSED: [&str; 9] = ["png", "jpg", "jpeg", "webp", "exr", "zip", "gz", "ktx2", "basis"];
+
+/// Why a pack that was written is refused.
+const OTHER_SCENE: &str = "is another scene when it is read from its pack: a file has changed meanwhile, or one is \
+                           named in a way that only this computer knows";
+
+/// What a pack has.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Packed {
+    /// The hash of the pack: packs of the same files have the same hash.
+    pub hash: String,
+    /// The names of the files in the pack, and their sizes in bytes.
+    pub files: Vec<(String, u64)>,
+}
+
+/// The reason why a pack cannot be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PackError {
+    /// The scene cannot be loaded.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A scene or a file of it cannot be packed.
+    #[error("{path}: {message}")]
+    Refused {
+        /// The scene's file, or the file that cannot be packed.
+        path: PathBuf,
+        /// What is wrong.
+        message: String,
+    },
+    /// The pack cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+}
+
+/// Writes a pack of a scene and, if it is given, of the path along which its camera moves. The pack is read again and
+/// has to give the same scene; otherwise nothing is written.
+///
+/// # Errors
+/// The scene cannot be loaded, or names files that do not exist; a file has a name that is not UTF-8; the pack cannot be
+/// written, or gives another scene.
+pub fn pack(
+    scene_file: &Path,
+    path_file: Option<&Path>,
+    options: &LoadOptions,
+    output: &Path,
+) -> Result<Packed, PackError> {
+    let failed = |message: String| PackError::Refused { path: scene_file.to_owned(), message };
+    if pack_of(scene_file).is_some() {
+        return Err(failed("is in a pack already".to_owned()));
+    }
+    let scene = Scene::load_with(scene_file, options)?;
+    let mut files = source_files_with(scene_file, options);
+    if let Some(path) = path_file {
+        CameraPath::load(path)?;
+        files.push(path.to_owned());
+    }
+    let missing: Vec<_> = files.iter().filter(|file| !file.is_file()).map(|file| file.display().to_string()).collect();
+    if !missing.is_empty() {
+        return Err(failed(format!("names files that do not exist: {}", missing.join(", "))));
+    }
+    let sources = Sources::new(files).map_err(failed)?;
+    let mut manifest = Manifest::new(sources.name(scene_file).map_err(failed)?);
+    (manifest.scene_name, manifest.camera) = (options.scene.clone(), options.camera.clone());
+    manifest.path = path_file.map(|path| sources.name(path)).transpose().map_err(failed)?;
+    if options.allow_outside {
+        let folder = sources.folder.to_str().ok_or_else(|| failed("its folder's name is not UTF-8".to_owned()))?;
+        manifest.folder = Some(folder.to_owned());
+    }
+    for (name, path) in &sources.files {
+        manifest.files.push(
+            described(name, path)
+                .map_err(|error| PackError::Refused { path: path.clone(), message: error.to_string() })?,
+        );
+    }
+    let manifest = manifest.sealed();
+    let check = |written: &Path| {
+        let packed = Scene::load_with(written, &LoadOptions { look: options.look.clone(), ..LoadOptions::default() });
+        match packed {
+            Ok(packed) if packed == scene => Ok(()),
+            Ok(_) => Err(failed(OTHER_SCENE.to_owned())),
+            Err(error) => Err(failed(format!("cannot be read from its pack: {error}"))),
+        }
+    };
+    output::write_checked::<PackError>(output, |file| write(file, &manifest, &sources), check)?;
+    let files = manifest.files.into_iter().map(|file| (file.name, file.n_bytes)).collect();
+    Ok(Packed { hash: manifest.hash, files })
+}
+
+/// The files of a pack.
+struct Sources {
+    /// The folder below which all of them are.
+    folder: PathBuf,
+    /// Names in the pack and paths, sorted by name.
+    files: Vec<(String, PathBuf)>,
+}
+
+impl Sources {
+    fn new(paths: Vec<PathBuf>) -> Result<Self, String> {
+        let absolutes = paths.iter().map(|path| absolute(path)).collect::<Result<Vec<_>, _>>()?;
+        let first = absolutes.first().ok_or("has no files")?;
+        let holds_all = |folder: &&Path| absolutes.iter().all(|path| path.starts_with(folder) && path != folder);
+        let folder = first.ancestors().find(holds_all).ok_or("its files are in no common folder")?.to_owned();
+        let mut sources = Self { folder, files: Vec::new() };
+        for path in paths {
+            sources.files.push((sources.name(&path)?, path));
+        }
+        sources.files.sort();
+        sources.files.dedup_by(|a, b| a.0 == b.0);
+        Ok(sources)
+    }
+
+    /// Returns the name in the pack of a file.
+    fn name(&self, path: &Path) -> Result<String, String> {
+        let absolute = absolute(path)?;
+        let below = absolute.strip_prefix(&self.folder).ok();
+        let name = below.and_then(name_of).filter(|name| name != MANIFEST);
+        name.ok_or_else(|| format!("`{}` is a name that no file of a pack can have", path.display()))
+    }
+}
+
+/// Returns the absolute path without `.` and `..`. Links are kept, because files name each other by them.
+fn absolute(path: &Path) -> Result<PathBuf, String> {
+    let absolute = std::path::absolute(path).ok().and_then(|path| normalized(&path));
+    absolute.ok_or_else(|| format!("`{}` has no absolute path", path.display()))
+}
+
+/// Returns the manifest's entry of a file.
+fn described(name: &str, path: &Path) -> io::Result<PackedFile> {
+    let mut hasher = blake3::Hasher::new();
+    let n_bytes = io::copy(&mut File::open(path)?, &mut hasher)?;
+    Ok(PackedFile { name: name.to_owned(), n_bytes, blake3: hasher.finalize().to_hex().to_string() })
+}
+
+/// Writes the archive.
+fn write(file: &mut File, manifest: &Manifest, sources: &Sources) -> io::Result<()> {
+    let mut archive = ZipWriter::new(io::BufWriter::new(file));
+    // The time of all files is the format's earliest one, so that equal files make equal packs.
+    let options = |name: &str, n_bytes: u64| {
+        let ending = name.rsplit_once('.').map(|(_, ending)| ending.to_ascii_lowercase()).unwrap_or_default();
+        let is_compressed = name == MANIFEST || COMPRESSED.contains(&ending.as_str());
+        let method = if is_compressed { CompressionMethod::Stored } else { CompressionMethod::Deflated };
+        SimpleFileOptions::DEFAULT.compression_method(method).large_file(n_bytes > u64::from(u32::MAX) / 2)
+    };
+    archive.start_file(MANIFEST, options(MANIFEST, 0))?;
+    archive.write_all(&manifest.json())?;
+    for ((name, path), file) in sources.files.iter().zip(&manifest.files) {
+        archive.start_file(name.as_str(), options(name, file.n_bytes))?;
+        io::copy(&mut File::open(path)?.take(file.n_bytes), &mut archive)?;
+    }
+    archive.finish()?.flush()
+}

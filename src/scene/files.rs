@@ -1,0 +1,78 @@
+//! The files that a scene is read from: on disk, or in a pack, which is used like a folder. Here alone, files are opened.
+
+use std::{
+    ffi::OsString,
+    fs,
+    io::{self, Cursor, Read},
+    path::{Path, PathBuf},
+};
+
+use super::pack;
+
+/// Reads a regular file.
+pub(super) fn read(path: &Path) -> io::Result<Vec<u8>> {
+    match pack::place(path) {
+        Some(place) => place?.read(),
+        None => regular(path).and_then(|()| fs::read(path)),
+    }
+}
+
+/// Opens a regular file, of which only the beginning may be needed.
+pub(super) fn open(path: &Path) -> io::Result<Box<dyn Read>> {
+    match pack::place(path) {
+        Some(place) => Ok(Box::new(Cursor::new(place?.read()?))),
+        None => regular(path).and_then(|()| Ok(Box::new(fs::File::open(path)?) as Box<dyn Read>)),
+    }
+}
+
+/// Refuses what is no regular file. Reading a device or a pipe might never end.
+fn regular(path: &Path) -> io::Result<()> {
+    match fs::metadata(path)?.is_file() {
+        true => Ok(()),
+        false => Err(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file")),
+    }
+}
+
+/// Returns the size of a file in bytes, 0 if it cannot be found.
+pub(super) fn n_bytes(path: &Path) -> u64 {
+    match pack::place(path) {
+        Some(place) => place.ok().and_then(|place| place.n_bytes()).unwrap_or(0),
+        None => fs::metadata(path).map_or(0, |metadata| metadata.len()),
+    }
+}
+
+/// Whether the path is that of a regular file.
+pub(super) fn is_file(path: &Path) -> bool {
+    match pack::place(path) {
+        Some(place) => place.is_ok_and(|place| place.n_bytes().is_some()),
+        None => path.is_file(),
+    }
+}
+
+/// Whether the path is that of a file or folder.
+pub(super) fn exists(path: &Path) -> bool {
+    match pack::place(path) {
+        Some(place) => place.is_ok_and(|place| place.exists()),
+        None => path.exists(),
+    }
+}
+
+/// Returns the absolute path of a file or folder without links. The empty path is that of the working directory.
+pub(super) fn canonical(path: &Path) -> io::Result<PathBuf> {
+    match pack::place(path) {
+        Some(place) => place?.canonical(),
+        None => fs::canonicalize(if path.as_os_str().is_empty() { Path::new(".") } else { path }),
+    }
+}
+
+/// Returns the names of what a folder has, none if it cannot be listed. The empty path is that of the working
+/// directory.
+pub(super) fn names_in(folder: &Path) -> Vec<OsString> {
+    match pack::place(folder) {
+        Some(place) => place.map_or_else(|_| Vec::new(), |place| place.names()),
+        None => {
+            let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+            fs::read_dir(folder).map_or_else(|_| Vec::new(), |dir| dir.flatten().map(|it| it.file_name()).collect())
+        }
+    }
+}

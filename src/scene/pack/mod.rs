@@ -1,0 +1,278 @@
+//! Packs: one file with everything that a scene is read from, so that nothing is left behind when it is moved to
+//! another computer.
+//!
+//! A pack is a ZIP archive. Its first file, the manifest, names the scene's file and says what each file has to be. A
+//! pack is used like a folder: `film.kdpack/parts/a.obj` is a file of the pack `film.kdpack`, and files of a pack name
+//! each other as they do on disk. Nothing that is in a pack can name a file on disk.
+
+mod manifest;
+
+use std::{
+    collections::{BTreeSet, HashMap},
+    ffi::OsString,
+    fs::File,
+    io::{self, Read},
+    path::{Component, Path, PathBuf},
+    sync::{Arc, Mutex, OnceLock, PoisonError, Weak},
+    time::SystemTime,
+};
+
+use flate2::read::DeflateDecoder;
+use zip::{CompressionMethod, ZipArchive};
+
+pub(crate) use self::manifest::{MANIFEST, Manifest, PackedFile};
+use super::{
+    LoadOptions,
+    error::{Checked, SceneError},
+};
+use crate::util::memory::require;
+
+/// The ending of a pack's name.
+pub const ENDING: &str = "kdpack";
+/// Size of the largest manifest, bytes.
+const MOST_MANIFEST_BYTES: u64 = 1 << 28;
+
+/// An open pack.
+pub(super) struct Pack {
+    path: PathBuf,
+    archive: Mutex<ZipArchive<File>>,
+    manifest: Manifest,
+    /// Indices into the manifest's files, by their names.
+    by_name: HashMap<String, usize>,
+    /// Why a file that the pack has could not be read, if there is one. Scenes are shown without images that cannot be
+    /// read, but not if a pack is damaged.
+    failure: OnceLock<String>,
+}
+
+/// A file or a folder in a pack, which need not exist.
+pub(super) struct Place {
+    pack: Arc<Pack>,
+    /// Its name in the pack; empty for the pack itself.
+    name: String,
+}
+
+/// The packs that are open now, with the size and the time of their files. A pack stays open as long as someone has it.
+static OPEN: Mutex<Vec<(PathBuf, Stamp, Weak<Pack>)>> = Mutex::new(Vec::new());
+
+/// Tells whether a file is the one that was opened.
+type Stamp = (u64, Option<SystemTime>);
+
+/// Returns whether a file's name is that of a pack.
+fn is_pack_name(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(ENDING))
+}
+
+/// Returns the pack in a path and the rest of the path, if a part of the path is a pack.
+fn split(path: &Path) -> Option<(&Path, &Path)> {
+    let ancestors: Vec<&Path> = path.ancestors().collect();
+    let pack = ancestors.into_iter().rev().find(|part| is_pack_name(part) && part.is_file())?;
+    Some((pack, path.strip_prefix(pack).expect("an ancestor")))
+}
+
+/// Returns the pack that a path leads into.
+pub(crate) fn pack_of(path: &Path) -> Option<&Path> {
+    split(path).map(|(pack, _)| pack)
+}
+
+/// Returns the place in a pack that a path leads to, or `None` for a path that leads into no pack.
+pub(super) fn place(path: &Path) -> Option<io::Result<Place>> {
+    let (pack, rest) = split(path)?;
+    Some(Pack::open(pack).map_err(io::Error::other).and_then(|pack| {
+        let outside = || io::Error::new(io::ErrorKind::NotFound, "the path leads out of the pack");
+        Ok(Place { name: name_of(rest).ok_or_else(outside)?, pack })
+    }))
+}
+
+/// Returns the path in the pack of `root` that stands for an absolute path of the computer on which it was packed.
+/// `None` if `root` is in no pack.
+pub(super) fn absolute(root: &Path, name: &Path) -> Option<PathBuf> {
+    let (pack, _) = split(root)?;
+    let folder = Pack::open(pack).ok().and_then(|pack| pack.manifest.folder.clone());
+    let below = folder.and_then(|folder| Some(normalized(name)?.strip_prefix(folder).ok()?.to_owned()));
+    // A file that the pack does not have: no file has an empty name.
+    Some(pack.join(below.unwrap_or_else(|| PathBuf::from(MANIFEST))))
+}
+
+/// Returns the path without `.` and `..`, or `None` if it leads above its beginning.
+pub(crate) fn normalized(path: &Path) -> Option<PathBuf> {
+    let mut plain = PathBuf::new();
+    for part in path.components() {
+        match part {
+            Component::CurDir => (),
+            Component::ParentDir => {
+                let ends_in_name = matches!(plain.components().next_back(), Some(Component::Normal(_)));
+                (ends_in_name && plain.pop()).then_some(())?;
+            }
+            part => plain.push(part),
+        }
+    }
+    Some(plain)
+}
+
+/// Returns a relative path as a name in a pack, or `None` if it leads out of the pack or is not UTF-8.
+pub(crate) fn name_of(path: &Path) -> Option<String> {
+    let plain = normalized(path)?;
+    let parts: Option<Vec<&str>> = plain.components().map(|part| part.as_os_str().to_str()).collect();
+    Some(parts?.join("/"))
+}
+
+/// A scene in a pack, and what was said about it when it was packed.
+pub(super) struct PackedScene {
+    pack: Arc<Pack>,
+    pub path: PathBuf,
+    pub options: LoadOptions,
+}
+
+/// Opens the pack that a path leads into, if it does.
+pub(super) fn opened(path: &Path) -> Result<Option<Arc<Pack>>, SceneError> {
+    let opened = pack_of(path).map(|path| Pack::open(path).map_err(|what| SceneError::file(path, what)));
+    opened.transpose()
+}
+
+/// Opens a pack. Returns its scene and the options of loading it, to which the user's options are added. `None` if the
+/// path is not that of a pack.
+pub(super) fn scene_of(path: &Path, options: &LoadOptions) -> Result<Option<PackedScene>, SceneError> {
+    if !is_pack_name(path) || path.is_dir() {
+        return Ok(None);
+    }
+    let pack = Pack::open(path).map_err(|what| SceneError::file(path, what))?;
+    let mut options = options.clone();
+    options.scene = options.scene.or_else(|| pack.manifest.scene_name.clone());
+    options.camera = options.camera.or_else(|| pack.manifest.camera.clone());
+    options.allow_outside = pack.manifest.folder.is_some();
+    Ok(Some(PackedScene { path: path.join(&pack.manifest.scene), pack, options }))
+}
+
+/// Returns the file of the camera path that a pack has.
+///
+/// # Errors
+/// The file is no pack, or it is damaged.
+pub fn packed_path(path: &Path) -> Result<Option<PathBuf>, SceneError> {
+    let Some(PackedScene { pack, .. }) = scene_of(path, &LoadOptions::default())? else { return Ok(None) };
+    Ok(pack.manifest.path.as_ref().map(|name| path.join(name)))
+}
+
+impl Pack {
+    /// Opens a pack, unless it is open already. An error is a message for people.
+    fn open(path: &Path) -> Checked<Arc<Self>> {
+        let unread = |error: io::Error| format!("cannot be read: {error}");
+        let metadata = path.metadata().map_err(unread)?;
+        if !metadata.is_file() {
+            return Err("is not a regular file".to_owned());
+        }
+        let stamp = (metadata.len(), metadata.modified().ok());
+        let mut open = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
+        open.retain(|(_, _, pack)| pack.strong_count() > 0);
+        let known = open.iter().find(|(other, time, _)| other == path && *time == stamp);
+        if let Some(pack) = known.and_then(|(_, _, pack)| pack.upgrade()) {
+            return Ok(pack);
+        }
+        let pack = Arc::new(Self::read(path.to_owned(), File::open(path).map_err(unread)?)?);
+        open.push((path.to_owned(), stamp, Arc::downgrade(&pack)));
+        Ok(pack)
+    }
+
+    /// Reads the list of files and the manifest.
+    fn read(path: PathBuf, file: File) -> Checked<Self> {
+        let archive = ZipArchive::new(file).map_err(|error| format!("is no pack: {error}"))?;
+        let mut pack = Self {
+            path,
+            archive: Mutex::new(archive),
+            manifest: Manifest::new(String::new()),
+            by_name: HashMap::new(),
+            failure: OnceLock::new(),
+        };
+        let json = pack.content(MANIFEST, MOST_MANIFEST_BYTES).map_err(|error| format!("is no pack: {error}"))?;
+        pack.manifest = Manifest::of_json(&json)?;
+        pack.by_name = (pack.manifest.files.iter().enumerate()).map(|(ix, file)| (file.name.clone(), ix)).collect();
+        Ok(pack)
+    }
+
+    /// Returns the content of a file of the archive, which has at most `most` bytes.
+    fn content(&self, name: &str, most: u64) -> io::Result<Vec<u8>> {
+        let (method, packed) = {
+            // Others may decompress their files at the same time.
+            let mut archive = self.archive.lock().unwrap_or_else(PoisonError::into_inner);
+            let ix = archive.index_for_name(name).ok_or(io::ErrorKind::NotFound)?;
+            let mut file = archive.by_index_raw(ix)?;
+            // What a file states of its size may be wrong.
+            let n_bytes = self.path.metadata()?.len().min(file.compressed_size());
+            require("reading a pack", n_bytes).map_err(io::Error::other)?;
+            let mut packed = Vec::new();
+            file.read_to_end(&mut packed)?;
+            (file.compression(), packed)
+        };
+        let mut content = Vec::new();
+        match method {
+            CompressionMethod::Stored => content = packed,
+            CompressionMethod::Deflated => {
+                DeflateDecoder::new(&packed[..]).take(most.saturating_add(1)).read_to_end(&mut content)?;
+            }
+            method => return Err(io::Error::other(format!("files packed by {method} are not read"))),
+        }
+        if content.len() as u64 > most { Err(io::Error::other("it is larger than stated")) } else { Ok(content) }
+    }
+
+    /// Returns an error if a file could not be read since the pack is open.
+    pub fn check(&self) -> Result<(), SceneError> {
+        self.failure.get().map_or(Ok(()), |what| Err(SceneError::file(&self.path, what)))
+    }
+
+    fn file(&self, name: &str) -> Option<&PackedFile> {
+        self.by_name.get(name).map(|ix| &self.manifest.files[*ix])
+    }
+}
+
+impl Place {
+    /// Reads the file, which has to be what the manifest says.
+    pub fn read(&self) -> io::Result<Vec<u8>> {
+        let file = self.pack.file(&self.name);
+        let file = file.ok_or_else(|| io::Error::new(io::ErrorKind::NotFound, "the pack does not have it"))?;
+        self.read_file(file).inspect_err(|error| {
+            let _ = self.pack.failure.set(format!("{}: {error}", file.name));
+        })
+    }
+
+    fn read_file(&self, file: &PackedFile) -> io::Result<Vec<u8>> {
+        require("reading a file of a pack", file.n_bytes).map_err(io::Error::other)?;
+        let content = self.pack.content(&file.name, file.n_bytes)?;
+        let mut hasher = blake3::Hasher::new();
+        let hash = hasher.update_rayon(&content).finalize().to_hex();
+        if content.len() as u64 == file.n_bytes && hash.as_str() == file.blake3 {
+            Ok(content)
+        } else {
+            Err(io::Error::new(io::ErrorKind::InvalidData, "it is damaged: it is not what was packed"))
+        }
+    }
+
+    /// Returns the size of the file in bytes, or `None` if there is none.
+    pub fn n_bytes(&self) -> Option<u64> {
+        self.pack.file(&self.name).map(|file| file.n_bytes)
+    }
+
+    /// Whether it is a file, or a folder with files.
+    pub fn exists(&self) -> bool {
+        self.n_bytes().is_some() || !self.names().is_empty()
+    }
+
+    /// Returns the absolute path.
+    pub fn canonical(&self) -> io::Result<PathBuf> {
+        let pack = self.pack.path.canonicalize()?;
+        match self.exists() {
+            true => Ok(if self.name.is_empty() { pack } else { pack.join(&self.name) }),
+            false => Err(io::ErrorKind::NotFound.into()),
+        }
+    }
+
+    /// Returns the names of the files and folders in a folder.
+    pub fn names(&self) -> Vec<OsString> {
+        let below = |file: &PackedFile| match self.name.is_empty() {
+            true => Some(file.name.clone()),
+            false => Some(file.name.strip_prefix(&self.name)?.strip_prefix('/')?.to_owned()),
+        };
+        let rests = self.pack.manifest.files.iter().filter_map(below);
+        let names: BTreeSet<OsString> =
+            rests.map(|rest| rest.split('/').next().unwrap_or_default().to_owned().into()).collect();
+        names.into_iter().collect()
+    }
+}

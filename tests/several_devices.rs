@@ -1,0 +1,162 @@
+//! Tests of pictures that several devices draw together. A software device that is opened twice stands in for two.
+
+mod support;
+
+use std::{fs, path::Path, sync::Arc};
+
+use kdray::{
+    engine::{Engine, choices::Workload},
+    frame::{Denoise, Goal, Integrator, Picture, RenderOptions, Watcher},
+    gpu::Context,
+    scene::Scene,
+    world::World,
+};
+use support::{
+    assert_silent,
+    command::{cornell, fail, stderr, stdout, succeed},
+    device,
+};
+use tempfile::TempDir;
+
+fn world(options: &RenderOptions) -> World {
+    let scene = Scene::load(cornell().as_ref()).unwrap();
+    let workload = Workload::of_pictures(options, scene.lights.len(), 1);
+    Engine::on_cpu().build(scene, &workload).unwrap().world
+}
+
+/// Draws two pictures one after the other, the second by speeds that the first has shown.
+fn draw(
+    contexts: Vec<Arc<Context>>,
+    world: &World,
+    options: &RenderOptions,
+    n_samples: u32,
+) -> [(Picture, kdray::frame::Drawn); 2] {
+    let engine = Engine::on_devices(contexts);
+    let mut renderer = engine.renderer(world, options).unwrap();
+    let camera = world.scene().camera;
+    [(), ()].map(|()| {
+        let mut samples = Samples::default();
+        let drawn = renderer.draw(&camera, Goal::Samples(n_samples), &mut samples).unwrap();
+        assert_eq!(samples.n_samples, n_samples, "the watcher is told of each sample of the whole picture");
+        assert!(samples.last_part <= 1.0);
+        (renderer.picture().unwrap().into_owned(), drawn)
+    })
+}
+
+#[derive(Default)]
+struct Samples {
+    n_samples: u32,
+    last_part: f32,
+}
+
+impl Watcher for &mut Samples {
+    fn part(&mut self, share: f32) {
+        self.last_part = share;
+    }
+
+    fn sample(&mut self) {
+        self.n_samples += 1;
+    }
+}
+
+/// Pictures of all kinds have the bits of one device's: those whose samples are shared, and those whose rows are.
+#[test]
+fn pictures_have_the_bits_of_one_device() {
+    let of_paths = RenderOptions { integrator: Integrator::Path, max_depth: 3, ..RenderOptions::default() };
+    let paper = Denoise::Paper { threshold: 0.5 };
+    for (options, n_samples) in [
+        (RenderOptions { denoise: Denoise::Off, ..of_paths.clone() }, 72),
+        (RenderOptions { denoise: Denoise::Off, ..of_paths.clone() }, 8),
+        (RenderOptions { denoise: paper, crop: Some("3,5,40,33".parse().unwrap()), ..of_paths.clone() }, 48),
+        (RenderOptions { denoise: Denoise::Edge, ..of_paths.clone() }, 32),
+        (RenderOptions { denoise: Denoise::Off, features: true, ..of_paths }, 32),
+        (RenderOptions { denoise: paper, features: true, ..RenderOptions::default() }, 3),
+        (RenderOptions { crop: Some("0,1,48,2".parse().unwrap()), ..RenderOptions::default() }, 1),
+    ] {
+        let options = RenderOptions { width: 48, height: 36, profile: true, ..options };
+        let world = world(&options);
+        let contexts = [device(), device(), device()];
+        let [one, _] = draw(contexts[..1].to_vec(), &world, &options, n_samples);
+        for several in [&contexts[..2], &contexts] {
+            for (picture, drawn) in draw(several.to_vec(), &world, &options, n_samples) {
+                assert!(picture == one.0, "{options:?}");
+                assert!(drawn.features == one.1.features, "{options:?}");
+                assert_eq!(drawn.n_samples, n_samples);
+                let rays = |drawn: &kdray::frame::Drawn| drawn.profile.bounces[0].n_rays;
+                assert!(rays(&drawn) >= rays(&one.1), "all rays are counted");
+                assert!(drawn.profile.device.starts_with(&format!("{} x ", several.len())));
+            }
+        }
+        contexts.iter().for_each(|context| assert_silent(context));
+    }
+}
+
+/// The comparison can fail: other samples make another picture.
+#[test]
+fn other_samples_make_another_picture() {
+    let options = RenderOptions { integrator: Integrator::Path, denoise: Denoise::Off, ..RenderOptions::default() };
+    let options = RenderOptions { width: 24, height: 18, max_depth: 2, ..options };
+    let world = world(&options);
+    let mut renderer = Engine::on_devices(vec![device(), device()]).renderer(&world, &options).unwrap();
+    let camera = world.scene().camera;
+    let range = |word: &str| word.parse().unwrap();
+    let (_, first) = renderer.draw_range(&camera, range("0-64"), || ()).unwrap();
+    let (_, later) = renderer.draw_range(&camera, range("64-128"), || ()).unwrap();
+    assert!(first.mean() != later.mean());
+    let mut alone = Engine::on_device(device()).renderer(&world, &options).unwrap();
+    let (_, same) = alone.draw_range(&camera, range("64-128"), || ()).unwrap();
+    assert!(later == same);
+}
+
+#[test]
+fn a_device_that_fails_leaves_its_work_to_the_others() {
+    for (integrator, n_samples) in [(Integrator::Path, 64), (Integrator::Whitted, 1)] {
+        let options = RenderOptions { integrator, denoise: Denoise::Off, max_depth: 2, ..RenderOptions::default() };
+        let options = RenderOptions { width: 32, height: 24, ..options };
+        let world = world(&options);
+        let [(one, _), _] = draw(vec![device()], &world, &options, n_samples);
+        let contexts = [device(), device()];
+        let mut renderer = Engine::on_devices(contexts.to_vec()).renderer(&world, &options).unwrap();
+        let camera = world.scene().camera;
+        contexts[1].fail_creations_after(Some(0));
+        renderer.draw(&camera, Goal::Samples(n_samples), || ()).unwrap();
+        assert!(*renderer.picture().unwrap() == one);
+        // It is not asked again.
+        renderer.draw(&camera, Goal::Samples(n_samples), || ()).unwrap();
+        assert!(*renderer.picture().unwrap() == one);
+        contexts[0].fail_creations_after(Some(0));
+        assert!(renderer.draw(&camera, Goal::Samples(n_samples), || ()).is_err(), "no device is left");
+        contexts.iter().for_each(|context| context.fail_creations_after(None));
+    }
+}
+
+#[test]
+fn the_command_shares_pictures_among_devices() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    let scene = cornell();
+    let render = |output: &str, device: &str, more: &[&str]| {
+        let common = ["render", &scene, "--size", "40x30", "-o", output, "--device", device];
+        succeed(path, &[&common, more].concat())
+    };
+    for more in [&["--spp", "2"][..], &["--integrator", "path", "--spp", "32"], &["--aov", "depth,cost"]] {
+        render("one.png", "0", more);
+        let output = render("two.png", "0,0", more);
+        assert!(stdout(&output).contains("2 devices: the times of passes are sums over all"), "{}", stdout(&output));
+        assert!(stdout(&output).contains(" on 2 x "), "{}", stdout(&output));
+        assert!(!stderr(&output).contains("of several kinds"), "{}", stderr(&output));
+        assert!(bytes(path, "one.png") == bytes(path, "two.png"), "{more:?}");
+    }
+    render("all.png", "all", &["--aov", "depth,cost"]);
+    assert!(bytes(path, "one.png") == bytes(path, "all.png"));
+    let refused = |more: &[&str], named: &str| {
+        fail(path, &[&["render", &scene, "--size", "8x6", "--device", "0,0"], more].concat(), 2, named);
+    };
+    refused(&["--time", "1s"], "--time needs a single device");
+    refused(&["--trace", "t.json"], "--trace needs a single device");
+    fail(path, &["render", &scene, "--device", "0,none"], 4, "no Vulkan device `none`");
+}
+
+fn bytes(directory: &Path, name: &str) -> Vec<u8> {
+    fs::read(directory.join(name)).unwrap()
+}
