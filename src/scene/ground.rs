@@ -1,6 +1,6 @@
 //! The ground below a mesh under the user's sky. The plain of a sky is as far away as the sky itself: nothing stands on
-//! it, and no shadow falls on it. So a mesh file, which has no ground to stand on, gets a disc of the same albedo, which
-//! the eye does not tell from the plain.
+//! it, and no shadow falls on it. So a mesh file, which has no ground to stand on, gets a disc of the same albedo. The
+//! eye does not tell it from the plain.
 
 use glam::{DQuat, DVec3, Vec3};
 

@@ -375,7 +375,8 @@ fn the_users_sky_replaces_all_light() {
     assert!(z.up == Up::Z && z.towards_sun.distance(Vec3::new(x, -depth, y)) < 1e-4, "{z:?}");
 }
 
-/// A bare mesh stands on a ground, which no scene file and no interior gets. A scene file that is made of the mesh has it.
+/// A bare mesh stands on a ground, which no scene file and no interior gets. A scene file that is made of the mesh has
+/// it.
 #[test]
 fn a_mesh_under_the_users_sky_stands_on_a_ground() {
     let sky = Some(SkyChoice { elevation: 40.0, azimuth: None, turbidity: 4.0 });
