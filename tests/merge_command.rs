@@ -217,6 +217,52 @@ fn headers_are_checked_first() {
     refused(patched(&good, &curve("linear"), &curve("curved")), "`curved` is not one of");
 }
 
+/// Returns an OpenEXR file with another text of its record.
+fn with_record(bytes: &[u8], change: impl Fn(&str) -> String) -> Vec<u8> {
+    let head = b"kdray\0string\0";
+    let place = (0..bytes.len()).find(|&place| bytes[place..].starts_with(head)).unwrap() + head.len();
+    let (before, rest) = bytes.split_at(place);
+    let (n_bytes, rest) = rest.split_at(4);
+    let (text, rest) = rest.split_at(u32::from_le_bytes(n_bytes.try_into().unwrap()) as usize);
+    let text = change(std::str::from_utf8(text).unwrap());
+    [before, &(text.len() as u32).to_le_bytes(), text.as_bytes(), rest].concat()
+}
+
+/// Eight channels of 2^29 x 2^29 pixels have a number of bytes that is 0 in 64 bits.
+#[test]
+fn a_size_beyond_64_bits_is_refused() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    render_paths(path, "part.exr", &["--cpu", "--spp", "1", "--aov", "albedo,depth,id"]);
+    let good = fs::read(path.join("part.exr")).unwrap();
+    let side = 1 << 29;
+    let window = |x: i32, y: i32| {
+        let ends = [0, 0, x, y].map(i32::to_le_bytes).concat();
+        [&b"dataWindow\0box2i\0\x10\0\0\0"[..], &ends].concat()
+    };
+    let bytes = patched(&good, &window(39, 29), &window(side - 1, side - 1));
+    let bytes = with_record(&bytes, |record| {
+        let crop = record.replace("0,0,40,30", &format!("0,0,{side},{side}"));
+        let wide = crop.replace("\"width\":40", &format!("\"width\":{side}"));
+        wide.replace("\"height\":30", &format!("\"height\":{side}"))
+    });
+    fs::write(path.join("bad.exr"), bytes).unwrap();
+    fail(path, &["merge", "bad.exr", "-o", "x.exr"], 3, "needs");
+}
+
+/// An error that quotes the file is one line that a terminal can print.
+#[test]
+fn errors_do_not_pass_on_control_characters() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    render_paths(path, "part.exr", &["--cpu", "--spp", "1"]);
+    let good = fs::read(path.join("part.exr")).unwrap();
+    let bytes = with_record(&good, |record| record.replace("\"samples\":\"0-1\"", "\"samples\":\"\u{7f}\""));
+    fs::write(path.join("bad.exr"), bytes).unwrap();
+    let error = kdray::merge::merge(&[path.join("bad.exr")]).unwrap_err().to_string();
+    assert!(error.contains("bad.exr: its record") && !error.chars().any(char::is_control), "{error:?}");
+}
+
 /// No flipped bit of a part gets into a picture.
 #[test]
 fn damage_is_noticed() {

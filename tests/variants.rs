@@ -5,7 +5,7 @@ mod support;
 
 use std::{fmt::Display, sync::Arc};
 
-use glam::{Vec3, vec3};
+use glam::{DVec3, Vec3, vec3};
 use kdray::{
     accel::{
         Query,
@@ -39,6 +39,7 @@ fn scene(triangles: &[Triangle]) -> FlatScene {
     let sun = Light { position: vec3(0.48, 0.6, 0.64), kind: LIGHT_DIRECTIONAL, ..lamp };
     FlatScene {
         name: "variants".into(),
+        origin: DVec3::ZERO,
         triangles: triangles.to_vec(),
         triangle_materials: vec![0; triangles.len()],
         materials: vec![scenes::diffuse(Vec3::ONE)],

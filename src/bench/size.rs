@@ -3,7 +3,7 @@
 
 use std::{sync::Arc, time::Instant};
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use serde::Serialize;
 
 use super::{
@@ -50,6 +50,7 @@ pub fn knot(n_triangles: u32) -> Scene {
     let mesh = generator.build(&TriangleBudget::default()).expect("numbers within its limits and memory");
     Scene {
         name: "knot".to_owned(),
+        origin: DVec3::ZERO,
         meshes: vec![mesh],
         instances: vec![Instance { mesh_ix: 0, transform: Transform::IDENTITY, materials: vec![0] }],
         materials: vec![Material::default()],

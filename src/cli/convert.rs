@@ -21,7 +21,7 @@ pub fn run(args: &ConvertArgs) -> Result<(), CliError> {
         return Err(CliError::Usage(format!("`{path}` exists: --force replaces it")));
     }
     output::check(&args.output)?;
-    let options = LoadOptions { look: args.look.look(), ..args.load.options() };
+    let options = LoadOptions { look: args.look.look(), ..args.load.options_of_pictures() };
     let text = scene_file_of(&args.input, &args.output, &options)?;
     output::write(&args.output, text.as_bytes())?;
     if args.quiet { Ok(()) } else { print(&format!("wrote {path}\n")) }

@@ -22,7 +22,7 @@ pub struct LoadArgs {
 }
 
 impl LoadArgs {
-    /// Loads a scene.
+    /// Loads a scene for rays of the user's, which count from the origin of its file.
     pub fn load(&self, path: &Path) -> Result<Scene, SceneError> {
         Scene::load_with(path, &self.options())
     }
@@ -30,7 +30,12 @@ impl LoadArgs {
     /// Returns the options of loading a scene whose picture has the user's size and look.
     pub fn options_for(&self, picture: &PictureArgs, look: &LookArgs) -> LoadOptions {
         let aspect = picture.size.map(|size| size.width as f32 / size.height as f32);
-        LoadOptions { aspect, look: look.look(), ..self.options() }
+        LoadOptions { aspect, look: look.look(), ..self.options_of_pictures() }
+    }
+
+    /// Returns the options of loading a scene for pictures.
+    pub fn options_of_pictures(&self) -> LoadOptions {
+        LoadOptions { recentre: true, ..self.options() }
     }
 
     /// Returns the options of loading.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use kdray::scene::{LightChoice, Look, MaterialChoice, Preset, Scene, Sky, SkyChoice, Up};
 
 use super::{
@@ -20,11 +20,11 @@ pub struct LookArgs {
     #[arg(help = with_words(UP, Some("auto"), &format!("{}, auto", Up::words())), long_help = up_long_help())]
     pub up: OrAuto<Up>,
     /// Point from which the camera looks, in world space; without --target, it looks at the middle of the scene
-    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = vector, conflicts_with = "camera")]
-    pub eye: Option<Vec3>,
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = point, conflicts_with = "camera")]
+    pub eye: Option<DVec3>,
     /// Point that the middle of the picture shows, in world space
-    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = vector)]
-    pub target: Option<Vec3>,
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = point)]
+    pub target: Option<DVec3>,
     /// Angle between the picture's lower and upper edge, 0.1 to 170 degrees [default: the camera's, else 40, or 60 in
     /// an interior]
     #[arg(long, value_name = "DEGREES", value_parser = fov)]
@@ -79,13 +79,16 @@ fn material_long_help() -> String {
     format!("{MATERIAL}. Images of replaced materials are not read.\n\nPresets:\n{}", Preset::descriptions())
 }
 
-/// Parses three finite numbers with commas between them.
+/// Parses three finite numbers with commas between them, in double precision.
+fn point(word: &str) -> Result<DVec3, String> {
+    let numbers: Option<Vec<f64>> = word.split(',').map(|number| number.trim().parse().ok()).collect();
+    let point = numbers.and_then(|numbers| Some(DVec3::from_array(numbers.try_into().ok()?)));
+    let point = point.filter(|point| point.as_vec3().is_finite());
+    point.ok_or_else(|| "expected three numbers with commas between them, such as 1,0.5,-2".into())
+}
+
 fn vector(word: &str) -> Result<Vec3, String> {
-    let numbers: Option<Vec<f32>> = word.split(',').map(|number| number.trim().parse().ok()).collect();
-    match numbers.as_deref() {
-        Some(&[x, y, z]) if [x, y, z].iter().all(|number| number.is_finite()) => Ok(Vec3::new(x, y, z)),
-        _ => Err("expected three numbers with commas between them, such as 1,0.5,-2".into()),
-    }
+    point(word).map(|point| point.as_vec3())
 }
 
 fn fov(word: &str) -> Result<f32, String> {

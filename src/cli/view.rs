@@ -7,7 +7,8 @@ use kdray::{
     frame::{RenderOptions, View},
     gpu::{ContextOptions, chosen_device},
     output::{self, Format, OutputError},
-    scene::{self, Camera, CameraPath, RenderDefaults, Scene},
+    scene::{self, CameraPath, RenderDefaults, Scene},
+    util::{self, progress::Work},
     view::{Display, LoadOptions, LoadedScene, Opened, Opener, Settings, Tour, ViewOptions, ViewReport},
 };
 use serde::Serialize;
@@ -89,23 +90,26 @@ fn opener(args: &ViewArgs, processor: Processor) -> Opener {
     // The camera and the scene on the command line are those of the first file.
     let look = scene::Look { eye: None, target: None, ..first.look };
     let load_options = scene::LoadOptions { scene: None, camera: None, look, ..first };
-    Arc::new(move |path| open(path, &load_options, &picture, processor).map_err(|error| error.to_string()))
+    Arc::new(move |path, progress| {
+        open(path, (&load_options, progress), &picture, processor).map_err(|error| error.to_string())
+    })
 }
 
 fn open(
     path: &Path,
-    scene_options: &scene::LoadOptions,
+    (scene_options, progress): (&scene::LoadOptions, util::progress::Progress),
     picture: &PictureArgs,
     processor: Processor,
 ) -> Result<Opened, CliError> {
-    let scene = Scene::load_with(path, scene_options)?;
+    let observed = scene::LoadOptions { progress: progress.clone(), ..scene_options.clone() };
+    let scene = Scene::load_with(path, &observed)?;
     let mut options = picture.options(&scene.defaults);
     scene.warn_of_missing_light(path, options.integrator);
     let (request, workload) = (picture.request(), Workload::of_window((options.width, options.height)));
     let accel = request.choose_accel(processor, scene.n_triangles(), &workload);
     build::check_memory(accel, scene.n_triangles())?;
     let load_options = LoadOptions { request, processor, workload, scene: scene_options.clone() };
-    let loaded = LoadedScene::with_tree(path, scene, &load_options);
+    let loaded = LoadedScene::with_tree(path, scene, &load_options, &progress);
     picture.meter(&loaded.world, &mut options);
     Ok(Opened { loaded, options })
 }
@@ -121,12 +125,16 @@ struct Start {
 fn load(args: &ViewArgs, path: &Path, progress: &Progress) -> Result<Start, CliError> {
     let scene_options = args.load.options_for(&args.picture, &args.look);
     let loading = format!("loading {}", path.display());
-    let (scene, _) = progress.stage(&loading, || Scene::load_with(path, &scene_options));
+    let observed = scene::LoadOptions {
+        progress: progress.observer(&loading, &[Work::Reading, Work::Images]),
+        ..scene_options.clone()
+    };
+    let (scene, _) = progress.stage(&loading, || Scene::load_with(path, &observed));
     let scene = scene?;
     scene.warn_of_missing_light(path, args.picture.options(&scene.defaults).integrator);
     args.look.note_up(path, &scene).into_iter().for_each(|note| progress.note(&note));
     let mut options = args.picture.options(&scene.defaults);
-    let tour = tour(args, scene.camera)?;
+    let tour = tour(args, &scene)?;
     let workload = match &tour {
         Some(tour) => {
             let n_pictures = u64::from(tour.n_frames()) * u64::from(n_samples(args, true));
@@ -139,7 +147,8 @@ fn load(args: &ViewArgs, path: &Path, progress: &Progress) -> Result<Start, CliE
     let accel = load_options.request.choose_accel(processor, scene.n_triangles(), &workload);
     build::check_memory(accel, scene.n_triangles())?;
     let building = build::building(accel, scene.n_triangles());
-    let (loaded, _) = progress.stage(&building, || LoadedScene::with_tree(path, scene, &load_options));
+    let observer = progress.observer(&building, &[Work::Building]);
+    let (loaded, _) = progress.stage(&building, || LoadedScene::with_tree(path, scene, &load_options, &observer));
     args.picture.meter(&loaded.world, &mut options).into_iter().for_each(|note| progress.note(&note));
     Ok(Start { loaded, options, tour })
 }
@@ -160,9 +169,9 @@ fn n_samples(args: &ViewArgs, has_tour: bool) -> u32 {
 }
 
 /// Returns the camera tour of `--path` and `--frames`, or none if neither is given.
-fn tour(args: &ViewArgs, start: Camera) -> Result<Option<Tour>, CliError> {
-    let Some(file) = &args.path else { return Ok(args.frames.map(|n_frames| Tour::around(start, n_frames))) };
-    let path = CameraPath::load(file)?;
+fn tour(args: &ViewArgs, scene: &Scene) -> Result<Option<Tour>, CliError> {
+    let Some(file) = &args.path else { return Ok(args.frames.map(|n_frames| Tour::around(scene.camera, n_frames))) };
+    let path = CameraPath::load(file)?.from_origin(scene.origin);
     let n_frames = args.frames.unwrap_or((path.end() - path.begin()).ceil() as u32 + 1);
     let tour = Tour::along(&path, n_frames).ok_or_else(|| {
         let file = file.display();

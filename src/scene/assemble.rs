@@ -91,6 +91,8 @@ fn assemble(file: &File, description: Description, options: &LoadOptions) -> Res
     let has_beyond = description.environment.is_some() || description.sky.is_some();
     let lacks = Lacks {
         up: Up::Y,
+        // The file says what there is.
+        ground: false,
         camera: description.camera.is_none() && description.cameras.is_empty(),
         light: description.light.is_empty() && description.ambient.is_none() && !has_beyond,
         background: description.background.is_none() && !has_beyond,
@@ -101,9 +103,7 @@ fn assemble(file: &File, description: Description, options: &LoadOptions) -> Res
     let replace = replace.transpose()?.unwrap_or_default();
     let mut images = Images::new([&replace[..], &options.look.materials].concat(), &options.progress);
     let indices = add_materials(file, (&mut scene, &mut images), &description.materials)?;
-    for (ix, spec) in description.light.iter().enumerate() {
-        scene.lights.push(file.check(&format!("light {}", ix + 1), spec, light)?);
-    }
+    scene.lights = lights(file, &description.light, DVec3::ZERO)?;
     warn_of_black(file, &scene.lights);
     if let Some(spec) = &description.ambient {
         (scene.ambient, scene.ground) = file.check("ambient", spec, ambient)?;
@@ -131,7 +131,7 @@ fn assemble(file: &File, description: Description, options: &LoadOptions) -> Res
         tables.push(MeshTable { number, span, spec });
     }
     let materials = NamedMaterials::new(&description.materials, indices);
-    let mut placer = Placer::new(file, (scene, images), materials, &tables);
+    let mut placer = Placer::new(file, (scene, images), materials, (&tables, options.recentre));
     placer.read_together(&tables);
     for table in &tables {
         placer.add(table)?;
@@ -146,13 +146,18 @@ fn assemble(file: &File, description: Description, options: &LoadOptions) -> Res
     if scene.n_triangles() == 0 {
         return Err(SceneError::file(file.path, "has no triangles"));
     }
+    if options.recentre {
+        extent::recentre(file.path, &mut scene);
+        scene.lights = lights(file, &description.light, scene.origin)?;
+    }
     extent::check(file.path, scene.bounds())?;
+    let origin = scene.origin;
     for (ix, spec) in description.cameras.iter().enumerate() {
-        let named = file.check(&format!("camera {}", ix + 1), spec, |spec| camera(&spec.camera()))?;
+        let named = file.check(&format!("camera {}", ix + 1), spec, |spec| camera(&spec.camera(), origin))?;
         scene.cameras.push((spec.get_ref().name.clone(), named));
     }
     scene.camera = match (&description.camera, scene.cameras.first()) {
-        (Some(spec), _) => file.check("camera", spec, camera)?,
+        (Some(spec), _) => file.check("camera", spec, |spec| camera(spec, origin))?,
         (None, Some((_, first))) => *first,
         (None, None) => scene.camera,
     };
@@ -230,7 +235,14 @@ fn ambient(spec: &AmbientSpec) -> Checked<(Vec3, Option<Ground>)> {
     }
 }
 
-fn light(spec: &LightSpec) -> Checked<Light> {
+/// Returns the lights. `origin` is the point of the file that is the origin of world space.
+fn lights(file: &File, specs: &[Spanned<LightSpec>], origin: DVec3) -> Result<Vec<Light>, SceneError> {
+    let light = |(number, spec)| file.check(&format!("light {number}"), spec, |spec| light(spec, origin));
+    (1..).zip(specs).map(light).collect()
+}
+
+fn light(spec: &LightSpec, origin: DVec3) -> Checked<Light> {
+    let point = |name, value| point(name, value, origin);
     match *spec {
         LightSpec::Point { position, intensity } => Ok(Light::Point {
             position: point("position", position)?,
@@ -357,10 +369,11 @@ fn normalized(vector: DVec3) -> Vec3 {
     if is_unit { vector.as_vec3() } else { vector.normalize_or_zero().as_vec3() }
 }
 
-pub(super) fn camera(spec: &CameraSpec) -> Checked<Camera> {
+/// Returns a camera. `origin` is the point of its file that is the origin of world space.
+pub(super) fn camera(spec: &CameraSpec, origin: DVec3) -> Checked<Camera> {
     let camera = Camera {
-        eye: point("eye", spec.eye)?,
-        target: point("target", spec.target)?,
+        eye: point("eye", spec.eye, origin)?,
+        target: point("target", spec.target, origin)?,
         up: normalized(finite("up", spec.up.unwrap_or([0.0, 1.0, 0.0]))?),
         projection: projection(spec.vertical_fov, spec.orthographic_height)?,
     };
@@ -384,11 +397,12 @@ fn projection(vertical_fov: Option<f32>, orthographic_height: Option<f32>) -> Ch
     Ok(Projection::Orthographic { height: within("orthographic_height", height, HEIGHTS.0, HEIGHTS.1)? })
 }
 
-/// Checks a point in world space, which must be finite and lie within [`MAX_COORDINATE`].
-fn point(name: &str, value: [f32; 3]) -> Checked<Vec3> {
-    let point = finite(name, value)?.as_vec3();
-    if point.abs().max_element() <= MAX_COORDINATE {
-        Ok(point)
+/// Checks a point of a file, which must be finite and lie within [`MAX_COORDINATE`]. Returns it in world space, whose
+/// origin is another point of the file.
+fn point(name: &str, value: [f64; 3], origin: DVec3) -> Checked<Vec3> {
+    let point = finite(name, value)?;
+    if point.abs().max_element() <= f64::from(MAX_COORDINATE) {
+        Ok((point - origin).as_vec3())
     } else {
         Err(format!("{name} = {value:?} lies beyond {MAX_COORDINATE:e}"))
     }

@@ -64,8 +64,9 @@ pub(super) struct HemispheresSpec {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct CameraSpec {
-    pub eye: [f32; 3],
-    pub target: [f32; 3],
+    /// In double precision, since the scene may be moved to the origin.
+    pub eye: [f64; 3],
+    pub target: [f64; 3],
     pub up: Option<[f32; 3]>,
     /// Angle between the picture's lower and upper edge, degrees; 45 where absent.
     pub vertical_fov: Option<f32>,
@@ -78,8 +79,8 @@ pub(super) struct CameraSpec {
 #[serde(deny_unknown_fields)]
 pub(super) struct NamedCameraSpec {
     pub name: String,
-    eye: [f32; 3],
-    target: [f32; 3],
+    eye: [f64; 3],
+    target: [f64; 3],
     up: Option<[f32; 3]>,
     vertical_fov: Option<f32>,
     orthographic_height: Option<f32>,
@@ -97,16 +98,16 @@ impl NamedCameraSpec {
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub(super) enum LightSpec {
     /// A point light, whose irradiance falls with the square of the distance.
-    Point { position: [f32; 3], intensity: [f32; 3] },
+    Point { position: [f64; 3], intensity: [f32; 3] },
     /// A point light that shines into a cone about `direction`: whole up to `inner_angle` from it, dark beyond
     /// `outer_angle`, both in degrees. In double precision, angles stand for every cosine of single precision.
-    Spot { position: [f32; 3], direction: [f32; 3], intensity: [f32; 3], inner_angle: f64, outer_angle: f64 },
+    Spot { position: [f64; 3], direction: [f32; 3], intensity: [f32; 3], inner_angle: f64, outer_angle: f64 },
     /// A light whose rays all travel along `direction`. With an `angle`, in degrees, it is seen as a disk by `path`.
     Directional { direction: [f32; 3], irradiance: [f32; 3], angle: Option<f32> },
     /// A rectangle that shines along `direction`, for `path`. Its height is along `up`, as far as that is possible; +y
     /// where absent.
     Rectangle {
-        position: [f32; 3],
+        position: [f64; 3],
         direction: [f32; 3],
         up: Option<[f32; 3]>,
         width: f32,
@@ -114,9 +115,9 @@ pub(super) enum LightSpec {
         radiance: [f32; 3],
     },
     /// A disk that shines along `direction`, for `path`.
-    Disk { position: [f32; 3], direction: [f32; 3], radius: f32, radiance: [f32; 3] },
+    Disk { position: [f64; 3], direction: [f32; 3], radius: f32, radiance: [f32; 3] },
     /// A sphere, for `path`.
-    Sphere { position: [f32; 3], radius: f32, radiance: [f32; 3] },
+    Sphere { position: [f64; 3], radius: f32, radiance: [f32; 3] },
 }
 
 /// The image of what rays see that leave the scene.

@@ -3,9 +3,9 @@
 
 use std::path::Path;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
-use super::SceneError;
+use super::{Scene, SceneError};
 
 /// Smallest length of a scene's longest side. Smaller scenes are refused, because products of their coordinates would
 /// underflow.
@@ -29,31 +29,116 @@ pub const MIN_EXTENT: f32 = 1e-8;
 /// that the coordinates have lost: one step is a sixteenth of a pixel in a picture 4096 pixels wide.
 const MIN_STEPS: f64 = 65_536.0;
 
-/// Refuses a scene that is too small to be traced, and warns of one that lies so far from the origin that its
-/// coordinates are coarse. `(min, max)` are the bounds of all triangles, world space.
-pub(super) fn check(path: &Path, (min, max): (Vec3, Vec3)) -> Result<(), SceneError> {
-    let extent = (max.as_dvec3() - min.as_dvec3()).max_element();
-    let largest = min.abs().max(max.abs()).max_element();
-    let spacing = f64::from(largest.next_up()) - f64::from(largest);
-    let is_coarse = extent < MIN_STEPS * spacing;
-    let precision = format!(
-        "its coordinates reach {largest:e}, where single-precision numbers are {spacing:.2e} apart, and its longest \
-         side is {extent:.2e}"
+/// Which point of a mesh file becomes the origin of its mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum MeshOrigin {
+    /// This one.
+    At(DVec3),
+    /// The file's own origin, or a point near the mesh if the mesh is so far from it that single precision is coarse.
+    Near,
+}
+
+impl MeshOrigin {
+    /// Returns the origin with which a file is read first.
+    pub fn first(self) -> DVec3 {
+        match self {
+            Self::At(origin) => origin,
+            Self::Near => DVec3::ZERO,
+        }
+    }
+
+    /// Returns the origin with which a file has to be read again, if there is one. `bounds` are those of the mesh, as
+    /// it has been read with the first origin.
+    pub fn second(self, bounds: (Vec3, Vec3)) -> Option<DVec3> {
+        match self {
+            Self::At(_) => None,
+            Self::Near => Measure::of(bounds).filter(|it| it.is_coarse).map(|it| it.middle),
+        }
+    }
+}
+
+/// The size of a box around points, and what single precision makes of it.
+#[derive(Clone, Copy, Debug)]
+struct Measure {
+    /// The longest side.
+    extent: f64,
+    /// The largest absolute value of a coordinate.
+    largest: f32,
+    /// The distance of the numbers of single precision at the largest coordinate.
+    spacing: f64,
+    is_coarse: bool,
+    /// A point near the middle, of few digits.
+    middle: DVec3,
+}
+
+impl Measure {
+    /// Returns the measure of a box, or `None` if the box is empty.
+    fn of((min, max): (Vec3, Vec3)) -> Option<Self> {
+        if !(min.is_finite() && max.is_finite()) {
+            return None;
+        }
+        let extent = (max.as_dvec3() - min.as_dvec3()).max_element();
+        let largest = min.abs().max(max.abs()).max_element();
+        let spacing = f64::from(largest.next_up()) - f64::from(largest);
+        // Powers of ten are exact from 1 on, so steps below 1 are divisors.
+        let digits = extent.max(spacing).max(f64::from(f32::MIN_POSITIVE)).log10().floor() as i32;
+        let round = |x: f64| match digits >= 0 {
+            true => (x / 10_f64.powi(digits)).round() * 10_f64.powi(digits),
+            false => (x * 10_f64.powi(-digits)).round() / 10_f64.powi(-digits),
+        };
+        let middle = (min.as_dvec3() + max.as_dvec3()) / 2.0;
+        let middle = DVec3::from_array(middle.to_array().map(round));
+        Some(Self { extent, largest, spacing, is_coarse: extent < MIN_STEPS * spacing, middle })
+    }
+
+    fn in_words(&self) -> String {
+        let Self { extent, largest, spacing, .. } = self;
+        format!(
+            "its coordinates reach {largest:e}, where single-precision numbers are {spacing:.2e} apart, and its \
+             longest side is {extent:.2e}"
+        )
+    }
+}
+
+/// Moves a scene to the origin if its coordinates are so large that single precision would lose details, and tells the
+/// user so. The meshes keep the precision that their files have, since transforms are in double precision. Lights and
+/// cameras are left to the caller. `path` is the scene's file.
+pub(super) fn recentre(path: &Path, scene: &mut Scene) {
+    let Some(measure) = Measure::of(scene.bounds()).filter(|it| it.is_coarse && it.largest >= MIN_EXTENT) else {
+        return;
+    };
+    scene.instances.iter_mut().for_each(|it| it.transform = it.transform.moved(-measure.middle));
+    scene.origin = measure.middle;
+    note(path, scene.origin);
+}
+
+/// Tells the user that a scene has another origin than its file.
+pub(super) fn note(path: &Path, origin: DVec3) {
+    let path = path.display();
+    tracing::info!(
+        "{path}: its coordinates are large, so the scene is computed around {:?} of the file",
+        origin.to_array()
     );
+}
+
+/// Refuses a scene that is too small to be traced, and warns of one that lies so far from the origin that its
+/// coordinates are coarse. `bounds` are those of all triangles, world space.
+pub(super) fn check(path: &Path, bounds: (Vec3, Vec3)) -> Result<(), SceneError> {
+    let Some(measure) = Measure::of(bounds) else { return Ok(()) };
+    let Measure { extent, largest, is_coarse, middle, .. } = measure;
     if extent < f64::from(MIN_EXTENT) {
         let cure = if is_coarse && largest >= MIN_EXTENT { "move it to the origin" } else { "scale it up" };
+        let precision = measure.in_words();
         let what = format!("is too small to be traced: {precision}, less than {MIN_EXTENT:e}; {cure}");
         return Err(SceneError::file(path, what));
     }
     if is_coarse {
-        // A few digits are enough for a point near the middle.
-        let step = 10_f64.powf(extent.log10().floor());
-        let middle = (min.as_dvec3() + max.as_dvec3()) / 2.0;
-        let [x, y, z] = (middle / step).round().to_array().map(|n| n * step);
         tracing::warn!(
-            "{}: {precision}: smaller details are lost; `origin = [{x:?}, {y:?}, {z:?}]` in the [[mesh]] table of a \
-             scene file keeps what an OBJ, PLY or STL file has of them",
-            path.display()
+            "{}: {}: smaller details are lost; `origin = {:?}` in the [[mesh]] table of a scene file keeps what an \
+             OBJ, PLY or STL file has of them",
+            path.display(),
+            measure.in_words(),
+            middle.to_array()
         );
     }
     Ok(())

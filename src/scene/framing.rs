@@ -1,12 +1,13 @@
-//! A camera for scenes without one: its picture is filled by the bounding box of the scene.
+//! A camera for scenes without one: its picture is filled by the scene.
 
 use glam::{DVec2, DVec3, Vec3};
+use rayon::prelude::*;
 
-use super::{Camera, Projection};
+use super::{Camera, Instance, Mesh, Projection, Scene};
 
 /// Vertical field of view unless the user states one, degrees.
 pub(super) const VERTICAL_FOV_DEGREES: f32 = 40.0;
-/// Factor on the half width and half height of the picture that the bounding box may fill.
+/// Factor on the half width and half height of the picture that the scene may fill.
 const FILLED: f64 = 0.95;
 
 /// Least half diagonal of a box, in steps of single precision at its coordinates. The eye's coordinates are rounded to
@@ -75,9 +76,9 @@ pub(super) struct Frame {
     pub vertical_fov_degrees: f32,
 }
 
-/// Returns a camera that sees a whole bounding box from outside, and that is as close as it can be. Long and flat
-/// boxes are seen from a direction that shows much of their sides.
-pub(super) fn camera(bounds: (Vec3, Vec3), frame: &Frame) -> Camera {
+/// Returns a camera that sees a whole scene from outside, and that is as close as it can be. If the bounding box is
+/// long or flat, it is seen from a direction that shows much of its sides.
+pub(super) fn camera(scene: &Scene, bounds: (Vec3, Vec3), frame: &Frame) -> Camera {
     let bounds = BoundingBox::new(bounds);
     let usual = View::new(&bounds, USUAL, frame);
     let others: Vec<_> =
@@ -85,11 +86,30 @@ pub(super) fn camera(bounds: (Vec3, Vec3), frame: &Frame) -> Camera {
     let best = others.iter().map(|(_, view)| view.shown).fold(usual.shown, f64::max);
     let is_equal = |(_, view): &&(Direction, View)| view.shown >= EQUALS_BEST * best;
     let nearest = others.iter().filter(is_equal).min_by_key(|(direction, _)| direction.strangeness());
-    let view = match nearest {
-        Some((_, view)) if usual.shown < USUAL_IS_ENOUGH * best => view,
-        _ => &usual,
+    let (direction, view) = match nearest {
+        Some((direction, view)) if usual.shown < USUAL_IS_ENOUGH * best => (*direction, view),
+        _ => (USUAL, &usual),
     };
-    view.camera(frame)
+    // The box's own corners are mostly empty.
+    let of_scene = |directions| support(scene, bounds.centre, directions);
+    if bounds.is_enlarged {
+        view.camera(frame)
+    } else {
+        View::around(&bounds, direction, frame, of_scene).camera(frame)
+    }
+}
+
+/// Returns how far the triangles of a scene reach from a point in some directions, in lengths of each.
+fn support(scene: &Scene, from: DVec3, directions: [DVec3; 4]) -> [f64; 4] {
+    const NOTHING: [f64; 4] = [f64::NEG_INFINITY; 4];
+    let most = |a: [f64; 4], b: [f64; 4]| std::array::from_fn(|ix| a[ix].max(b[ix]));
+    let corners: Vec<Vec<Vec3>> = scene.meshes.par_iter().map(Mesh::corners).collect();
+    let of_instance = |Instance { mesh_ix, transform, .. }: &Instance| {
+        let object = directions.map(|direction| transform.height_in_object_space(direction, from));
+        let of_corner = |p: &Vec3| object.map(|(direction, constant)| direction.dot(p.as_dvec3()) + constant);
+        corners[*mesh_ix].par_iter().map(of_corner).reduce(|| NOTHING, most)
+    };
+    scene.instances.par_iter().map(of_instance).reduce(|| NOTHING, most)
 }
 
 /// Returns a camera that sees a whole bounding box horizontally from outside: from the front, or from an `azimuth` to
@@ -103,6 +123,8 @@ struct BoundingBox {
     centre: DVec3,
     /// Half of its extents.
     half: DVec3,
+    /// Whether it is larger than the box of the scene.
+    is_enlarged: bool,
 }
 
 impl BoundingBox {
@@ -110,10 +132,11 @@ impl BoundingBox {
         let (min, max) = (min.as_dvec3(), max.as_dvec3());
         let (centre, mut half) = ((min + max) / 2.0, (max - min) / 2.0);
         let least = LEAST_STEPS * f64::from(f32::EPSILON) * centre.abs().max_element();
-        if half.length() < least {
+        let is_enlarged = half.length() < least;
+        if is_enlarged {
             half *= least / half.length();
         }
-        Self { centre, half }
+        Self { centre, half, is_enlarged }
     }
 
     /// Returns the corner whose coordinates have the given signs.
@@ -138,27 +161,36 @@ struct View {
 
 impl View {
     /// Returns the view of a box whose eye is as near as the box's corners allow.
+    fn new(bounds: &BoundingBox, direction: Direction, frame: &Frame) -> Self {
+        let corners = bounds.corners().map(|corner| corner - bounds.centre);
+        let most = |direction: DVec3| corners.iter().map(|p| p.dot(direction)).fold(f64::NEG_INFINITY, f64::max);
+        Self::around(bounds, direction, frame, |directions| directions.map(most))
+    }
+
+    /// Returns the view of points whose eye is as near as they allow. `support` returns how far the points reach from
+    /// the centre of their bounding box in some directions, in lengths of each.
     ///
     /// Let x, y and z be the coordinates of a corner to the right, up and forward, and a and b those of the eye to the
     /// right and forward. The corner is in the picture if |x - a| <= t (z - b), where t is the tangent of half the
     /// field of view. So b is at most -(R + L) / 2t, where R is the largest x - t z and L the largest -x - t z. The
     /// middle of the range of a is (R - L) / 2. The vertical works alike, and the smaller of both b counts.
-    fn new(bounds: &BoundingBox, direction: Direction, frame: &Frame) -> Self {
+    fn around(
+        bounds: &BoundingBox,
+        direction: Direction,
+        frame: &Frame,
+        support: impl Fn([DVec3; 4]) -> [f64; 4],
+    ) -> Self {
         let forward = -direction.vector(&frame.axes);
         let right = forward.cross(frame.axes.up).normalize();
         let up = right.cross(forward);
         let tangent = (f64::from(frame.vertical_fov_degrees) / 2.0).to_radians().tan() * FILLED;
         let tangents = DVec2::new(tangent * frame.aspect, tangent);
-        let corners = bounds.corners().map(|corner| corner - bounds.centre);
-        let fit = |axis: DVec3, tangent: f64| {
-            let most = |axis: DVec3| {
-                let slopes = corners.iter().map(|corner| corner.dot(axis) - tangent * corner.dot(forward));
-                slopes.fold(f64::NEG_INFINITY, f64::max)
-            };
-            let (above, below) = (most(axis), most(-axis));
-            ((above - below) / 2.0, -(above + below) / (2.0 * tangent))
-        };
-        let ((x, z_of_width), (y, z_of_height)) = (fit(right, tangents.x), fit(up, tangents.y));
+        let (across, along) = (tangents.x * forward, tangents.y * forward);
+        let [to_right, to_left, to_top, to_bottom] =
+            support([right - across, -right - across, up - along, -up - along]);
+        let fit = |above: f64, below: f64, tangent: f64| ((above - below) / 2.0, -(above + below) / (2.0 * tangent));
+        let (x, z_of_width) = fit(to_right, to_left, tangents.x);
+        let (y, z_of_height) = fit(to_top, to_bottom, tangents.y);
         let z = z_of_width.min(z_of_height);
         let eye = bounds.centre + x * right + y * up + z * forward;
         let to_picture = |point: DVec3| {

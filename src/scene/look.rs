@@ -1,6 +1,6 @@
 //! What the user wants to see in place of what a scene's file states or leaves out.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::{
     Camera, Light, Projection, Scene, Sky, camera::FOV_DEGREES, error::Checked, mesh::MAX_COORDINATE,
@@ -57,10 +57,11 @@ pub struct SkyChoice {
 pub struct Look {
     /// The axis that points up in the picture. Where absent, it is +z for a bare STL file, and else that of the camera.
     pub up: Option<Up>,
-    /// The camera's eye, world space.
-    pub eye: Option<Vec3>,
-    /// The point that the middle of the picture shows, world space. With an eye alone, it is the middle of the scene.
-    pub target: Option<Vec3>,
+    /// The camera's eye in the coordinates of the file: those of world space, unless the scene was moved to the origin.
+    pub eye: Option<DVec3>,
+    /// The point that the middle of the picture shows, in the same coordinates. With an eye alone, it is the middle of
+    /// the scene.
+    pub target: Option<DVec3>,
     /// Angle between the picture's lower and upper edge, degrees, 0.1 to 170. It makes a camera perspective.
     pub vertical_fov_degrees: Option<f32>,
     /// The light, which replaces all lights of the scene. Its ambient light stays.
@@ -91,14 +92,16 @@ impl Look {
             let (min, max) = scene.bounds();
             (min + max) / 2.0
         };
-        let Camera { eye, target, up, projection } = scene.camera;
-        let target = self.target.unwrap_or_else(|| if self.eye.is_some() { centre() } else { target });
+        let Camera { eye, up, projection, .. } = scene.camera;
+        let moved = |point: DVec3| (point - scene.origin).as_vec3();
+        let target = self.target.map(moved);
+        let target = target.unwrap_or_else(|| if self.eye.is_some() { centre() } else { scene.camera.target });
         let fov = self.vertical_fov_degrees;
         if let Some(fov) = fov.filter(|fov| !(FOV_DEGREES.0..=FOV_DEGREES.1).contains(fov)) {
             return Err(format!("a field of view of {fov} degrees is outside {} to {}", FOV_DEGREES.0, FOV_DEGREES.1));
         }
         let camera = Camera {
-            eye: self.eye.unwrap_or(eye),
+            eye: self.eye.map_or(eye, moved),
             target,
             up: self.up.map_or(up, Up::vector),
             projection: fov.map_or(projection, |vertical_fov_degrees| Projection::Perspective { vertical_fov_degrees }),

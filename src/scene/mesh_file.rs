@@ -3,15 +3,17 @@
 
 use std::path::Path;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 use super::{
     error::SceneError,
+    extent::MeshOrigin,
     image_files::Images,
     material::Material,
     mesh::Mesh,
     needs::{require_for_bytes, require_for_text},
-    obj::parse_obj,
+    obj::{ObjFile, obj_mesh, read_obj},
     outside::Access,
     ply::{PlyMesh, ply_mesh},
     read::{lossy_text, read_bytes},
@@ -78,7 +80,7 @@ pub(super) struct Loading<'a> {
     pub shading: Shading,
     /// The point of the file that becomes the origin of the mesh. It is subtracted before coordinates are rounded to
     /// single precision.
-    pub origin: DVec3,
+    pub origin: MeshOrigin,
     /// Number of triangles that the scene has already.
     pub n_loaded: usize,
     /// Which files the mesh file may name.
@@ -92,37 +94,69 @@ pub(super) struct Loaded {
     /// The mesh. The slot of a face is an index into `materials`, or `materials.len()` for a face without a material,
     /// or with one that no library defines.
     pub mesh: Mesh,
+    /// The point of the file that is the origin of the mesh.
+    pub origin: DVec3,
     pub materials: Vec<Material>,
     /// Whether normals depend on the crease angle.
     pub uses_crease: bool,
 }
 
-/// The mesh of a file whose materials are not needed to make it. Several can be made at the same time.
-pub(super) enum Shape {
+/// The content of a file that is not glTF, as far as it needs no other files. Several can be read at the same time.
+pub(super) struct Shape {
+    kind: ShapeKind,
+    /// The point of the file that is the origin of a PLY or STL file's mesh.
+    origin: DVec3,
+}
+
+enum ShapeKind {
+    Obj(ObjFile),
     Ply(PlyMesh),
     Stl(Mesh),
 }
 
 impl Shape {
-    /// Makes the mesh of a PLY or STL file. `n_loaded`: the number of triangles that the scene has already.
+    /// Reads a file's content. `n_loaded`: the number of triangles that the scene has already.
     pub fn parse(
         path: &Path,
         bytes: Vec<u8>,
-        place: (Shading, DVec3),
+        (shading, origin): (Shading, MeshOrigin),
         (n_loaded, progress): (usize, &Progress),
     ) -> Result<Self, SceneError> {
-        let made = match MeshFormat::of(path, &bytes) {
-            MeshFormat::Ply => ply_mesh(&bytes, place, n_loaded, progress).map(Self::Ply),
-            _ => parse_stl(bytes, place, n_loaded).map(Self::Stl),
+        let format = MeshFormat::of(path, &bytes);
+        match format {
+            MeshFormat::Gltf => return Err(SceneError::file(path, "is glTF, which is a whole scene")),
+            MeshFormat::Obj => {
+                let file = read_obj(path, lossy_text(bytes), origin, progress)?;
+                return Ok(Self { kind: ShapeKind::Obj(file), origin: origin.first() });
+            }
+            MeshFormat::Ply | MeshFormat::Stl => {}
+        }
+        let parse = |bytes: Vec<u8>, origin: DVec3| {
+            let made = match format {
+                MeshFormat::Ply => ply_mesh(&bytes, (shading, origin), n_loaded, progress).map(ShapeKind::Ply),
+                _ => parse_stl(bytes, (shading, origin), (n_loaded, progress)).map(ShapeKind::Stl),
+            };
+            made.map(|kind| Self { kind, origin }).map_err(|what| SceneError::file(path, what))
         };
-        made.map_err(|what| SceneError::file(path, what))
+        let made = parse(bytes, origin.first())?;
+        let mesh = match &made.kind {
+            ShapeKind::Ply(ply) => ply.mesh(),
+            ShapeKind::Stl(mesh) => mesh,
+            ShapeKind::Obj(_) => return Ok(made),
+        };
+        match origin.second(bounds_of(mesh.positions.par_iter().copied())) {
+            Some(nearer) => parse(read_mesh(path)?, nearer),
+            None => Ok(made),
+        }
     }
 
-    /// Reads the materials.
+    /// Reads the materials, and makes the mesh if that has not been done.
     pub fn loaded(self, path: &Path, loading: &mut Loading) -> Result<Loaded, SceneError> {
-        let loaded = match self {
-            Self::Ply(ply) => ply.with_materials(path, loading.access, loading.images),
-            Self::Stl(mesh) => Loaded { mesh, materials: Vec::new(), uses_crease: loading.shading.smooth },
+        let Self { kind, origin } = self;
+        let loaded = match kind {
+            ShapeKind::Obj(file) => obj_mesh(path, file, loading)?,
+            ShapeKind::Ply(ply) => Loaded { origin, ..ply.with_materials(path, loading.access, loading.images) },
+            ShapeKind::Stl(mesh) => Loaded { mesh, origin, materials: Vec::new(), uses_crease: loading.shading.smooth },
         };
         match loaded.mesh.faces.is_empty() {
             true => Err(SceneError::file(path, "has no triangles")),
@@ -131,20 +165,15 @@ impl Shape {
     }
 }
 
+/// Returns the least and the greatest coordinates of points.
+pub(super) fn bounds_of(points: impl ParallelIterator<Item = Vec3>) -> (Vec3, Vec3) {
+    let none = || (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    points.map(|p| (p, p)).reduce(none, |a, b| (a.0.min(b.0), a.1.max(b.1)))
+}
+
 /// Makes a mesh from the content of a file that is not glTF, and reads the materials that it names.
 pub(super) fn parse_mesh(path: &Path, bytes: Vec<u8>, loading: &mut Loading) -> Result<Loaded, SceneError> {
-    let failed = |what: String| SceneError::file(path, what);
+    let progress = loading.images.progress().clone();
     let place = (loading.shading, loading.origin);
-    let loaded = match MeshFormat::of(path, &bytes) {
-        MeshFormat::Obj => parse_obj(path, &lossy_text(bytes), loading)?,
-        MeshFormat::Gltf => return Err(failed("is glTF, which is a whole scene".to_owned())),
-        MeshFormat::Ply | MeshFormat::Stl => {
-            let progress = loading.images.progress().clone();
-            return Shape::parse(path, bytes, place, (loading.n_loaded, &progress))?.loaded(path, loading);
-        }
-    };
-    if loaded.mesh.faces.is_empty() {
-        return Err(SceneError::file(path, "has no triangles"));
-    }
-    Ok(loaded)
+    Shape::parse(path, bytes, place, (loading.n_loaded, &progress))?.loaded(path, loading)
 }

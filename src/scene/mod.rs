@@ -16,6 +16,7 @@ mod files;
 mod framing;
 pub mod generate;
 mod gltf;
+pub(crate) mod ground;
 mod image;
 mod image_files;
 mod interior;
@@ -75,6 +76,7 @@ pub use self::{
     transform::Transform,
 };
 use self::{
+    extent::MeshOrigin,
     image_files::Images,
     mesh_file::{Loaded, Loading, MeshFormat},
     outside::Access,
@@ -88,6 +90,9 @@ use crate::util::progress::Progress;
 pub struct Scene {
     /// The file's name without its folder and extension.
     pub name: String,
+    /// The point of the file that is the origin of world space, in the file's coordinates. It is 0, unless the scene
+    /// was moved there ([`LoadOptions::recentre`]).
+    pub origin: DVec3,
     /// Meshes, each of which may have several instances.
     pub meshes: Vec<Mesh>,
     /// Placed meshes. A loaded scene has at least one triangle, all triangles lie within `mesh::MAX_COORDINATE`, and
@@ -131,6 +136,9 @@ pub struct LoadOptions {
     /// Width of the picture divided by its height, which a camera is made for where the file has none. Where absent, it
     /// is that of [`Scene::defaults`].
     pub aspect: Option<f32>,
+    /// Whether a scene is moved to the origin if its coordinates are so large that single precision loses details.
+    /// [`Scene::origin`] says by how much. Cameras and lights of the file and of `look` are moved with it.
+    pub recentre: bool,
     /// What replaces parts of the scene.
     pub look: Look,
     /// Who is told of the progress: of mesh files that are read, and of images that are decoded.
@@ -233,6 +241,11 @@ impl Scene {
     /// # Panics
     /// An index of a mesh or of a position is out of range.
     pub fn bounds(&self) -> (Vec3, Vec3) {
+        self.bounds_of(&self.instances)
+    }
+
+    /// Returns the bounds of some instances.
+    pub(super) fn bounds_of(&self, instances: &[Instance]) -> (Vec3, Vec3) {
         // Instances share the list of their mesh's corners, in which each point is once.
         let corners: Vec<Vec<Vec3>> = self.meshes.par_iter().map(Mesh::corners).collect();
         let none = || (Vec3::INFINITY, Vec3::NEG_INFINITY);
@@ -241,7 +254,7 @@ impl Scene {
             let world = corners[*mesh_ix].par_iter().map(|p| transform.point(*p));
             world.map(|p| (p, p)).reduce(none, joined)
         };
-        self.instances.par_iter().map(of_instance).reduce(none, joined)
+        instances.par_iter().map(of_instance).reduce(none, joined)
     }
 
     /// Adds a mesh and one instance of it. `materials` becomes [`Instance::materials`].
@@ -259,6 +272,7 @@ impl Scene {
     pub(crate) fn empty(path: &Path) -> Self {
         Self {
             name: Self::name_of(path),
+            origin: DVec3::ZERO,
             meshes: Vec::new(),
             instances: Vec::new(),
             materials: Vec::new(),
@@ -296,10 +310,14 @@ fn load_mesh_file(path: &Path, options: &LoadOptions) -> Result<(Scene, Lacks), 
     let mut scene = Scene::empty(path);
     let mut images = Images::new(options.look.materials.clone(), &options.progress);
     let access = Access::of(options);
-    let mut loading =
-        Loading { shading: Shading::default(), origin: DVec3::ZERO, n_loaded: 0, access, images: &mut images };
+    let origin = if options.recentre { MeshOrigin::Near } else { MeshOrigin::At(DVec3::ZERO) };
+    let mut loading = Loading { shading: Shading::default(), origin, n_loaded: 0, access, images: &mut images };
     let (format, head) = (MeshFormat::of(path, &bytes), bytes[..bytes.len().min(up::HEAD_BYTES)].to_vec());
-    let Loaded { mesh, materials, .. } = mesh_file::parse_mesh(path, bytes, &mut loading)?;
+    let Loaded { mesh, materials, origin, .. } = mesh_file::parse_mesh(path, bytes, &mut loading)?;
+    if origin != DVec3::ZERO {
+        scene.origin = origin;
+        extent::note(path, origin);
+    }
     let guess = up::guess(format, &head, &mesh);
     if let (Some(why), None) = (&guess.why, options.look.up) {
         tracing::info!("{}: {why}", path.display());
@@ -309,7 +327,7 @@ fn load_mesh_file(path: &Path, options: &LoadOptions) -> Result<(Scene, Lacks), 
     scene.push_mesh(mesh, Transform::IDENTITY, slots).map_err(|what| SceneError::file(path, what))?;
     extent::check(path, scene.bounds())?;
     scene.defaults.samples = standard::SAMPLES;
-    Ok((scene, Lacks { camera: true, up: guess.up, light: true, background: true, integrator: true }))
+    Ok((scene, Lacks { camera: true, up: guess.up, ground: true, light: true, background: true, integrator: true }))
 }
 
 /// Refuses the choice of a scene for a file that has only one.

@@ -38,8 +38,8 @@ struct KeyframeSpec {
     frame: Option<f64>,
     /// Time in seconds, in place of a frame.
     time: Option<f64>,
-    eye: [f32; 3],
-    target: [f32; 3],
+    eye: [f64; 3],
+    target: [f64; 3],
     up: Option<[f32; 3]>,
     vertical_fov: Option<f32>,
     orthographic_height: Option<f32>,
@@ -50,6 +50,8 @@ struct KeyframeSpec {
 pub struct CameraPath {
     /// Frames per second.
     pub fps: f64,
+    /// The point of the file that is the origin of the cameras.
+    origin: DVec3,
     /// Whether the camera is orthographic, in all frames.
     is_orthographic: bool,
     keyframes: Vec<Keyframe>,
@@ -94,7 +96,13 @@ impl CameraPath {
         if keyframes.is_empty() {
             return Err(SceneError::file(path, "has no [[keyframe]]"));
         }
-        Ok(Self { fps, is_orthographic: first_is, keyframes })
+        Ok(Self { fps, origin: DVec3::ZERO, is_orthographic: first_is, keyframes })
+    }
+
+    /// Returns the path for a scene that was moved to the origin: one whose [`Scene::origin`](super::Scene::origin) is
+    /// this point of the file.
+    pub fn from_origin(self, origin: DVec3) -> Self {
+        Self { origin, ..self }
     }
 
     /// Returns the frame of the first keyframe.
@@ -144,14 +152,15 @@ impl CameraPath {
     }
 
     fn camera_of(&self, pose: &Pose) -> Option<Camera> {
-        let vector = |i: usize| DVec3::from_slice(&pose[i..]).as_vec3().to_array();
+        let point = |i: usize| DVec3::from_slice(&pose[i..]).to_array();
+        let up = DVec3::from_slice(&pose[6..]).as_vec3().to_array();
         // A spline may overshoot its keyframes.
         let (vertical_fov, orthographic_height) = match self.is_orthographic {
             true => (None, Some((pose[9].exp() as f32).clamp(HEIGHTS.0, HEIGHTS.1))),
             false => (Some((pose[9] as f32).clamp(FOV_DEGREES.0, FOV_DEGREES.1)), None),
         };
-        let (eye, target, up) = (vector(0), vector(3), Some(vector(6)));
-        camera(&CameraSpec { eye, target, up, vertical_fov, orthographic_height }).ok()
+        let (eye, target, up) = (point(0), point(3), Some(up));
+        camera(&CameraSpec { eye, target, up, vertical_fov, orthographic_height }, self.origin).ok()
     }
 }
 
@@ -174,10 +183,10 @@ fn keyframe(spec: &KeyframeSpec, fps: f64, before: Option<f64>) -> Checked<Keyfr
     }
     let KeyframeSpec { eye, target, up, vertical_fov, orthographic_height, .. } = *spec;
     let spec = CameraSpec { eye, target, up, vertical_fov, orthographic_height };
-    let Camera { eye, target, up, projection } = camera(&spec)?;
+    let Camera { up, projection, .. } = camera(&spec, DVec3::ZERO)?;
     let mut pose = [0.0; 10];
-    for (numbers, vector) in pose.chunks_exact_mut(3).zip([eye, target, up]) {
-        numbers.copy_from_slice(&vector.as_dvec3().to_array());
+    for (numbers, vector) in pose.chunks_exact_mut(3).zip([eye, target, up.as_dvec3().to_array()]) {
+        numbers.copy_from_slice(&vector);
     }
     pose[9] = match projection {
         Projection::Perspective { vertical_fov_degrees } => f64::from(vertical_fov_degrees),

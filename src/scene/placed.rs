@@ -11,10 +11,11 @@ use glam::{DVec3, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::{
-    Instance, LoadOptions, Look, Material, Scene, SceneError, Transform,
+    Instance, LoadOptions, Look, Material, MaterialChoice, Scene, SceneError, Transform,
     assemble::File,
     description::{CommonSpec, MeshSpec, Source},
     error::Checked,
+    extent::MeshOrigin,
     files,
     generate::{Generator, TriangleBudget},
     gltf,
@@ -52,6 +53,8 @@ struct Reading {
     uv_scale: Option<[u32; 2]>,
     /// Bits of the coordinates of the point that becomes the mesh's origin.
     origin: Option<[u64; 3]>,
+    /// Whether the mesh gets an origin of its own if it is far from 0 and the table states no `origin`.
+    recentre: bool,
 }
 
 /// A mesh file whose meshes are in the scene.
@@ -70,11 +73,38 @@ struct Read {
 enum Content {
     /// A mesh.
     Shape(Box<Result<Shape, SceneError>>),
+    /// A glTF file.
+    Model(Box<Result<gltf::Model, SceneError>>),
     /// Bytes, since their format is not the one that the file's name tells.
     Bytes(Vec<u8>),
 }
 
-/// Bytes of memory that reading a byte of a PLY or STL file takes.
+/// How glTF files are loaded.
+#[derive(Clone, Copy)]
+struct Models<'a> {
+    /// Which materials are replaced.
+    replaced: &'a [MaterialChoice],
+    allow_outside: bool,
+    /// The readings whose materials some table shows.
+    with_materials: &'a HashSet<Reading>,
+}
+
+impl Models<'_> {
+    /// Loads the meshes of a file. `before`: what the scene has already.
+    fn load(
+        &self,
+        reading: &Reading,
+        bytes: Vec<u8>,
+        (before, progress): (gltf::LoadedBefore, &Progress),
+    ) -> Result<gltf::Model, SceneError> {
+        let look = Look { materials: self.replaced.to_vec(), ..Look::default() };
+        let (scene, allow_outside, progress) = (reading.scene.clone(), self.allow_outside, progress.clone());
+        let options = LoadOptions { scene, allow_outside, look, progress, ..LoadOptions::default() };
+        gltf::load_meshes(&reading.path, bytes, &options, self.with_materials.contains(reading), before)
+    }
+}
+
+/// Bytes of memory that reading a byte of a file takes.
 const READING_BYTES: u64 = 10;
 
 /// Adds the meshes of a scene file to its scene.
@@ -90,6 +120,8 @@ pub(super) struct Placer<'a> {
     shapes: HashMap<Reading, Result<Content, SceneError>>,
     /// The readings whose materials some table shows.
     with_materials: HashSet<Reading>,
+    /// Whether meshes that are far from 0 get an origin of their own.
+    recentre: bool,
 }
 
 impl<'a> Placer<'a> {
@@ -98,11 +130,12 @@ impl<'a> Placer<'a> {
         file: &'a File<'a>,
         (scene, images): (Scene, Images),
         materials: NamedMaterials<'a>,
-        tables: &[MeshTable],
+        (tables, recentre): (&[MeshTable], bool),
     ) -> Self {
         let has_own =
             |table: &&MeshTable| table.spec.common.material.is_none() && table.spec.common.materials.is_empty();
-        let with_materials = tables.iter().filter(has_own).filter_map(|table| Reading::of(file, &table.spec).ok()?);
+        let with_materials = tables.iter().filter(has_own);
+        let with_materials = with_materials.filter_map(|table| Reading::of(file, &table.spec, recentre).ok()?);
         let with_materials = with_materials.collect();
         Self {
             file,
@@ -113,32 +146,49 @@ impl<'a> Placer<'a> {
             read: HashMap::new(),
             shapes: HashMap::new(),
             with_materials,
+            recentre,
         }
     }
 
-    /// Reads the PLY and STL files of all tables at the same time, if there are several and there is memory for them.
-    /// Errors are kept until the table of the file is added, so that the first table with an error decides.
+    /// Reads the files of all tables at the same time, if there are several and there is memory for them. Errors and
+    /// warnings are kept until the table of the file is added, so that they do not depend on the order of reading.
     pub fn read_together(&mut self, tables: &[MeshTable]) {
-        let readings = tables.iter().filter_map(|table| Reading::of(self.file, &table.spec).ok()?);
-        let is_shape = |it: &Reading| matches!(MeshFormat::of_name(&it.path), Some(MeshFormat::Ply | MeshFormat::Stl));
+        let readings = tables.iter().filter_map(|table| Reading::of(self.file, &table.spec, self.recentre).ok()?);
         let mut seen = HashSet::new();
-        let readings: Vec<Reading> =
-            readings.filter(|it| is_shape(it) && it.scene.is_none()).filter(|it| seen.insert(it.clone())).collect();
-        let n_bytes: u64 = readings.iter().map(|it| files::n_bytes(&it.path)).sum();
+        let readings: Vec<Reading> = readings.filter(|it| seen.insert(it.clone())).collect();
+        let n_bytes: u64 = readings.iter().map(|it| it.n_bytes(self.file)).sum();
         if readings.len() < 2 || require("reading files", n_bytes.saturating_mul(READING_BYTES)).is_err() {
             return;
         }
         let meter = self.images.progress().begin(Work::Reading, n_bytes);
+        let (file, models) = (self.file, self.models());
         let content = |reading: Reading| {
-            let read = read_mesh(&reading.path).map(|bytes| {
-                let n_bytes = bytes.len() as u64;
-                let content = reading.content(bytes);
-                meter.add(n_bytes);
-                content
+            let n_bytes = reading.n_bytes(file);
+            let read = read_mesh(&reading.path).map(|bytes| match MeshFormat::of(&reading.path, &bytes) {
+                MeshFormat::Gltf => {
+                    let model = models.load(&reading, bytes, (gltf::LoadedBefore::default(), &Progress::default()));
+                    Content::Model(Box::new(model))
+                }
+                _ if reading.scene.is_some() => Content::Bytes(bytes),
+                _ => {
+                    let how = (reading.shading(), reading.origin());
+                    Content::Shape(Box::new(Shape::parse(&reading.path, bytes, how, (0, &Progress::default()))))
+                }
             });
+            meter.add(n_bytes);
             (reading, read)
         };
-        self.shapes = readings.into_par_iter().map(content).collect::<Vec<_>>().into_iter().collect();
+        let read = readings.into_par_iter().map(content).collect::<Vec<_>>();
+        self.shapes = read.into_iter().collect();
+    }
+
+    /// Returns how glTF files are loaded.
+    fn models(&self) -> Models<'_> {
+        Models {
+            replaced: self.images.replaced(),
+            allow_outside: self.file.access.is_anywhere(),
+            with_materials: &self.with_materials,
+        }
     }
 
     /// Adds the meshes of a table.
@@ -150,7 +200,8 @@ impl<'a> Placer<'a> {
         match source {
             Source::Generator(generator) => self.generate(generator, common, (transform, named)).map_err(failed),
             Source::File { crease, .. } => {
-                let reading = Reading::of(self.file, &table.spec).map_err(failed)?.expect("the source is a file");
+                let reading =
+                    Reading::of(self.file, &table.spec, self.recentre).map_err(failed)?.expect("the source is a file");
                 if !self.read.contains_key(&reading) {
                     let read = self.read_file(&reading, table)?;
                     self.read.insert(reading.clone(), read);
@@ -199,21 +250,24 @@ impl<'a> Placer<'a> {
         let n_loaded = self.scene.n_triangles();
         let first_mesh = self.scene.meshes.len();
         let uv_scale = table.spec.common.uv_scale;
-        let origin = reading.origin.map(|bits| DVec3::from_array(bits.map(f64::from_bits)));
-        if let Content::Bytes(bytes) = &content
-            && MeshFormat::of(path, bytes) == MeshFormat::Gltf
-        {
-            if origin.is_some() {
-                return Err(failed("has `origin`, but coordinates of glTF files are of single precision".to_owned()));
+        let before = gltf::LoadedBefore { n_triangles: n_loaded as u64, n_pixels: self.images.n_pixels() };
+        let progress = self.images.progress().clone();
+        let content = match content {
+            Content::Bytes(bytes) if MeshFormat::of(path, &bytes) == MeshFormat::Gltf => {
+                Content::Model(Box::new(self.models().load(reading, bytes, (before, &progress))))
             }
-            let allow_outside = self.file.access.is_anywhere();
-            let look = Look { materials: self.images.replaced().to_vec(), ..Look::default() };
-            let (scene, progress) = (reading.scene.clone(), self.images.progress().clone());
-            let options = LoadOptions { scene, allow_outside, look, progress, ..LoadOptions::default() };
-            let has_materials = self.with_materials.contains(reading);
-            let before = gltf::LoadedBefore { n_triangles: n_loaded as u64, n_pixels: self.images.n_pixels() };
-            let Content::Bytes(bytes) = content else { unreachable!("glTF files are bytes") };
-            let mut model = gltf::load_meshes(path, bytes, &options, has_materials, before)?;
+            // Images that were decoded together are limited one by one. If there are too many pixels, those of this
+            // file are left out, with its warnings.
+            Content::Model(model) if model.as_ref().as_ref().is_ok_and(|model| before.exceeds(&model.scene)) => {
+                drop(model);
+                let bytes = read_mesh(path).map_err(|error| failed(error.to_string()))?;
+                Content::Model(Box::new(self.models().load(reading, bytes, (before, &progress))))
+            }
+            content => content,
+        };
+        if let Content::Model(model) = content {
+            let gltf::Model { scene: mut model, warnings } = (*model)?;
+            warnings.iter().for_each(|warning| tracing::warn!("{warning}"));
             for mesh in &mut model.meshes {
                 if !reading.is_smooth {
                     mesh.normals.fill([Vec3::ZERO; 3]);
@@ -221,7 +275,11 @@ impl<'a> Placer<'a> {
                 scale_uvs(mesh, uv_scale).map_err(failed)?;
             }
             self.scene.meshes.append(&mut model.meshes);
-            model.instances.iter_mut().for_each(|instance| instance.mesh_ix += first_mesh);
+            let origin = reading.origin().first();
+            for instance in &mut model.instances {
+                instance.mesh_ix += first_mesh;
+                instance.transform = instance.transform.moved(-origin);
+            }
             let first_image = self.images.adopt(model.images);
             let own = |mut material: Material| {
                 material.maps.change_each(|texture| texture.image_ix += first_image);
@@ -233,18 +291,21 @@ impl<'a> Placer<'a> {
         if let Some(name) = &reading.scene {
             return Err(failed(format!("there is no scene `{name}`: only glTF files name scenes")));
         }
-        let (shading, origin) = reading.shape_options();
+        let (shading, origin) = (reading.shading(), reading.origin());
         let mut loading = Loading { shading, origin, n_loaded, access: self.file.access, images: &mut self.images };
         let loaded = match content {
             Content::Shape(shape) => (*shape)?.loaded(path, &mut loading),
             Content::Bytes(bytes) => parse_mesh(path, bytes, &mut loading),
+            Content::Model(_) => unreachable!("models are placed above"),
         };
-        let Loaded { mut mesh, materials, uses_crease } = loaded?;
+        let Loaded { mut mesh, origin: own_origin, materials, uses_crease } = loaded?;
         scale_uvs(&mut mesh, uv_scale).map_err(failed)?;
         self.scene.meshes.push(mesh);
         let materials: Vec<_> = materials.into_iter().map(Some).chain([None]).collect();
         let slots = (0..materials.len() as u32).collect();
-        let instances = vec![Instance { mesh_ix: first_mesh, transform: Transform::IDENTITY, materials: slots }];
+        // A stated origin moves the mesh, one that was chosen does not.
+        let transform = Transform::IDENTITY.moved(own_origin - origin.first());
+        let instances = vec![Instance { mesh_ix: first_mesh, transform, materials: slots }];
         Ok(Read { instances, materials, material_ixs: [None, None], uses_crease })
     }
 
@@ -288,7 +349,7 @@ impl<'a> Placer<'a> {
 
 impl Reading {
     /// Returns how the file of a mesh is read, or `None` for a generator.
-    fn of(file: &File, spec: &MeshSpec) -> Checked<Option<Self>> {
+    fn of(file: &File, spec: &MeshSpec, recentre: bool) -> Checked<Option<Self>> {
         let Source::File { path, crease, scene, origin } = &spec.source else { return Ok(None) };
         Ok(Some(Self {
             path: file.access.beside(file.path).exact(path)?,
@@ -297,24 +358,32 @@ impl Reading {
             crease: crease.unwrap_or(DEFAULT_CREASE).to_bits(),
             uv_scale: spec.common.uv_scale.map(|scale| scale.map(f32::to_bits)),
             origin: origin.map(|origin| origin.map(f64::to_bits)),
+            recentre,
         }))
     }
 
-    /// Returns how normals are computed, and the point of the file that becomes the mesh's origin.
-    fn shape_options(&self) -> (Shading, DVec3) {
-        let shading = Shading { smooth: self.is_smooth, crease: f32::from_bits(self.crease) };
-        (shading, self.origin.map_or(DVec3::ZERO, |bits| DVec3::from_array(bits.map(f64::from_bits))))
+    /// Returns how normals are computed.
+    fn shading(&self) -> Shading {
+        Shading { smooth: self.is_smooth, crease: f32::from_bits(self.crease) }
     }
 
-    /// Makes the mesh of a file's content, if it is a PLY or an STL file.
-    fn content(&self, bytes: Vec<u8>) -> Content {
-        match MeshFormat::of(&self.path, &bytes) {
-            MeshFormat::Ply | MeshFormat::Stl => {
-                let made = Shape::parse(&self.path, bytes, self.shape_options(), (0, &Progress::default()));
-                Content::Shape(Box::new(made))
-            }
-            MeshFormat::Gltf | MeshFormat::Obj => Content::Bytes(bytes),
+    /// Returns which point of the file becomes the mesh's origin.
+    fn origin(&self) -> MeshOrigin {
+        match self.origin {
+            Some(bits) => MeshOrigin::At(DVec3::from_array(bits.map(f64::from_bits))),
+            None if self.recentre => MeshOrigin::Near,
+            None => MeshOrigin::At(DVec3::ZERO),
         }
+    }
+
+    /// Returns the size of the file and of the files beside a glTF file that it names.
+    fn n_bytes(&self, file: &File) -> u64 {
+        let is_json = self.path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gltf"));
+        let beside = match is_json {
+            true => gltf::named_files(&self.path, &read_mesh(&self.path).unwrap_or_default(), file.access),
+            false => Vec::new(),
+        };
+        beside.iter().map(|path| files::n_bytes(path)).fold(files::n_bytes(&self.path), u64::saturating_add)
     }
 }
 

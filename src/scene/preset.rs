@@ -8,6 +8,7 @@ use hashbrown::HashSet;
 use super::{
     Scene,
     error::Checked,
+    ground::GROUND,
     material::{Material, MaterialSpec},
 };
 use crate::util::text::escape_controls;
@@ -97,7 +98,8 @@ pub struct MaterialChoice {
 
 impl MaterialChoice {
     fn concerns(&self, name: &str) -> bool {
-        self.name.as_ref().is_none_or(|own| own == name)
+        // The ground below a mesh is none of its materials.
+        name != GROUND && (self.name.as_ref().is_none_or(|own| own == name))
     }
 }
 

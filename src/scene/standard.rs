@@ -17,6 +17,8 @@ pub(super) struct Lacks {
     pub camera: bool,
     /// The axis that points up in a scene without a camera, unless the user states one.
     pub up: Up,
+    /// A ground is below the scene if the user chooses a sky.
+    pub ground: bool,
     /// The scene has neither lights nor ambient light.
     pub light: bool,
     /// Only a scene without light gets a background.
@@ -50,7 +52,8 @@ pub(super) fn fill_in(scene: &mut Scene, lacks: Lacks, options: &LoadOptions) ->
     let up = look.up.unwrap_or(lacks.up);
     let axes = WorldAxes::with_up(up.vector());
     let lacks_light = lacks.light && look.sky.is_none();
-    let needs_bounds = lacks.camera || lacks_light;
+    let needs_ground = lacks.ground && look.sky.is_some();
+    let needs_bounds = lacks.camera || lacks_light || needs_ground;
     let bounds = if needs_bounds { scene.bounds() } else { Default::default() };
     let is_interior = needs_bounds && interior::is_interior(scene, bounds);
     if lacks.camera {
@@ -59,12 +62,15 @@ pub(super) fn fill_in(scene: &mut Scene, lacks: Lacks, options: &LoadOptions) ->
         let frame = |standard| Frame { axes, aspect: f64::from(aspect), vertical_fov_degrees: fov(standard) };
         let (outside, inside) = (frame(framing::VERTICAL_FOV_DEGREES), frame(interior::VERTICAL_FOV_DEGREES));
         let of_interior = if is_interior { interior::camera(scene, bounds, [&outside, &inside]) } else { None };
-        scene.camera = of_interior.unwrap_or_else(|| framing::camera(bounds, &outside));
+        scene.camera = of_interior.unwrap_or_else(|| framing::camera(scene, bounds, &outside));
     }
     look.set_camera(scene)?;
     if look.sky.is_some() {
         let up = [Up::Y, Up::Z].into_iter().find(|up| up.vector() == scene.camera.up).unwrap_or(up);
         look.set_sky(scene, up, azimuth_of_key(scene, up))?;
+        if needs_ground && !is_interior {
+            scene.add_ground(bounds, up)?;
+        }
     }
     if lacks.integrator && scene.needs_path() {
         scene.defaults.integrator = Integrator::Path;

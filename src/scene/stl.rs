@@ -14,6 +14,7 @@ use super::{
     needs::{MeshSize, require_for_mesh},
     smooth::{Shading, smooth_normals},
 };
+use crate::util::progress::{Meter, Progress, Work};
 
 /// Size in bytes of the header of a binary file: 80 bytes of comment, then the number of facets.
 const HEAD_BYTES: usize = 84;
@@ -47,11 +48,16 @@ fn is_statement(line: &[u8], keyword: &[u8]) -> bool {
     line.get(..keyword.len()).is_some_and(|word| word.eq_ignore_ascii_case(keyword))
 }
 
-/// Makes a mesh of a file's content. Its faces have slot 0.
-pub(super) fn parse_stl(bytes: Vec<u8>, (shading, origin): (Shading, DVec3), n_loaded: usize) -> Checked<Mesh> {
+/// Makes a mesh of a file's content. Its faces have slot 0. `n_loaded`: the number of triangles that the scene has
+/// already. `progress` is told of the facets that have been read.
+pub(super) fn parse_stl(
+    bytes: Vec<u8>,
+    (shading, origin): (Shading, DVec3),
+    (n_loaded, progress): (usize, &Progress),
+) -> Checked<Mesh> {
     let triangles = match is_binary_stl(&bytes) || !is_stl_text(&bytes) {
-        true => binary(bytes, n_loaded)?,
-        false => text(without_bom(&bytes), n_loaded)?,
+        true => binary(bytes, (n_loaded, progress))?,
+        false => text(without_bom(&bytes), (n_loaded, progress))?,
     };
     let position = |v: stl_io::Vertex| (Vec3::from(v.0).as_dvec3() - origin).as_vec3();
     let positions: Vec<_> = triangles.iter().flat_map(|triangle| triangle.vertices.map(position)).collect();
@@ -60,7 +66,7 @@ pub(super) fn parse_stl(bytes: Vec<u8>, (shading, origin): (Shading, DVec3), n_l
     Ok(Mesh { positions, slots: vec![0; faces.len()], faces, normals, ..Mesh::default() })
 }
 
-fn binary(mut bytes: Vec<u8>, n_loaded: usize) -> Checked<Vec<Triangle>> {
+fn binary(mut bytes: Vec<u8>, (n_loaded, progress): (usize, &Progress)) -> Checked<Vec<Triangle>> {
     let n = n_facets(&bytes).ok_or("is no STL file: it is neither text nor long enough for the binary form")?;
     let n_held = (bytes.len() - HEAD_BYTES) / FACET_BYTES;
     if n_held < n {
@@ -68,7 +74,7 @@ fn binary(mut bytes: Vec<u8>, n_loaded: usize) -> Checked<Vec<Triangle>> {
     }
     require_for_facets(n_loaded, n)?;
     bytes[..80].fill(0); // a comment, which the reader would take for text if it began with `solid`
-    triangles_of(bytes)
+    triangles_of(bytes, &progress.begin(Work::Reading, n as u64))
 }
 
 /// Refuses facets, which have three points each, if there is not enough memory for them.
@@ -79,22 +85,33 @@ fn require_for_facets(n_loaded: usize, n: usize) -> Checked<()> {
 }
 
 /// Reads the solids of a text.
-fn text(bytes: &[u8], n_loaded: usize) -> Checked<Vec<Triangle>> {
+fn text(bytes: &[u8], (n_loaded, progress): (usize, &Progress)) -> Checked<Vec<Triangle>> {
     let lines = bytes.split(|byte| *byte == b'\n');
     let n_facets = lines.filter(|line| is_statement(line.trim_ascii_start(), b"facet")).count();
     require_for_facets(n_loaded, n_facets)?;
+    let meter = progress.begin(Work::Reading, n_facets as u64);
     let mut triangles = Vec::new();
     for (line, solid) in solids(bytes) {
         let named = |what| format!("the solid at line {line}: {what}");
-        triangles.extend(triangles_of(solid).map_err(named)?);
+        triangles.extend(triangles_of(solid, &meter).map_err(named)?);
     }
     Ok(triangles)
 }
 
+/// The number of facets between two reports of progress.
+const REPORTED_FACETS: usize = 1 << 14;
+
 /// Reads a binary file, or a text of one solid.
-fn triangles_of(bytes: Vec<u8>) -> Checked<Vec<Triangle>> {
+fn triangles_of(bytes: Vec<u8>, meter: &Meter) -> Checked<Vec<Triangle>> {
     let mut bytes = Cursor::new(bytes);
-    let triangles = create_stl_reader(&mut bytes).and_then(Iterator::collect);
+    let count = |(ix, triangle)| {
+        if ix % REPORTED_FACETS == REPORTED_FACETS - 1 {
+            meter.add(REPORTED_FACETS as u64);
+        }
+        triangle
+    };
+    let triangles = create_stl_reader(&mut bytes).and_then(|reader| reader.enumerate().map(count).collect());
+    let triangles = triangles.inspect(|read: &Vec<Triangle>| meter.add((read.len() % REPORTED_FACETS) as u64));
     triangles.map_err(|error| error.to_string().escape_debug().to_string().replace("\\\"", "\""))
 }
 

@@ -1,5 +1,7 @@
 //! Transforms that place a mesh in the world.
 
+use std::fmt::Debug;
+
 use glam::{DMat3, DMat4, DQuat, DVec3, Vec3};
 use serde::Deserialize;
 
@@ -112,9 +114,21 @@ impl Transform {
         }
     }
 
+    /// Returns the transform that is followed by a translation.
+    pub(super) fn moved(&self, by: DVec3) -> Self {
+        Self { translation: self.translation + by, ..self.clone() }
+    }
+
     /// Returns a point of object space in world space.
     pub fn point(&self, p: Vec3) -> Vec3 {
         (self.linear * p.as_dvec3() + self.translation).as_vec3()
+    }
+
+    /// Returns a vector and a number of which the height of a point of object space above another point of world space
+    /// is made: the dot product of the vector and the point, plus the number. `direction` says where up is, and its
+    /// length scales the height.
+    pub(super) fn height_in_object_space(&self, direction: DVec3, above: DVec3) -> (DVec3, f64) {
+        (self.linear.transpose() * direction, direction.dot(self.translation - above))
     }
 
     /// Returns a surface normal of object space in world space: unit length, or zero if `n` is zero.
@@ -179,7 +193,7 @@ impl TransformSpec {
 }
 
 /// Checks that three numbers are finite.
-pub(super) fn finite(name: &str, value: [f32; 3]) -> Checked<DVec3> {
-    let vector = Vec3::from_array(value);
-    if vector.is_finite() { Ok(vector.as_dvec3()) } else { Err(format!("{name} = {value:?} is not finite")) }
+pub(super) fn finite<T: Copy + Debug + Into<f64>>(name: &str, value: [T; 3]) -> Checked<DVec3> {
+    let vector = DVec3::from_array(value.map(Into::into));
+    if vector.is_finite() { Ok(vector) } else { Err(format!("{name} = {value:?} is not finite")) }
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use glam::{UVec2, Vec3, uvec2};
+use glam::{DVec3, UVec2, Vec3, uvec2};
 
 use super::{
     gpu_session::GpuSession,
@@ -37,7 +37,9 @@ impl Session {
                 self.is_save_due = true;
                 self.save_if_due(gpu, window);
             }
-            Action::PrintCamera => (self.print)(&to_toml(self.controller.camera())),
+            Action::PrintCamera => {
+                (self.print)(&to_toml(self.controller.camera(), self.loaded.scene().origin));
+            }
             Action::FrameScene => self.controller.frame_scene(window.0 as f32 / window.1 as f32),
             Action::GoHome => {
                 self.controller.go_home();
@@ -146,11 +148,16 @@ pub fn save(gpu: &GpuSession, path: &Path) -> Result<(), SaveError> {
     Ok(())
 }
 
-/// Returns the camera in the format of scene files.
-fn to_toml(camera: &Camera) -> String {
+/// Returns the camera in the format of scene files. `origin` is the point of the file that is the origin of world
+/// space.
+fn to_toml(camera: &Camera, origin: DVec3) -> String {
     let vector = |v: Vec3| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z);
+    let point = |p: Vec3| match origin {
+        DVec3::ZERO => vector(p),
+        _ => format!("{:?}", (p.as_dvec3() + origin).to_array()),
+    };
     let Camera { eye, target, up, projection } = *camera;
-    let (eye, target, up) = (vector(eye), vector(target), vector(up));
+    let (eye, target, up) = (point(eye), point(target), vector(up));
     let projection = match projection {
         Projection::Perspective { vertical_fov_degrees } => format!("vertical_fov = {vertical_fov_degrees:?}"),
         Projection::Orthographic { height } => format!("orthographic_height = {height:?}"),
@@ -181,7 +188,7 @@ mod tests {
         };
         let mesh = "[[mesh]]\ngenerator = \"plane\"\nsize = [1.0, 1.0]\n";
         for camera in [camera, Camera { projection: Projection::Orthographic { height: 1.0 / 3.0 }, ..camera }] {
-            std::fs::write(&path, format!("{}{mesh}", to_toml(&camera))).unwrap();
+            std::fs::write(&path, format!("{}{mesh}", to_toml(&camera, DVec3::ZERO))).unwrap();
             assert_eq!(crate::scene::Scene::load(&path).unwrap().camera, camera);
         }
     }

@@ -307,6 +307,12 @@ impl ApplicationHandler<Wake> for App {
                 }
                 self.reloader.done();
             }
+            Wake::Progress(text) => {
+                if let (true, Some(Shown { window, .. })) = (self.reloader.is_loading(), &self.shown) {
+                    self.session.note_progress(&text);
+                    window.request_redraw();
+                }
+            }
             Wake::Opened(opened) => self.opened(*opened),
             Wake::Saved => {
                 self.session.report_saves();

@@ -201,9 +201,11 @@ impl Controller {
         self.camera = camera;
     }
 
-    /// Takes over another scene's start and bounds. The camera and the flight stay.
-    pub fn set_scene(&mut self, start: Camera, bounds: (Vec3, Vec3)) {
-        let Self { camera, flight, .. } = *self;
+    /// Takes over another scene's start and bounds. The camera and the flight stay; `moved` is the way by which a point
+    /// of the file has moved in world space.
+    pub fn set_scene(&mut self, start: Camera, bounds: (Vec3, Vec3), moved: Vec3) {
+        let Self { camera: Camera { eye, target, .. }, flight, .. } = *self;
+        let camera = Camera { eye: eye + moved, target: target + moved, ..self.camera };
         *self = Self { camera, ..Self::new(start, bounds) };
         self.flight = flight.around(self.radius);
     }

@@ -10,7 +10,8 @@ use glam::Vec3;
 use crate::{
     accel::Statistics,
     engine::choices::{ChosenAccel, Processor, Request, Workload},
-    scene::{self, Scene, SceneError},
+    scene::{self, Scene, SceneError, ground::GROUND},
+    util::progress::Progress,
     world::{FlatScene, World},
 };
 
@@ -49,21 +50,23 @@ impl LoadedScene {
     /// # Errors
     /// The scene cannot be loaded.
     pub fn load(path: &Path, load_options: &LoadOptions) -> Result<Self, SceneError> {
-        Ok(Self::with_tree(path, Scene::load_with(path, &load_options.scene)?, load_options))
+        let scene = Scene::load_with(path, &load_options.scene)?;
+        Ok(Self::with_tree(path, scene, load_options, &Progress::default()))
     }
 
-    /// Builds a scene's acceleration structure, a kd-tree or a grid.
+    /// Builds a scene's acceleration structure, a kd-tree or a grid, and reports its progress.
     ///
     /// # Panics
     /// The scene has a triangle without a material, which no loaded scene has.
-    pub fn with_tree(path: &Path, scene: Scene, load_options: &LoadOptions) -> Self {
+    pub fn with_tree(path: &Path, scene: Scene, load_options: &LoadOptions, progress: &Progress) -> Self {
         let &LoadOptions { request, processor, workload, .. } = load_options;
         let accel = request.choose_accel(processor, scene.n_triangles(), &workload);
         let flat = FlatScene::new(&scene).expect("a loaded scene fits together");
         // The unflattened scene is freed here, because building the structure needs the memory.
         drop(scene);
         let start = Instant::now();
-        let world = World::with_accel(flat, &accel.options(processor)).expect("a material for each triangle");
+        let world = World::with_accel_observed(flat, &accel.options(processor), progress);
+        let world = world.expect("a material for each triangle");
         let build_ms = start.elapsed().as_secs_f64() * 1e3;
         let statistics = world.statistics();
         let path = Some(path.to_owned());
@@ -92,8 +95,15 @@ impl LoadedScene {
     }
 
     /// Returns the minimum and the maximum corner of the scene, world space. Those of a scene without triangles are
-    /// the corners of a cube around the origin.
+    /// the corners of a cube around the origin. The ground that a mesh gets under a sky does not count.
     pub fn bounds(&self) -> (Vec3, Vec3) {
-        if self.scene().triangles.is_empty() { (Vec3::NEG_ONE, Vec3::ONE) } else { self.scene().bounds() }
+        let scene = self.scene();
+        let ground = scene.material_names.iter().position(|name| name == GROUND);
+        let Some(ground) = ground.filter(|ix| scene.triangle_materials.first() != Some(&(*ix as u32))) else {
+            return if scene.triangles.is_empty() { (Vec3::NEG_ONE, Vec3::ONE) } else { scene.bounds() };
+        };
+        let of_mesh = scene.triangles.iter().zip(&scene.triangle_materials).filter(|(_, ix)| **ix as usize != ground);
+        let corners = of_mesh.flat_map(|(t, _)| [t.v0, t.v1, t.v2]);
+        corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)))
     }
 }

@@ -10,7 +10,10 @@ use super::{
     message::{Message, Topic},
     session::Session,
 };
-use crate::frame::{Profile, RenderOptions};
+use crate::{
+    frame::{Profile, RenderOptions},
+    util::progress::Progress,
+};
 
 /// A file that was opened.
 pub struct Opened {
@@ -20,13 +23,19 @@ pub struct Opened {
     pub options: RenderOptions,
 }
 
-/// Loads a file that the user opens in the window. It runs on a thread of its own. The error is a message for people.
-pub type Opener = Arc<dyn Fn(&Path) -> Result<Opened, String> + Send + Sync>;
+/// Loads a file that the user opens in the window, and reports the progress. It runs on a thread of its own. The error
+/// is a message for people.
+pub type Opener = Arc<dyn Fn(&Path, Progress) -> Result<Opened, String> + Send + Sync>;
 
 impl Session {
     /// Shows that a file is being opened.
     pub fn note_opening(&mut self, path: &Path) {
         self.message = Some(Message::note(Topic::Scene, &format!("opening {} ...", path.display())));
+    }
+
+    /// Shows how far the opening of a file has come.
+    pub fn note_progress(&mut self, text: &str) {
+        self.message = Some(Message::note(Topic::Scene, text));
     }
 
     /// Replaces the scene by another file's and looks from that file's camera. Returns whether it succeeds. If the

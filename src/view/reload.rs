@@ -3,8 +3,9 @@
 use std::{
     collections::BTreeSet,
     path::{Path, PathBuf},
+    sync::{Arc, Mutex, PoisonError},
     thread,
-    time::Instant,
+    time::{Duration, Instant},
 };
 
 use winit::event_loop::EventLoopProxy;
@@ -17,7 +18,10 @@ use super::{
     session::Session,
     watch::Watch,
 };
-use crate::scene::{SceneError, source_files_with};
+use crate::{
+    scene::{SceneError, source_files_with},
+    util::progress::{Observer, Progress, Work},
+};
 
 /// Event from another thread that wakes the viewer.
 pub enum Wake {
@@ -27,6 +31,8 @@ pub enum Wake {
     Reloaded(Box<Result<LoadedScene, SceneError>>),
     /// A picture was written, or could not be written.
     Saved,
+    /// How far the loading of a file has come that the user opens, in words.
+    Progress(String),
     /// A file that the user opens was loaded, or could not be loaded.
     Opened(Box<Result<Opened, String>>),
     /// A shader has changed.
@@ -134,8 +140,12 @@ impl Reloader {
         let proxy = self.proxy.clone();
         let load: Box<dyn FnOnce() -> Wake + Send> = match (self.to_open.take(), self.path.clone()) {
             (Some(path), _) => {
-                let opener = self.opener.clone();
-                Box::new(move || Wake::Opened(Box::new(opener(&path))))
+                let (opener, proxy) = (self.opener.clone(), Mutex::new(proxy.clone()));
+                let send = move |text| {
+                    drop(proxy.lock().unwrap_or_else(PoisonError::into_inner).send_event(Wake::Progress(text)));
+                };
+                let reporter = Reporter { path: path.clone(), begun: Instant::now(), last: Mutex::default(), send };
+                Box::new(move || Wake::Opened(Box::new(opener(&path, Progress::to(Arc::new(reporter))))))
             }
             (None, Some(path)) => {
                 self.is_changed = false;
@@ -149,6 +159,11 @@ impl Reloader {
         };
         // An error means that the viewer has ended; then nothing needs to be woken.
         thread::spawn(move || drop(proxy.send_event(load())));
+    }
+
+    /// Whether a file is being read.
+    pub fn is_loading(&self) -> bool {
+        self.loading.is_under_way
     }
 
     /// Follows the changes of another scene's files from now on.
@@ -168,6 +183,35 @@ impl Reloader {
     }
 }
 
+/// Time after which the progress of loading is shown. Small files are not worth a message.
+const SHOWN_AFTER: Duration = Duration::from_millis(300);
+
+/// Says in words how far the loading of a file has come, once for each percent.
+struct Reporter<F> {
+    path: PathBuf,
+    begun: Instant,
+    last: Mutex<Option<(Work, u32)>>,
+    send: F,
+}
+
+impl<F: Fn(String) + Send + Sync> Observer for Reporter<F> {
+    fn progress(&self, work: Work, share: f32) {
+        let percent = (100.0 * share) as u32;
+        if self.begun.elapsed() < SHOWN_AFTER {
+            return;
+        }
+        let last = self.last.lock().unwrap_or_else(PoisonError::into_inner).replace((work, percent));
+        if last != Some((work, percent)) {
+            let what = match work {
+                Work::Reading => "reading",
+                Work::Images => "images",
+                Work::Building => "building",
+            };
+            (self.send)(format!("opening {}: {what} {percent} %", self.path.display()));
+        }
+    }
+}
+
 impl Session {
     /// Replaces the scene; the camera stays. If the scene could not be read or uploaded, shows a message and keeps
     /// the previous scene.
@@ -178,7 +222,9 @@ impl Session {
         };
         match gpu.set_scene(&loaded) {
             Ok(()) => {
-                self.controller.set_scene(loaded.scene().camera, loaded.bounds());
+                // The camera stays where it is in the file.
+                let moved = (self.loaded.scene().origin - loaded.scene().origin).as_vec3();
+                self.controller.set_scene(loaded.scene().camera, loaded.bounds(), moved);
                 self.loaded = loaded;
                 self.picked = None;
                 // The next picture is drawn small, so that it is shown at once.
@@ -193,6 +239,23 @@ impl Session {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn each_percent_is_reported_once() {
+        let sent = Mutex::new(Vec::new());
+        let send = |text: String| sent.lock().unwrap().push(text);
+        let path = PathBuf::from("a.obj");
+        let begun = Instant::now().checked_sub(2 * SHOWN_AFTER).unwrap();
+        let reporter = Reporter { path: path.clone(), begun, last: Mutex::default(), send };
+        for share in [0.0, 0.42, 0.424, 1.0] {
+            reporter.progress(Work::Reading, share);
+        }
+        reporter.progress(Work::Building, 0.5);
+        // A file that is loaded at once.
+        Reporter { path, begun: Instant::now(), last: Mutex::default(), send }.progress(Work::Reading, 0.5);
+        let expected = ["reading 0 %", "reading 42 %", "reading 100 %", "building 50 %"];
+        assert_eq!(*sent.lock().unwrap(), expected.map(|what| format!("opening a.obj: {what}")));
+    }
 
     #[test]
     fn work_that_is_under_way_is_begun_again_once() {

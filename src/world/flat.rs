@@ -2,7 +2,7 @@
 
 use std::f32::consts::PI;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{Mismatch, Textures};
@@ -24,6 +24,8 @@ use crate::{
 pub struct FlatScene {
     /// The scene's name.
     pub name: String,
+    /// The point of the scene's file that is the origin of world space ([`Scene::origin`]).
+    pub origin: DVec3,
     /// The triangles in world space. Those of the first instance come first, in the order of its mesh's faces, then
     /// those of the next instance.
     pub triangles: Vec<Triangle>,
@@ -75,6 +77,7 @@ impl FlatScene {
         let sun = scene.sky.filter(|sky| sky.has_sun).map(|sky| sky.sun());
         Ok(Self {
             name: scene.name.clone(),
+            origin: scene.origin,
             triangles,
             triangle_materials,
             materials: scene.materials.iter().map(Material::from).collect(),

@@ -11,6 +11,7 @@ impl FlatScene {
         // A field that is added to the scene must be hashed, or be named here.
         let Self {
             name: _,
+            origin: _,
             triangles,
             triangle_materials,
             materials,

@@ -33,6 +33,7 @@ fn instance(transform: Transform, materials: Vec<u32>) -> Instance {
 fn scene(instances: Vec<Instance>) -> Scene {
     Scene {
         name: "squares".to_owned(),
+        origin: DVec3::ZERO,
         meshes: vec![square()],
         instances,
         materials: ["red", "green", "blue"].map(named).into(),

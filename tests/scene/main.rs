@@ -3,6 +3,7 @@
 mod convert;
 mod errors;
 mod extent;
+mod far;
 mod generators;
 mod gltf;
 mod instances;

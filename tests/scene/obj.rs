@@ -245,12 +245,12 @@ fn a_bare_obj_is_framed_and_lit() {
         let scene = load_obj(&format!("{obj}f 1 2 3\nf 1 3 4\n"));
         assert_eq!((scene.name.as_str(), scene.lights.len()), ("mesh", 2));
         let (min, max) = scene.bounds();
+        let corners: Vec<Vec3> = scene.triangles.iter().flat_map(|t| [t.v0, t.v1, t.v2]).collect();
         let camera = scene.camera;
         let forward = (camera.target - camera.eye).normalize();
         let right = forward.cross(camera.up).normalize();
-        for n in 0..8 {
-            let side = |bit: u32, axis: usize| if n & bit == 0 { min[axis] } else { max[axis] };
-            let to = Vec3::new(side(1, 0), side(2, 1), side(4, 2)) - camera.eye;
+        for corner in corners {
+            let to = corner - camera.eye;
             let edge = camera.height_at(to.dot(forward)) / 2.0;
             assert!(edge > 0.0, "behind the camera");
             let (x, y) = (to.dot(right).abs() / edge, to.dot(right.cross(forward)).abs() / edge);

@@ -124,3 +124,66 @@ fn overrides_that_match_nothing_are_told() {
     assert!(told[0].contains("s.toml:2: material `Reed` overrides no material of a mesh file"), "{told:?}");
     assert!(told[0].ends_with("is `red` meant?") && !told[1].contains("meant"), "{told:?}");
 }
+
+/// Several files are read at the same time. The scene, the warnings and their order, and the error that is reported are
+/// those of files that are read one after another.
+#[test]
+fn files_that_are_read_together_are_as_read_one_by_one() {
+    let points: Vec<u8> =
+        [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.5_f32].iter().flat_map(|x| x.to_le_bytes()).collect();
+    let gltf = |name: &str| {
+        let json = serde_json::json!({
+            "asset": { "version": "2.0" },
+            "nodes": [{ "mesh": 0 }],
+            "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 }, "material": 0 }] }],
+            "materials": [{ "name": name, "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } }],
+            "textures": [{ "source": 0 }],
+            "images": [{ "uri": format!("{name}.png") }],
+            "animations": [{ "name": name, "channels": [], "samplers": [] }],
+            "accessors": [{ "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0],
+                            "max": [1, 1, 0.5] }],
+            "bufferViews": [{ "buffer": 0, "byteLength": 36 }],
+            "buffers": [{ "uri": "m.bin", "byteLength": 36 }],
+        });
+        json.to_string()
+    };
+    let obj =
+        |name: &str| format!("what {name}\nmtllib {name}.mtl\nusemtl {name}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    let names = ["a.gltf", "b.obj", "c.gltf", "d.obj", "e.gltf", "f.obj"];
+    let stem = |name: &'static str| &name[..1];
+    let mut files: Vec<(String, Vec<u8>)> = vec![("m.bin".to_owned(), points)];
+    for name in names {
+        let text = if name.ends_with("gltf") { gltf(stem(name)) } else { obj(stem(name)) };
+        files.push((name.to_owned(), text.into_bytes()));
+    }
+    let table = |name: &&str| format!("[[mesh]]\nfile = '{name}'\n");
+    let load = |names: &[&str], more: &[(&str, &[u8])]| {
+        let toml: String = names.iter().map(table).collect();
+        let mut all: Vec<(&str, &[u8])> = vec![("s.toml", toml.as_bytes())];
+        all.extend(files.iter().map(|(name, content)| (name.as_str(), content.as_slice())));
+        all.extend(more);
+        let (scene, warnings) = load_scene(&all);
+        // Each folder has another name.
+        let without_folder =
+            |line: &String| line.replace(&line[line.find('/').unwrap_or(0)..=line.rfind("/").unwrap_or(0)], "");
+        (scene, warnings.iter().map(without_folder).collect::<Vec<_>>())
+    };
+    let (together, warnings) = load(&names, &[]);
+    let together = together.unwrap();
+    let one_by_one: Vec<_> = names.iter().map(|name| load(&[name], &[])).collect();
+    let expected: Vec<String> = one_by_one.iter().flat_map(|(_, warnings)| warnings.clone()).collect();
+    assert!(expected.len() >= 12, "{expected:#?}");
+    assert_eq!(warnings, expected);
+    for (mesh, (scene, _)) in together.meshes.iter().zip(&one_by_one) {
+        assert_eq!(*mesh, scene.as_ref().unwrap().meshes[0]);
+    }
+    let of_materials: Vec<&str> = together.materials.iter().map(|material| material.name.as_str()).collect();
+    assert_eq!(of_materials, ["a", "(default)", "c", "e"]);
+    // The first table with an error decides, whichever file is read first.
+    let broken: [(&str, &[u8]); 2] =
+        [("b.obj", b"v 0 0 x\nf 1 1 1\n"), ("a.gltf", b"{ \"asset\": { \"version\": \"1.0\" } }")];
+    for order in [["c.gltf", "a.gltf", "b.obj"], ["c.gltf", "b.obj", "a.gltf"]] {
+        let error = load(&order, &broken).0.unwrap_err().to_string();
+        assert!(error.contains(order[1]), "{error}");
+    }
+}

@@ -70,12 +70,67 @@ fn ply(n: usize) -> Vec<u8> {
     bytes
 }
 
+fn stl(n: usize) -> Vec<u8> {
+    let (points, triangles) = grid(n);
+    let mut bytes = vec![0; 80];
+    bytes.extend((triangles.len() as u32).to_le_bytes());
+    for triangle in triangles {
+        let corners = triangle.map(|ix| points[ix]);
+        let numbers =
+            [[0.0; 3]].iter().chain(&corners).flatten().flat_map(|number| number.to_le_bytes()).collect::<Vec<_>>();
+        bytes.extend(numbers);
+        bytes.extend([0; 2]);
+    }
+    bytes
+}
+
+/// The same triangles as a text of three solids.
+fn stl_text(n: usize) -> Vec<u8> {
+    let (points, triangles) = grid(n);
+    let facet = |triangle: &[usize; 3]| {
+        let corners = triangle.map(|ix| points[ix].map(|number| number.to_string()).join(" "));
+        format!("facet normal 0 0 1\nouter loop\nvertex {}\nendloop\nendfacet\n", corners.join("\nvertex "))
+    };
+    let solid =
+        |triangles: &[[usize; 3]]| format!("solid a\n{}endsolid a\n", triangles.iter().map(facet).collect::<String>());
+    triangles.chunks(triangles.len().div_ceil(3)).map(solid).collect::<String>().into_bytes()
+}
+
+/// A glTF file of four meshes, one of which two nodes show.
+fn gltf(n: usize) -> (String, Vec<u8>) {
+    let (points, triangles) = grid(n);
+    let indices: Vec<u32> = triangles.iter().flatten().map(|ix| *ix as u32).collect();
+    let (points, indices) = (bytemuck::cast_slice(&points).to_vec(), bytemuck::cast_slice(&indices).to_vec());
+    let (n_points, n_indices): (usize, usize) = (points.len(), indices.len());
+    let primitive = serde_json::json!({ "attributes": { "POSITION": 0 }, "indices": 1 });
+    let json = serde_json::json!({
+        "asset": { "version": "2.0" },
+        "nodes": [{ "mesh": 0 }, { "mesh": 1 }, { "mesh": 1 }, { "mesh": 2 }, { "mesh": 3 }],
+        "meshes": vec![serde_json::json!({ "primitives": [primitive] }); 4],
+        "accessors": [
+            { "bufferView": 0, "componentType": 5126, "count": n_points / 12, "type": "VEC3", "min": [0, 0, 0],
+              "max": [n, 6, n] },
+            { "bufferView": 1, "componentType": 5125, "count": n_indices / 4, "type": "SCALAR" },
+        ],
+        "bufferViews": [
+            { "buffer": 0, "byteLength": n_points }, { "buffer": 0, "byteOffset": n_points, "byteLength": n_indices },
+        ],
+        "buffers": [{ "uri": "m.bin", "byteLength": n_points + n_indices }],
+    });
+    (json.to_string(), [points, indices].concat())
+}
+
 #[test]
 fn loading_and_building_report_their_progress() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     fs::write(path("large.obj"), obj(250)).unwrap();
     fs::write(path("large.ply"), ply(250)).unwrap();
+    fs::write(path("large.stl"), stl(250)).unwrap();
+    fs::write(path("text.stl"), stl_text(250)).unwrap();
+    let (json, buffer) = gltf(60);
+    fs::write(path("four.gltf"), json).unwrap();
+    fs::write(path("m.bin"), buffer).unwrap();
     let mut scene = String::new();
     for ix in 0..5 {
         RgbImage::new(4, 4).save_with_format(path(&format!("{ix}.png")), ImageFormat::Png).unwrap();
@@ -83,7 +138,8 @@ fn loading_and_building_report_their_progress() {
     }
     scene += "[[mesh]]\nfile = 'large.obj'\nmaterials = ['m0', 'm1', 'm2', 'm3', 'm4']\n";
     fs::write(path("scene.toml"), scene).unwrap();
-    for (name, n_images) in [("large.obj", 0), ("large.ply", 0), ("scene.toml", 5)] {
+    let meshes = ["large.obj", "large.ply", "large.stl", "text.stl", "four.gltf"].map(|name| (name, 0));
+    for (name, n_images) in meshes.into_iter().chain([("scene.toml", 5)]) {
         let reports = Arc::new(Reports::default());
         let progress = Progress::to(reports.clone());
         let options = LoadOptions { progress: progress.clone(), ..LoadOptions::default() };

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use kdray::{
     frame::Integrator,
     scene::{
@@ -83,6 +83,40 @@ fn boxes_of_all_shapes_fill_pictures_of_all_shapes() {
                 let share = hull_area(&corners) / 4.0;
                 assert!(share > 0.1, "{what}: the box covers {share} of the picture");
             }
+        }
+    }
+}
+
+/// An octahedron has no corner of its bounding box. Its own corners fill the picture, and are in its middle.
+#[test]
+fn the_scene_fills_the_picture_not_its_bounding_box() {
+    let corners = "v 2 0 0\nv -2 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 3\nv 0 0 -3\nv 90 90 90\n";
+    let faces = "f 1 3 5\nf 3 2 5\nf 2 4 5\nf 4 1 5\nf 3 1 6\nf 2 3 6\nf 4 2 6\nf 1 4 6\n";
+    let obj = format!("{corners}{faces}");
+    let toml = "[[mesh]]\nfile = 'a.obj'\n\
+                transform = { scale = [1, 2, 1], rotate = [10, 20, 30], translate = [5, -9, 2] }\n";
+    let turned = [("a.toml", toml), ("a.obj", &obj)];
+    for files in [&[("a.obj", obj.as_str())][..], &turned] {
+        for aspect in [4.0 / 3.0, 0.4] {
+            let scene = load(files, &LoadOptions { aspect: Some(aspect), ..LoadOptions::default() });
+            let Camera { eye, target, up, .. } = scene.camera;
+            let forward = (target - eye).normalize();
+            let right = forward.cross(up).normalize();
+            let transform = &scene.instances[0].transform;
+            let points = scene.meshes[0].positions[..6].iter().map(|p| transform.point(*p) - eye);
+            let seen: Vec<Vec2> = points
+                .map(|p| {
+                    Vec2::new(p.dot(right) / aspect, p.dot(right.cross(forward)))
+                        / scene.camera.height_at(p.dot(forward))
+                        * 2.0
+                })
+                .collect();
+            let (least, most) =
+                seen.iter().fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(a, b), p| (a.min(*p), b.max(*p)));
+            // The narrower of both extents is not quite in the middle, since the eye is farther away than it asks for.
+            let full = if most.x > most.y.max(-least.y) { 0 } else { 1 };
+            assert!((least[full] + most[full]).abs() < 1e-3 && (most[full] - 0.95).abs() < 1e-3, "{least} {most}");
+            assert!(least.min_element() > -0.951 && most.max_element() < 0.951, "{least} {most}");
         }
     }
 }
@@ -284,11 +318,11 @@ fn the_users_look_replaces_the_scenes() {
     let scene = |look: Look| load(&files, &with_look(look));
     let same = load(&files, &LoadOptions::default());
     assert_eq!(scene(Look::default()), same);
-    let (eye, target) = (Some(Vec3::new(5.0, 4.0, 3.0)), Some(Vec3::new(0.0, 0.5, 0.0)));
+    let (eye, target) = (Some(DVec3::new(5.0, 4.0, 3.0)), Some(DVec3::new(0.0, 0.5, 0.0)));
     let Camera { eye: moved, target: middle, .. } = scene(Look { eye, ..Look::default() }).camera;
-    assert_eq!((moved, middle), (eye.unwrap(), Vec3::Y));
+    assert_eq!((moved, middle), (eye.unwrap().as_vec3(), Vec3::Y));
     let camera = scene(Look { target, ..Look::default() }).camera;
-    assert_eq!((camera.eye, camera.target), (same.camera.eye, target.unwrap()));
+    assert_eq!((camera.eye, camera.target), (same.camera.eye, target.unwrap().as_vec3()));
     let wide = scene(Look { vertical_fov_degrees: Some(70.0), ..Look::default() }).camera;
     assert_eq!(wide.projection, Projection::Perspective { vertical_fov_degrees: 70.0 });
     let lit = scene(Look { light: Some(LightChoice::Along(Vec3::new(0.0, -2.0, 0.0))), ..Look::default() });
@@ -301,8 +335,8 @@ fn the_users_look_replaces_the_scenes() {
     let path = folder.path().join("a.toml");
     fs::write(&path, toml).unwrap();
     for look in [
-        Look { eye: Some(Vec3::Y), ..Look::default() },
-        Look { eye: Some(Vec3::splat(2e9)), ..Look::default() },
+        Look { eye: Some(DVec3::Y), ..Look::default() },
+        Look { eye: Some(DVec3::splat(2e9)), ..Look::default() },
         Look { up: Some(Up::Z), ..Look::default() },
         Look { vertical_fov_degrees: Some(180.0), ..Look::default() },
     ] {
@@ -341,6 +375,57 @@ fn the_users_sky_replaces_all_light() {
     assert!(z.up == Up::Z && z.towards_sun.distance(Vec3::new(x, -depth, y)) < 1e-4, "{z:?}");
 }
 
+/// A bare mesh stands on a ground, which no scene file and no interior gets. A scene file that is made of the mesh has
+/// it.
+#[test]
+fn a_mesh_under_the_users_sky_stands_on_a_ground() {
+    let sky = Some(SkyChoice { elevation: 40.0, azimuth: None, turbidity: 4.0 });
+    let gold = vec!["gold".parse().unwrap()];
+    let (min, size) = (Vec3::new(3.0, -2.0, 1.0), Vec3::new(2.0, 3.0, 4.0));
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    fs::write(path("a.obj"), box_obj(min, size)).unwrap();
+    for (up, axis) in [(Up::Y, 1), (Up::Z, 2)] {
+        let look = Look { sky, up: Some(up), ..Look::default() };
+        let bare = Scene::load_with(&path("a.obj"), &with_look(Look { sky: None, ..look.clone() })).unwrap();
+        let scene = Scene::load_with(&path("a.obj"), &with_look(look.clone())).unwrap();
+        assert_eq!((scene.camera, scene.instances.len()), (bare.camera, 2));
+        let (least, greatest) = scene.bounds();
+        let gap = min[axis] - least[axis];
+        assert!(gap > 0.0 && gap < 1e-3 && greatest[axis] == (min + size)[axis], "{least} {greatest}");
+        let middle = min + size / 2.0;
+        for other in (0..3).filter(|other| *other != axis) {
+            let radius = 10.0 * size.length();
+            assert!((greatest[other] - middle[other] - radius).abs() < 0.01 * radius, "{least} {greatest}");
+        }
+        let flat = kdray::world::FlatScene::new(&scene).unwrap();
+        let ground = flat.triangles.last().unwrap();
+        let normal = (ground.v1 - ground.v0).cross(ground.v2 - ground.v0).normalize();
+        assert!(normal.dot(up.vector()) > 0.9999, "{normal}");
+        for look in [look.clone(), Look { materials: gold.clone(), ..look }] {
+            let before = Scene::load_with(&path("a.obj"), &with_look(look.clone())).unwrap();
+            let text = scene_file_of(&path("a.obj"), &path("b.toml"), &with_look(look)).unwrap();
+            fs::write(path("b.toml"), &text).unwrap();
+            let after = Scene::load(&path("b.toml")).unwrap();
+            let [before, after] = [before, after].map(|scene| kdray::world::FlatScene::new(&scene).unwrap());
+            assert_eq!(before.triangles, after.triangles, "{text}");
+            let material =
+                |flat: &kdray::world::FlatScene| flat.materials[*flat.triangle_materials.last().unwrap() as usize];
+            assert_eq!(material(&before), material(&after), "{text}");
+            assert_eq!(material(&before).kd, Vec3::splat(0.2));
+        }
+    }
+    let toml = "[[mesh]]\nfile = 'a.obj'\n";
+    fs::write(path("c.toml"), toml).unwrap();
+    let look = || with_look(Look { sky, ..Look::default() });
+    assert_eq!(Scene::load_with(&path("c.toml"), &look()).unwrap().instances.len(), 1);
+    // A room: a box whose faces are turned inwards.
+    let room = box_obj(min, size).replace("f 1 5 7 3", "f 3 7 5 1").replace("f 6 2 4 8", "f 8 4 2 6");
+    let room = room.replace("f 1 2 6 5", "f 5 6 2 1").replace("f 7 8 4 3", "f 3 4 8 7");
+    let room = room.replace("f 2 1 3 4", "f 4 3 1 2").replace("f 5 6 8 7", "f 7 8 6 5");
+    assert_eq!(load(&[("a.obj", &room)], &look()).instances.len(), 1);
+}
+
 /// `--light` takes the place of the sun; the sky stays.
 #[test]
 fn the_users_light_replaces_the_sun() {
@@ -369,7 +454,7 @@ fn converted_files_keep_the_look_and_the_samples() {
     let along = Some(LightChoice::Along(Vec3::new(1.0, -2.0, -0.3)));
     for (input, samples) in [("a.obj", 4), ("b.toml", 1)] {
         for light in [None, Some(LightChoice::None), along] {
-            let (eye, background) = (Some(Vec3::new(3.0, 4.0, 5.0)), Some(Vec3::new(0.1, 0.2, 0.3)));
+            let (eye, background) = (Some(DVec3::new(3.0, 4.0, 5.0)), Some(Vec3::new(0.1, 0.2, 0.3)));
             let options = with_look(Look { eye, light, background, up: Some(Up::Z), ..Look::default() });
             let text = scene_file_of(&path(input), &path("c.toml"), &options).unwrap();
             fs::write(path("c.toml"), &text).unwrap();

@@ -11,7 +11,8 @@ use kdray::{
     cast::RayReader,
     engine::{Engine, choices::Workload},
     frame::RenderOptions,
-    scene::{Scene, source_files},
+    merge::{MergeError, merge},
+    scene::{LoadOptions, Scene, source_files},
 };
 use tempfile::TempDir;
 use tracing::{
@@ -31,11 +32,12 @@ pub enum Format {
     Stl,
     Image,
     Npy,
+    Part,
 }
 
 impl Format {
     /// All formats with the folder of `tests/corpus` that has files of it.
-    pub const ALL: [(Self, &str); 8] = [
+    pub const ALL: [(Self, &str); 9] = [
         (Self::Obj, "obj"),
         (Self::Mtl, "mtl"),
         (Self::Toml, "toml"),
@@ -44,6 +46,7 @@ impl Format {
         (Self::Stl, "stl"),
         (Self::Image, "image"),
         (Self::Npy, "npy"),
+        (Self::Part, "part"),
     ];
 
     /// Returns the name under which a file of the format is read. The content says which format an image has, but
@@ -58,6 +61,7 @@ impl Format {
             Self::Stl => "file.stl",
             Self::Image => "file.tga",
             Self::Npy => "file.npy",
+            Self::Part => "file.exr",
         }
     }
 
@@ -116,6 +120,7 @@ impl Reader {
         };
         let error = match format {
             Format::Npy => read_rays(&path).err(),
+            Format::Part => merge_part(&path).err(),
             _ => read_scene(&scene).err(),
         };
         if let Some(line) = &error {
@@ -145,7 +150,8 @@ pub fn check_error(line: &str, files: &[&Path]) {
 fn read_scene(path: &Path) -> Result<(), String> {
     // The viewer watches these files.
     let _ = source_files(path);
-    let scene = Scene::load(path).map_err(|error| error.to_string())?;
+    let options = LoadOptions { recentre: true, ..LoadOptions::default() };
+    let scene = Scene::load_with(path, &options).map_err(|error| error.to_string())?;
     let n_pixels: usize = scene.images.iter().map(|image| image.pixels.len()).sum();
     if scene.n_triangles() > MAX_RENDERED_TRIANGLES || n_pixels > MAX_RENDERED_PIXELS {
         return Ok(());
@@ -170,6 +176,20 @@ fn read_rays(path: &Path) -> Result<(), String> {
         }
     }
     assert_eq!(n_read, reader.n_rays());
+    Ok(())
+}
+
+/// Reads a part of a picture, and joins it to a picture if it is a whole one.
+fn merge_part(path: &Path) -> Result<(), String> {
+    let merged = match merge(&[path]) {
+        Err(error @ MergeError::Missing(_)) => {
+            check_line(&error.to_string());
+            return Ok(());
+        }
+        merged => merged.map_err(|error| error.to_string())?,
+    };
+    let n_pixels = merged.picture.width as usize * merged.picture.height as usize;
+    assert_eq!((merged.picture.radiance.len(), merged.picture.display.len()), (n_pixels, n_pixels));
     Ok(())
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use glam::{Vec3, vec3};
+use glam::{DVec3, Vec3, vec3};
 use kdray::{
     layout::{
         LIGHT_DIRECTIONAL, LIGHT_POINT, Light, MATERIAL_FRESNEL, MATERIAL_REFLECT, MATERIAL_REFRACT, MATERIAL_SPECULAR,
@@ -23,6 +23,7 @@ pub fn load(path: &Path) -> FlatScene {
 pub fn empty() -> FlatScene {
     FlatScene {
         name: "test".to_owned(),
+        origin: DVec3::ZERO,
         triangles: Vec::new(),
         triangle_materials: Vec::new(),
         materials: Vec::new(),

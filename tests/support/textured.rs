@@ -15,6 +15,7 @@ use kdray::{
 pub fn empty() -> Scene {
     Scene {
         name: "textured".to_owned(),
+        origin: DVec3::ZERO,
         meshes: Vec::new(),
         instances: Vec::new(),
         materials: Vec::new(),

@@ -3,12 +3,14 @@
 mod contents;
 mod text;
 
+use glam::DVec3;
 use kdray::{
     accel::Statistics,
     buffers::{PathQueue, Pixels},
     engine::choices::{BuildPolicy, Processor, Request, Workload},
     gpu::GpuError,
     layout::{LIGHT_DIRECTIONAL, LIGHT_SPOT, Light},
+    scene::Scene,
     world::{FlatScene, Mismatch, World},
 };
 use serde::Serialize;
@@ -22,7 +24,9 @@ use super::{args::InspectArgs, build, error::CliError, print, print_raw, progres
 /// Loads the scene, builds its structure and describes both.
 pub fn run(args: &InspectArgs) -> Result<(), CliError> {
     let progress = Progress::new(false, 2);
-    let (scene, load_ms) = progress.stage(&format!("loading {}", args.scene.display()), || args.load.load(&args.scene));
+    let (scene, load_ms) = progress.stage(&format!("loading {}", args.scene.display()), || {
+        Scene::load_with(&args.scene, &args.load.options_of_pictures())
+    });
     let scene = scene?;
     let contents = Contents::from(&scene);
     let details: Vec<_> = scene.materials.iter().map(|material| MaterialDetails::new(material, &scene)).collect();
@@ -47,6 +51,7 @@ pub fn run(args: &InspectArgs) -> Result<(), CliError> {
 
     let inspection = Inspection {
         triangles: n_triangles,
+        origin: (scene.origin != DVec3::ZERO).then(|| scene.origin.to_array()),
         bounds: world.bounds().map(|corner| corner.to_array()),
         materials: material_uses(scene, details),
         lights: scene.lights.iter().map(LightUse::from).collect(),
@@ -73,6 +78,9 @@ struct Inspection {
     triangles: usize,
     /// Minimum and maximum corner, world units.
     bounds: [[f32; 3]; 2],
+    /// The point of the file from which all coordinates count, if it is not 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    origin: Option<[f64; 3]>,
     materials: Vec<MaterialUse>,
     lights: Vec<LightUse>,
     #[serde(flatten)]
@@ -168,7 +176,11 @@ impl Inspection {
     fn text(&self) -> String {
         let [min, max] = self.bounds.map(vector);
         let mut text = format!("{}: {} triangles, loaded in {:.0} ms\n", self.scene, self.triangles, self.load_ms);
-        text += &format!("bounds {min} to {max}\n\n");
+        text += &format!("bounds {min} to {max}\n");
+        if let Some(origin) = self.origin {
+            text += &format!("coordinates count from {origin:?} of the file\n");
+        }
+        text.push('\n');
         text += &cut_table(["material", "triangles"], &self.materials, |_, used| {
             [shortened(&used.name), used.triangles.to_string()]
         });

@@ -21,6 +21,8 @@ use crate::cli::{
 pub struct FrameJob {
     /// None for the scene's own camera.
     pub camera: Option<Camera>,
+    /// The number of the frame on the camera's path; 0 without a path.
+    pub frame: u32,
     pub files: Files,
 }
 

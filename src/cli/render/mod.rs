@@ -49,11 +49,15 @@ pub fn run(args: RenderArgs) -> Result<(), CliError> {
 
     let (begun_at, spans) = (Instant::now(), Spans::default());
     let progress = Progress::with_spans(args.quiet, 3, args.trace.is_some().then_some(&spans));
-    let views = views(args, roles, &progress)?;
+    let mut views = views(args, roles, &progress)?;
     if views.is_empty() {
         return Ok(());
     }
     let (scene, load_ms) = load(args, &progress)?;
+    if let Some(path) = &args.path {
+        let path = CameraPath::load(path)?.from_origin(scene.origin);
+        views.iter_mut().for_each(|view| view.camera = path.camera_at(f64::from(view.frame)).or(view.camera));
+    }
     let options = args.options(&scene)?;
     let n_samples = args.samples(&scene);
     let some_samples = args.some_samples(&scene, &options)?;
@@ -173,7 +177,7 @@ fn load(args: &RenderArgs, progress: &Progress) -> Result<(Scene, f64), CliError
 fn views(args: &RenderArgs, mut roles: FileRoles, progress: &Progress) -> Result<Vec<FrameJob>, CliError> {
     let output = output_of(args);
     let mut views = match &args.path {
-        None => vec![FrameJob { camera: None, files: Files::of(output, &args.aov) }],
+        None => vec![FrameJob { camera: None, frame: 0, files: Files::of(output, &args.aov) }],
         Some(path) => {
             let views = views_along(path, args, &output)?;
             views.iter().try_for_each(|view| view.files.note(&mut roles))?;
@@ -209,7 +213,7 @@ fn views_along(path_file: &Path, args: &RenderArgs, output: &Path) -> Result<Vec
             let file = path_file.display();
             CliError::Usage(format!("{file}: at frame {frame}, eye and target coincide, or up points along the view"))
         })?;
-        Ok(FrameJob { camera: Some(camera), files: Files::of(numbered(output, frame)?, &args.aov) })
+        Ok(FrameJob { camera: Some(camera), frame, files: Files::of(numbered(output, frame)?, &args.aov) })
     };
     (first..=last).step_by(step as usize).map(view).collect()
 }

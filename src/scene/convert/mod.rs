@@ -50,7 +50,7 @@ fn moved(input: &Path, places: &Places, (scene, options): (&Scene, &LoadOptions)
     let mut table: Table = text.parse().map_err(|error: toml::de::Error| SceneError::file(input, error.message()))?;
     let parsed = |text: String| text.parse::<Table>().expect("the text of a table is TOML");
     if options.camera.is_some() || options.look.has_camera() {
-        table.insert("camera".to_owned(), Value::Table(parsed(text::camera(&scene.camera))));
+        table.insert("camera".to_owned(), Value::Table(parsed(text::camera(&scene.camera, scene.origin))));
     }
     if options.look.sky.is_some() {
         for key in ["light", "ambient", "background", "environment"] {

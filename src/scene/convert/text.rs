@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use hashbrown::HashMap;
 
 use crate::{
@@ -10,6 +10,7 @@ use crate::{
     scene::{
         Camera, Ground, Light, Material, MaterialChoice, Projection, RenderDefaults, Scene, Sky,
         assemble::DEFAULT_MATERIAL,
+        ground::{self, GENERATOR, GROUND},
         material_spec::MaterialSpec,
         overrides::override_terms,
         preset::is_replaced,
@@ -35,9 +36,9 @@ pub(super) fn scene_file(scene: &Scene, mesh: &MeshTable) -> String {
         let words: Vec<_> = mesh.replaced.iter().map(|choice| quoted(&choice.to_string())).collect();
         text += &format!("replace = [{}]\n", words.join(", "));
     }
-    text += &format!("\n[camera]\n{}", camera(&scene.camera));
+    text += &format!("\n[camera]\n{}", camera(&scene.camera, DVec3::ZERO));
     for (name, named) in &scene.cameras {
-        text += &format!("\n[[cameras]]\nname = {}\n{}", quoted(name), camera(named));
+        text += &format!("\n[[cameras]]\nname = {}\n{}", quoted(name), camera(named, DVec3::ZERO));
     }
     text.extend(scene.lights.iter().map(light));
     text.extend(scene.sky.iter().map(|it| format!("\n[sky]\n{}", sky(it))));
@@ -51,8 +52,19 @@ pub(super) fn scene_file(scene: &Scene, mesh: &MeshTable) -> String {
     if let Some(name) = &mesh.scene {
         text += &format!("scene = {}\n", quoted(name));
     }
+    if scene.origin != DVec3::ZERO {
+        text += &format!("origin = {:?}    # all other coordinates count from here\n", scene.origin.to_array());
+    }
     if !materials.is_empty() {
         text += "override = true\n";
+    }
+    if let Some(ground::Ground { radius, turn, centre }) = ground::Ground::of(scene) {
+        let (albedo, radius, turn) = (vector(Vec3::splat(Sky::GROUND_ALBEDO)), number(radius), number(turn));
+        text += &format!(
+            "\n[materials.{GROUND:?}]\nKd = {albedo}\n\n[[mesh]]\n{GENERATOR}material = {GROUND:?}\n\
+             transform = {{ scale = {radius}, rotate = [{turn}, 0.0, 0.0], translate = {} }}\n",
+            vector(centre)
+        );
     }
     text
 }
@@ -66,10 +78,14 @@ pub(super) fn ambient(scene: &Scene) -> String {
     }
 }
 
-/// Returns the keys of a camera.
-pub(super) fn camera(camera: &Camera) -> String {
+/// Returns the keys of a camera. `origin` is the point of the file that is the origin of its world space.
+pub(in crate::scene) fn camera(camera: &Camera, origin: DVec3) -> String {
     let Camera { eye, target, up, projection } = *camera;
-    let (eye, target, up) = (vector(eye), vector(target), vector(up));
+    let point = |p: Vec3| match origin {
+        DVec3::ZERO => vector(p),
+        _ => format!("{:?}", (p.as_dvec3() + origin).to_array()),
+    };
+    let (eye, target, up) = (point(eye), point(target), vector(up));
     let projection = match projection {
         Projection::Perspective { vertical_fov_degrees } => format!("vertical_fov = {}", number(vertical_fov_degrees)),
         Projection::Orthographic { height } => format!("orthographic_height = {}", number(height)),
@@ -157,7 +173,7 @@ fn render(defaults: &RenderDefaults) -> String {
 /// Returns the tables of the file's materials that are not replaced, a table for each name.
 fn materials(scene: &Scene, replaced: &[MaterialChoice]) -> String {
     let mut by_name: HashMap<&str, Vec<&Material>> = HashMap::new();
-    let is_shown = |name: &str| name != DEFAULT_MATERIAL && !is_replaced(replaced, name);
+    let is_shown = |name: &str| ![DEFAULT_MATERIAL, GROUND].contains(&name) && !is_replaced(replaced, name);
     let of_file = || scene.materials.iter().filter(|material| is_shown(&material.name));
     of_file().for_each(|material| by_name.entry(&material.name).or_default().push(material));
     let tables = of_file().filter_map(|material| {

@@ -1,6 +1,6 @@
 //! Cameras of a scene's nodes.
 
-use glam::{DVec3, Vec3};
+use glam::{DMat4, DVec3, Vec3};
 use gltf::json::{self, camera::Type, validation::Checked::Valid};
 
 use super::{
@@ -16,8 +16,12 @@ use crate::scene::{
 };
 
 /// Returns the cameras of a scene's nodes with their names. Each looks at the middle of `bounds`, the scene's, or at a
-/// point as far away.
-pub(super) fn cameras(document: &Document, nodes: &Nodes, bounds: (Vec3, Vec3)) -> Checked<Vec<(String, Camera)>> {
+/// point as far away. `origin` is the point of the file that is the origin of world space.
+pub(super) fn cameras(
+    document: &Document,
+    nodes: &Nodes,
+    (bounds, origin): ((Vec3, Vec3), DVec3),
+) -> Checked<Vec<(String, Camera)>> {
     let mut cameras = Vec::new();
     for &ix in &nodes.shown {
         let node = &document.root.nodes[ix];
@@ -25,7 +29,10 @@ pub(super) fn cameras(document: &Document, nodes: &Nodes, bounds: (Vec3, Vec3)) 
         let json = item(&document.root.cameras, "cameras", index.value(), &format_args!("nodes[{ix}].camera"))?;
         let name = node.name.clone().or_else(|| json.name.clone());
         let name = name.unwrap_or_else(|| format!("camera {}", cameras.len() + 1));
-        let Some(view) = View::new(nodes, ix, bounds) else {
+        let view = nodes
+            .world_from_node(ix)
+            .and_then(|world_from_node| View::new(DMat4::from_translation(-origin) * world_from_node, bounds));
+        let Some(view) = view else {
             document.note("cameras whose nodes flatten them or lie too far away, which are left out", name);
             continue;
         };
@@ -45,8 +52,7 @@ struct View {
 
 impl View {
     /// Returns the view of a node's camera, or `None` if its directions span no picture.
-    fn new(nodes: &Nodes, node_ix: usize, (min, max): (Vec3, Vec3)) -> Option<Self> {
-        let world_from_node = nodes.world_from_node(node_ix)?;
+    fn new(world_from_node: DMat4, (min, max): (Vec3, Vec3)) -> Option<Self> {
         let eye = world_from_node.w_axis.truncate();
         let forward = world_from_node.transform_vector3(DVec3::NEG_Z).try_normalize()?;
         let up = world_from_node.transform_vector3(DVec3::Y).try_normalize()?;

@@ -271,16 +271,17 @@ impl Document {
         }
     }
 
-    /// Emits a warning for each kind of thing that is not shown.
-    pub fn warn(&self, path: &Path) {
+    /// Returns a warning for each kind of thing that is not shown.
+    pub fn warnings(&self, path: &Path) -> Vec<String> {
         const MAX_LISTED: usize = 8;
-        for (kind, list) in self.notes.take() {
+        let warning = |(kind, list): (&'static str, Vec<String>)| {
             let mut listed = list[..list.len().min(MAX_LISTED)].join(", ");
             if list.len() > MAX_LISTED {
                 listed += &format!(" and {} more", list.len() - MAX_LISTED);
             }
-            tracing::warn!("{}: {kind}: {}", path.display(), one_line(&listed));
-        }
+            format!("{}: {kind}: {}", path.display(), one_line(&listed))
+        };
+        self.notes.take().into_iter().map(warning).collect()
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
-use glam::{DVec3, Vec3};
+use glam::{DMat4, DVec3, Vec3};
 use gltf::json::{extensions::scene::khr_lights_punctual as punctual, validation::Checked::Valid};
 
 use super::{
@@ -20,7 +20,9 @@ use crate::scene::{
 ///
 /// An irradiance E on a white diffuse surface gives the radiance E in kdray and E / pi in glTF. So intensities and
 /// illuminances are divided by pi.
-pub(super) fn lights(document: &Document, nodes: &Nodes) -> Checked<Vec<Light>> {
+///
+/// `origin` is the point of the file that is the origin of world space.
+pub(super) fn lights(document: &Document, nodes: &Nodes, origin: DVec3) -> Checked<Vec<Light>> {
     let list = document.root.extensions.as_ref().and_then(|extensions| extensions.khr_lights_punctual.as_ref());
     let list = list.map(|extension| &extension.lights[..]).unwrap_or_default();
     let mut lights = Vec::new();
@@ -35,14 +37,16 @@ pub(super) fn lights(document: &Document, nodes: &Nodes) -> Checked<Vec<Light>> 
             let name = json.name.clone().unwrap_or_else(|| format!("lights[{light_ix}]"));
             document.note("ranges of lights, which are ignored, so that they shine further", name);
         }
-        let light = light(json, nodes, ix).map_err(|what| format!("lights[{light_ix}] at nodes[{ix}]: {what}"))?;
+        let world_from_node = nodes.world_from_node(ix).unwrap_or_default();
+        let world_from_node = DMat4::from_translation(-origin) * world_from_node;
+        let light =
+            light(json, world_from_node).map_err(|what| format!("lights[{light_ix}] at nodes[{ix}]: {what}"))?;
         lights.push(light);
     }
     Ok(lights)
 }
 
-fn light(json: &punctual::Light, nodes: &Nodes, node_ix: usize) -> Checked<Light> {
-    let world_from_node = nodes.world_from_node(node_ix).unwrap_or_default();
+fn light(json: &punctual::Light, world_from_node: DMat4) -> Checked<Light> {
     let position = world_from_node.w_axis.truncate().as_vec3();
     if position.abs().max_element() > MAX_COORDINATE {
         return Err(format!("it lies at {:?}, beyond {MAX_COORDINATE:e}", position.to_array()));

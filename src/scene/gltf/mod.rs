@@ -23,7 +23,7 @@ mod uri;
 use std::path::Path;
 
 use gltf::json::{Node, mesh::Primitive};
-use hashbrown::HashMap;
+use hashbrown::{HashMap, HashSet};
 
 pub(super) use self::document::named_files;
 use self::{
@@ -37,13 +37,14 @@ use super::{
     Instance, LoadOptions, Mesh, Scene, SceneError, Transform,
     error::Checked,
     extent,
+    image::MAX_PIXELS,
     look::Up,
     needs::{MeshSize, require_for_mesh},
     outside::Access,
     preset::MaterialChoice,
     standard::{Lacks, SAMPLES},
 };
-use crate::util::progress::Work;
+use crate::util::progress::{Meter, Work};
 
 /// Loads a glTF file as a scene with its lights and cameras.
 pub(super) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<(Scene, Lacks), SceneError> {
@@ -53,19 +54,28 @@ pub(super) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result
     let replaced = &options.look.materials[..];
     let mut scene =
         Loader::new(&document, &nodes, LoadedBefore::default(), Some(replaced)).load(path).map_err(failed)?;
+    if options.recentre {
+        extent::recentre(path, &mut scene);
+    }
     let bounds = scene.bounds();
     extent::check(path, bounds)?;
-    scene.lights = lights::lights(&document, &nodes).map_err(failed)?;
-    scene.cameras = cameras::cameras(&document, &nodes, bounds).map_err(failed)?;
+    scene.lights = lights::lights(&document, &nodes, scene.origin).map_err(failed)?;
+    scene.cameras = cameras::cameras(&document, &nodes, (bounds, scene.origin)).map_err(failed)?;
     let lacks_camera = scene.cameras.is_empty();
     scene.camera = scene.cameras.first().map_or(scene.camera, |(_, camera)| *camera);
     // The light of emissive surfaces does not reach others.
     let lacks_light = scene.lights.is_empty();
     scene.defaults.is_metered = !lacks_light;
     scene.defaults.samples = SAMPLES;
-    document.warn(path);
-    let lacks =
-        Lacks { camera: lacks_camera, up: Up::Y, light: lacks_light, background: lacks_light, integrator: true };
+    document.warnings(path).iter().for_each(|warning| tracing::warn!("{warning}"));
+    let lacks = Lacks {
+        camera: lacks_camera,
+        up: Up::Y,
+        ground: true,
+        light: lacks_light,
+        background: lacks_light,
+        integrator: true,
+    };
     Ok((scene, lacks))
 }
 
@@ -77,6 +87,23 @@ pub(super) struct LoadedBefore {
     pub n_pixels: u64,
 }
 
+impl LoadedBefore {
+    /// Whether the images of a scene are too many beside those that there are.
+    pub fn exceeds(&self, scene: &Scene) -> bool {
+        let n_pixels =
+            scene.images.iter().map(|image| image.pixels.len() as u64).fold(self.n_pixels, u64::saturating_add);
+        self.n_pixels > 0 && n_pixels > MAX_PIXELS
+    }
+}
+
+/// The meshes of a glTF file.
+pub(super) struct Model {
+    /// Instances, materials and images, without lights and cameras.
+    pub scene: Scene,
+    /// What the user has to be told of the file.
+    pub warnings: Vec<String>,
+}
+
 /// Loads the meshes of a scene of a glTF file with their materials and images, without its lights and cameras. If
 /// `has_materials` is false, the materials and images are left out, and the instances' materials have no meaning.
 /// `options` name the scene.
@@ -86,14 +113,13 @@ pub(super) fn load_meshes(
     options: &LoadOptions,
     has_materials: bool,
     before: LoadedBefore,
-) -> Result<Scene, SceneError> {
+) -> Result<Model, SceneError> {
     let failed = |what: String| SceneError::file(path, what);
     let document = read(path, bytes, options)?;
     let nodes = Nodes::new(&document, options.scene.as_deref()).map_err(failed)?;
     let replaced = has_materials.then_some(&options.look.materials[..]);
     let scene = Loader::new(&document, &nodes, before, replaced).load(path).map_err(failed)?;
-    document.warn(path);
-    Ok(scene)
+    Ok(Model { scene, warnings: document.warnings(path) })
 }
 
 fn read(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<Document, SceneError> {
@@ -142,10 +168,9 @@ impl<'a> Loader<'a> {
     fn load(mut self, path: &Path) -> Checked<Scene> {
         let mut scene = Scene::empty(path);
         let mut n_placed = self.before.n_triangles;
-        let meter = self.document.progress.begin(Work::Reading, self.nodes.shown.len() as u64);
+        let meter = self.document.progress.begin(Work::Reading, self.n_primitives());
         for &ix in &self.nodes.shown {
-            meter.add(1);
-            let Some(instance) = self.instance(ix)? else { continue };
+            let Some(instance) = self.instance(ix, &meter)? else { continue };
             let mesh = &self.meshes[instance.mesh_ix];
             n_placed += mesh.faces.len() as u64;
             require_for_mesh(n_placed, &MeshSize::default())?;
@@ -161,8 +186,17 @@ impl<'a> Loader<'a> {
         Ok(scene)
     }
 
-    /// Returns the instance that a node is, if it has a mesh with triangles.
-    fn instance(&mut self, node_ix: usize) -> Checked<Option<Instance>> {
+    /// Returns the number of the primitives that are read if each mesh is read once.
+    fn n_primitives(&self) -> u64 {
+        let nodes = self.nodes.shown.iter().filter_map(|ix| self.document.root.nodes[*ix].mesh);
+        let meshes: HashSet<usize> = nodes.map(|mesh| mesh.value()).collect();
+        let json = |ix: usize| self.document.root.meshes.get(ix);
+        meshes.into_iter().filter_map(json).map(|mesh| mesh.primitives.len() as u64).sum()
+    }
+
+    /// Returns the instance that a node is, if it has a mesh with triangles. `meter` counts the primitives that are
+    /// read.
+    fn instance(&mut self, node_ix: usize, meter: &Meter) -> Checked<Option<Instance>> {
         let document = self.document;
         let node = &document.root.nodes[node_ix];
         let Some(mesh) = node.mesh else { return Ok(None) };
@@ -187,7 +221,7 @@ impl<'a> Loader<'a> {
         let known = match self.known.get(&key) {
             Some(known) => known.clone(),
             None => {
-                let known = self.mesh(mesh.value(), node, node_ix, (weights, is_turned))?;
+                let known = self.mesh((mesh.value(), meter), node, node_ix, (weights, is_turned))?;
                 self.known.insert(key, known.clone());
                 known
             }
@@ -198,7 +232,7 @@ impl<'a> Loader<'a> {
     /// Adds the mesh of a node in its pose. Returns its index and its materials, or `None` if it has no triangles.
     fn mesh(
         &mut self,
-        mesh_ix: usize,
+        (mesh_ix, meter): (usize, &Meter),
         node: &Node,
         node_ix: usize,
         (weights, is_turned): (&[f32], bool),
@@ -218,7 +252,9 @@ impl<'a> Loader<'a> {
             let material = if self.has_materials { self.materials.index(primitive.material, &path)? } else { 0 };
             let targets = document.morph_targets.of(mesh_ix, ix);
             let part = Part { primitive, targets, path, slot: materials.len() as u32, whole: attributes };
-            let Some(mesh) = geometry::mesh(document, &part, pose, &mut self.n_read)? else { continue };
+            let mesh = geometry::mesh(document, &part, pose, &mut self.n_read)?;
+            meter.add(1);
+            let Some(mesh) = mesh else { continue };
             materials.push(material);
             whole.append(mesh);
         }

@@ -12,9 +12,10 @@ use std::{
     io::{BufRead, Read},
 };
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
-use crate::scene::{error::Checked, needs::MeshSize};
+use crate::scene::{error::Checked, mesh_file::bounds_of, needs::MeshSize};
 
 /// How a face is shaded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -124,6 +125,15 @@ pub struct CleanObj {
 }
 
 impl CleanObj {
+    /// Returns the least and the greatest coordinates of all points.
+    pub fn bounds(&self) -> (Vec3, Vec3) {
+        let point = |line: &str| {
+            let mut numbers = line.split_ascii_whitespace().skip(1).flat_map(str::parse::<f32>);
+            Some(Vec3::new(numbers.next()?, numbers.next()?, numbers.next()?))
+        };
+        bounds_of(self.text[0].par_lines().filter_map(point))
+    }
+
     /// Returns the text for tobj. Its first line names a material library, so that tobj calls its material loader.
     pub fn text(&self) -> impl BufRead {
         let [positions, texcoords, normals, faces] = self.text.each_ref().map(|part| part.as_bytes());

@@ -13,24 +13,77 @@ pub(super) use self::files::named_files;
 use self::{
     clean::{CleanObj, clean_obj},
     model::Model,
-    quick::quick_obj,
+    quick::{QuickObj, quick_obj},
 };
 use super::{
     error::SceneError,
+    extent::MeshOrigin,
     material::Material,
     mesh_file::{Loaded, Loading},
     needs::require_for_mesh,
 };
+use crate::util::progress::Progress;
 use glam::DVec3;
 
-/// Makes a mesh from an OBJ file's text, and reads its materials.
-pub(super) fn parse_obj(path: &Path, text: &str, loading: &mut Loading) -> Result<Loaded, SceneError> {
-    let &mut Loading { shading, origin, n_loaded, access, ref mut images } = loading;
-    let careful = || clean_obj(text, origin).map_err(|(line, what)| SceneError::line(path, line, what));
+/// The content of an OBJ file, without its materials.
+pub(super) struct ObjFile {
+    text: String,
+    content: ObjContent,
+    /// The point of the file that is the origin of the points.
+    origin: DVec3,
+}
+
+/// What has been read in one of two ways.
+enum ObjContent {
+    Quick(QuickObj),
+    Careful(CleanObj),
+}
+
+impl ObjContent {
+    fn clean(&self) -> &CleanObj {
+        match self {
+            Self::Quick(quick) => &quick.clean,
+            Self::Careful(clean) => clean,
+        }
+    }
+}
+
+/// Reads an OBJ file's text, without the files that it names.
+pub(super) fn read_obj(
+    path: &Path,
+    text: String,
+    origin: MeshOrigin,
+    progress: &Progress,
+) -> Result<ObjFile, SceneError> {
+    let first = origin.first();
     // The quick way keeps points as they are written.
-    let quick = if origin == DVec3::ZERO { quick_obj(text, images.progress()) } else { None };
-    let cleaned = if quick.is_none() { Some(careful()?) } else { None };
-    let clean = quick.as_ref().map(|quick| &quick.clean).or(cleaned.as_ref()).expect("the file is read in either way");
+    let quick = if first == DVec3::ZERO { quick_obj(&text, progress) } else { None };
+    let (content, bounds) = match quick {
+        Some(quick) => {
+            let bounds = quick.bounds();
+            (ObjContent::Quick(quick), bounds)
+        }
+        None => {
+            let clean = careful(path, &text, first)?;
+            let bounds = clean.bounds();
+            (ObjContent::Careful(clean), bounds)
+        }
+    };
+    Ok(match origin.second(bounds) {
+        Some(origin) => ObjFile { content: ObjContent::Careful(careful(path, &text, origin)?), text, origin },
+        None => ObjFile { content, text, origin: first },
+    })
+}
+
+fn careful(path: &Path, text: &str, origin: DVec3) -> Result<CleanObj, SceneError> {
+    clean_obj(text, origin).map_err(|(line, what)| SceneError::line(path, line, what))
+}
+
+/// Makes a mesh from an OBJ file's content, and reads its materials.
+pub(super) fn obj_mesh(path: &Path, file: ObjFile, loading: &mut Loading) -> Result<Loaded, SceneError> {
+    let &mut Loading { shading, n_loaded, access, ref mut images, .. } = loading;
+    let ObjFile { text, content, origin } = file;
+    let clean = content.clean();
     require_for_mesh(n_loaded as u64, &clean.size).map_err(|what| SceneError::file(path, what))?;
     let materials = mtl::load_libraries(path, &clean.libraries, access, images)?;
     if let Some((line, statement)) = &clean.unknown {
@@ -41,18 +94,24 @@ pub(super) fn parse_obj(path: &Path, text: &str, loading: &mut Loading) -> Resul
     }
     let by_name = used_materials(path, clean, &materials);
     let (no_material, by_kind) = (materials.len() as u32, (shading, clean.colour_scale));
-    let quick_models = quick.as_ref().and_then(|quick| quick.models(|name| by_name.get(name).copied()));
+    let quick_models = match &content {
+        ObjContent::Quick(quick) => quick.models(|name| by_name.get(name).copied()),
+        ObjContent::Careful(_) => None,
+    };
     let (mesh, uses_crease) = match quick_models {
         Some(models) => model::mesh(&models, no_material, by_kind),
-        // The quick way has not found what is wrong with a number. The careful way finds it.
         None => {
-            let cleaned = cleaned.map_or_else(careful, Ok)?;
+            let cleaned = match content {
+                ObjContent::Careful(clean) => clean,
+                // The quick way has not found what is wrong with a number. The careful way finds it.
+                ObjContent::Quick(_) => careful(path, &text, origin)?,
+            };
             let models = parse(&cleaned, &by_name).map_err(|e| SceneError::file(path, e.to_string()))?;
             let models: Vec<Model> = models.iter().map(Model::of_tobj).collect();
             model::mesh(&models, no_material, by_kind)
         }
     };
-    Ok(Loaded { mesh, materials, uses_crease })
+    Ok(Loaded { mesh, origin, materials, uses_crease })
 }
 
 /// Returns the indices of the used materials in the library. A name that differs from that of one material in the case

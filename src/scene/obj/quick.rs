@@ -4,13 +4,17 @@
 
 use std::borrow::Cow;
 
+use glam::Vec3;
 use rayon::prelude::*;
 
 use super::{
     clean::{CleanObj, Cleaner, Corner, FaceKind, FaceShading, split_keyword, statements},
     model::Model,
 };
-use crate::util::progress::{Meter, Progress, Work};
+use crate::{
+    scene::mesh_file::bounds_of,
+    util::progress::{Meter, Progress, Work},
+};
 
 /// Least number of bytes of the text that one thread reads at a time.
 const CHUNK_BYTES: usize = 1 << 20;
@@ -19,7 +23,7 @@ const CHUNK_BYTES: usize = 1 << 20;
 const MAX_INDEX: usize = u32::MAX as usize;
 
 /// The content of an OBJ file.
-pub struct QuickObj<'a> {
+pub struct QuickObj {
     /// What [`clean_obj`](super::clean::clean_obj) finds, without the text for tobj.
     pub clean: CleanObj,
     positions: Vec<f32>,
@@ -27,7 +31,7 @@ pub struct QuickObj<'a> {
     normals: Vec<f32>,
     /// Whether all numbers are finite, also those that no face names.
     is_finite: bool,
-    chunks: Vec<Chunk<'a>>,
+    chunks: Vec<Chunk>,
     /// The faces and the names of materials in the order of the file.
     items: Vec<Item>,
 }
@@ -42,11 +46,11 @@ enum Item {
 
 /// Reads the text of an OBJ file, or returns `None` for a file that has anything else than is usual.
 /// `progress` is told of the bytes that have been read.
-pub fn quick_obj<'a>(text: &'a str, progress: &Progress) -> Option<QuickObj<'a>> {
+pub fn quick_obj(text: &str, progress: &Progress) -> Option<QuickObj> {
     quick_obj_in_chunks(text, CHUNK_BYTES, &progress.begin(Work::Reading, text.len() as u64))
 }
 
-fn quick_obj_in_chunks<'a>(text: &'a str, chunk_bytes: usize, meter: &Meter) -> Option<QuickObj<'a>> {
+fn quick_obj_in_chunks(text: &str, chunk_bytes: usize, meter: &Meter) -> Option<QuickObj> {
     let texts = chunks_of(text, chunk_bytes);
     let chunks = read_chunks(&texts, None, meter).or_else(|stop| match stop {
         Stop::Unusual => Err(stop),
@@ -83,16 +87,12 @@ enum Stop {
 
 /// Reads all chunks. `n_elements`: the numbers of positions, texture coordinates and normals of each one, if they are
 /// known.
-fn read_chunks<'a>(
-    texts: &[&'a str],
-    n_elements: Option<&[[usize; 3]]>,
-    meter: &Meter,
-) -> Result<Vec<Chunk<'a>>, Stop> {
+fn read_chunks(texts: &[&str], n_elements: Option<&[[usize; 3]]>, meter: &Meter) -> Result<Vec<Chunk>, Stop> {
     let before = |ix: usize| {
         let counts = n_elements?[..ix].iter();
         Some(counts.fold([0; 3], |sum, counts| [0, 1, 2].map(|kind| sum[kind] + counts[kind])))
     };
-    let read = |(ix, text): (usize, &&'a str)| {
+    let read = |(ix, text): (usize, &&str)| {
         let chunk = Chunk::new(text, if ix == 0 { Some([0; 3]) } else { before(ix) })?;
         meter.add(text.len() as u64);
         Ok(chunk)
@@ -113,7 +113,7 @@ fn n_elements(text: &str) -> [usize; 3] {
 
 /// The content of a part of a file.
 #[derive(Default)]
-struct Chunk<'a> {
+struct Chunk {
     positions: Vec<f32>,
     texcoords: Vec<f32>,
     normals: Vec<f32>,
@@ -122,17 +122,17 @@ struct Chunk<'a> {
     corners: [Vec<u32>; 3],
     /// Numbers of the faces' corners.
     arities: Vec<u32>,
-    parts: Vec<Part<'a>>,
+    parts: Vec<Part>,
     n_lines: usize,
     /// The greatest indices of corners, counted from 1: of a position, texture coordinates and a normal.
     greatest: [usize; 3],
 }
 
 /// A part of a chunk.
-enum Part<'a> {
+enum Part {
     Faces(Run),
     /// Any statement that is neither an element nor a face, with its line in the chunk.
-    Statement(usize, Cow<'a, str>),
+    Statement(usize, String),
 }
 
 /// Faces that follow each other. All or none of them have texture coordinates, and all or none normals.
@@ -148,9 +148,9 @@ struct Run {
     has_normals: bool,
 }
 
-impl<'a> Chunk<'a> {
+impl Chunk {
     /// Reads a text. `seen`: the numbers of elements before it, if they are known.
-    fn new(text: &'a str, seen: Option<[usize; 3]>) -> Result<Self, Stop> {
+    fn new(text: &str, seen: Option<[usize; 3]>) -> Result<Self, Stop> {
         let mut chunk = Self::default();
         let mut face = Vec::new();
         for (line, statement) in statements(text) {
@@ -165,7 +165,7 @@ impl<'a> Chunk<'a> {
                     corners(&mut face, rest.as_bytes(), seen)?;
                     chunk.add_face(&face)?;
                 }
-                _ => chunk.parts.push(Part::Statement(line, statement)),
+                _ => chunk.parts.push(Part::Statement(line, statement.into_owned())),
             }
         }
         chunk.n_lines = text.bytes().filter(|byte| *byte == b'\n').count();
@@ -289,7 +289,7 @@ fn index(bytes: &[u8], at: &mut usize, seen: Option<usize>) -> Result<usize, Sto
 
 /// Joins the chunks of a file. Returns `None` if a statement is wrong, if there are no faces, or if a face names an
 /// element that the file does not have.
-fn joined(mut chunks: Vec<Chunk<'_>>) -> Option<QuickObj<'_>> {
+fn joined(mut chunks: Vec<Chunk>) -> Option<QuickObj> {
     let mut cleaner = Cleaner::default();
     let (mut items, mut first_line, mut n_triangles, mut has_any_uvs) = (Vec::new(), 0, 0, false);
     for (chunk_ix, chunk) in chunks.iter_mut().enumerate() {
@@ -331,7 +331,12 @@ fn joined(mut chunks: Vec<Chunk<'_>>) -> Option<QuickObj<'_>> {
     Some(QuickObj { clean, positions, texcoords, normals, is_finite, chunks, items })
 }
 
-impl QuickObj<'_> {
+impl QuickObj {
+    /// Returns the least and the greatest coordinates of all points.
+    pub fn bounds(&self) -> (Vec3, Vec3) {
+        bounds_of(self.positions.par_chunks_exact(3).map(Vec3::from_slice))
+    }
+
     /// Returns the models of the file, as tobj divides it: faces that follow each other, of one kind and one material.
     /// `material_ix` returns the index of a named material. Returns `None` if a face names a number that is not finite.
     pub fn models(&self, material_ix: impl Fn(&str) -> Option<usize>) -> Option<Vec<Model<'_>>> {
@@ -375,7 +380,7 @@ impl QuickObj<'_> {
 
 /// Adds faces to models. Each model has its own positions, in the order in which its faces name them first.
 struct Joiner<'a> {
-    file: &'a QuickObj<'a>,
+    file: &'a QuickObj,
     /// For each position of the file the last model that has it, and its index there.
     indices: Vec<(u32, u32)>,
 }
@@ -432,7 +437,7 @@ mod tests {
         mesh(&quick.models(material_ix).unwrap(), 3, (Shading::default(), 1.0)).0
     }
 
-    fn in_chunks(text: &str, chunk_bytes: usize) -> Option<QuickObj<'_>> {
+    fn in_chunks(text: &str, chunk_bytes: usize) -> Option<QuickObj> {
         quick_obj_in_chunks(text, chunk_bytes, &Progress::default().begin(Work::Reading, 1))
     }
 

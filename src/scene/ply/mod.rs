@@ -151,11 +151,16 @@ pub(super) fn ply_mesh(
 }
 
 impl PlyMesh {
+    /// The mesh without its materials.
+    pub fn mesh(&self) -> &Mesh {
+        &self.mesh
+    }
+
     /// Reads the images that the file names.
     pub fn with_materials(self, path: &Path, access: Access, images: &mut Images) -> Loaded {
         let Self { mesh, names, uses_crease } = self;
         let materials = if mesh.uvs[0].is_empty() { Vec::new() } else { materials(path, &names, access, images) };
-        Loaded { mesh, materials, uses_crease }
+        Loaded { mesh, origin: DVec3::ZERO, materials, uses_crease }
     }
 }
 
