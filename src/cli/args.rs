@@ -304,11 +304,15 @@ impl RenderArgs {
             ));
         }
         if let Some(aov) = self.aov.iter().find(|aov| aov.is_of_paths() && options.integrator != Integrator::Path) {
-            return Err(CliError::Usage(format!("--aov {aov} needs --integrator path: it is about random samples")));
+            let reason =
+                if aov.is_of_light() { "it is a layer of the light of paths" } else { "it is about random samples" };
+            return Err(CliError::Usage(format!("--aov {aov} needs --integrator path: {reason}")));
         }
         // Passes are timed only if some output shows the times.
         let profile = !self.quiet || self.profile.is_some() || self.trace.is_some();
-        Ok(RenderOptions { crop, features: !self.aov.is_empty(), profile, ..options })
+        let features = self.aov.iter().any(|aov| !aov.is_of_light());
+        let light_layers = self.aov.iter().any(|aov| aov.is_of_light());
+        Ok(RenderOptions { crop, features, light_layers, profile, ..options })
     }
 }
 

@@ -15,6 +15,7 @@ mod features;
 mod grids;
 mod lanes;
 mod large;
+mod light_layers;
 mod living;
 mod mismatch;
 mod orthographic;
