@@ -28,6 +28,8 @@ pub mod bsdf;
 pub mod camera;
 pub mod candidate;
 pub mod cast;
+#[cfg(test)]
+mod chi_square;
 pub mod children;
 pub mod compact;
 pub mod counting;

@@ -13,6 +13,7 @@ mod crop;
 mod edge;
 mod features;
 mod grids;
+mod lamps;
 mod lanes;
 mod large;
 mod light_layers;

@@ -12,7 +12,10 @@ use crate::{
     accel::kdtree::BuildOptions,
     frame::RenderOptions,
     layout::{Frame, Material, Triangle},
-    reference::inputs::KernelInputs,
+    reference::{
+        chi_square::{LARGEST_DEVIATION, Uniform, chi_square},
+        inputs::KernelInputs,
+    },
     scene::{Environment, Light, Scene, Sky, Up},
     world::{Emitters, FlatScene, World},
 };
@@ -166,6 +169,40 @@ fn densities_of_area_lights_are_whole() {
         for point in [Vec3::ZERO, vec3(1.0, -0.5, 0.5)] {
             let sum = over_sphere(|direction| seen_light(&inputs, point, direction, f32::INFINITY).density);
             assert_near(sum, 1.0, 5e-3);
+        }
+    }
+}
+
+/// Picked directions are distributed by the density that is stated for rays that meet the light.
+#[test]
+fn picks_have_the_stated_density() {
+    let worlds = [
+        world(vec![rectangle()]),
+        world(vec![disk()]),
+        world(vec![sphere()]),
+        world(vec![sun()]),
+        world_with(Vec::new(), |scene| scene.environment = Some(map(40.0))),
+    ];
+    for (ix, world) in worlds.iter().enumerate() {
+        let frame = frame(world);
+        let inputs = inputs_of(world, &frame);
+        for point in [Vec3::ZERO, vec3(0.3, -0.5, 1.0)] {
+            let mut random = Uniform(ix as u64);
+            let mut sample = || {
+                let pick = pick_light(&inputs, point, random.point());
+                (pick != LightPick::NONE).then_some(pick.direction)
+            };
+            let density = |direction| {
+                let seen = seen_light(&inputs, point, direction, f32::INFINITY).density;
+                seen + environment_density(&inputs, direction)
+            };
+            // Lights have sharp edges, which many points in a cell resolve.
+            let found = chi_square((30_000, 100), &mut sample, &density);
+            assert!(found < LARGEST_DEVIATION, "{found} deviations of light {ix} at {point}");
+            // A density that is 15 % higher on one side is noticed.
+            let skewed = |direction: Vec3| density(direction) * (1.0 + 0.15 * direction.x.signum());
+            let found = chi_square((30_000, 100), &mut sample, &skewed);
+            assert!(found > LARGEST_DEVIATION, "{found} deviations of light {ix} at {point}");
         }
     }
 }
