@@ -92,7 +92,7 @@ fn places(width: f32, n_columns: u32) -> impl Iterator<Item = f32> {
     (0..n_columns).map(move |column| ((column as f32 + 0.5) / n_columns as f32 - 0.5) * width)
 }
 
-/// Half the width along x, and half the length along z, of the rectangle.
+/// Half the width along x, and half the length along z, of the smaller rectangle.
 const HALF_EDGES: (f32, f32) = (0.5, 1.0);
 
 /// A lamp of radiance 1 that shines down.
@@ -109,9 +109,9 @@ const LAMP: AreaLight = AreaLight {
     reserved: 0,
 };
 
-fn rectangle() -> AreaLight {
-    let (edge_u, edge_v) = (HALF_EDGES.0 * Vec3::X, HALF_EDGES.1 * Vec3::Z);
-    AreaLight { kind: AREA_RECTANGLE, edge_u, edge_v, area: 4.0 * HALF_EDGES.0 * HALF_EDGES.1, ..LAMP }
+fn rectangle((half_width, half_length): (f32, f32)) -> AreaLight {
+    let (edge_u, edge_v) = (half_width * Vec3::X, half_length * Vec3::Z);
+    AreaLight { kind: AREA_RECTANGLE, edge_u, edge_v, area: 4.0 * half_width * half_length, ..LAMP }
 }
 
 fn disk() -> AreaLight {
@@ -127,10 +127,10 @@ fn sphere() -> AreaLight {
 
 /// Returns what the floor shows at x of a rectangle of radiance 1 whose part from `low` to `high` along x is seen: the
 /// configuration factor of an element of area and a parallel rectangle, as a sum over the corners.
-fn floor_below_rectangle(x: f32, (low, high): (f32, f32)) -> f32 {
+fn floor_below_rectangle(x: f32, (low, high): (f32, f32), half_length: f32) -> f32 {
     let part = |a: f32, b: f32| a / (1.0 + a * a).sqrt() * (b / (1.0 + a * a).sqrt()).atan();
     let corner = |at: f32| {
-        let (a, b) = ((at - x) / LAMP_HEIGHT, HALF_EDGES.1 / LAMP_HEIGHT);
+        let (a, b) = ((at - x) / LAMP_HEIGHT, half_length / LAMP_HEIGHT);
         // Of the two corners along z, which are at the same distance.
         part(a, b) + part(b, a)
     };
@@ -160,12 +160,16 @@ fn lamps(width: f32, n_columns: u32) -> Vec<Lamp> {
     let empty = floor(width, n_columns);
     let with = |lamp| FlatScene { area_lights: vec![lamp], ..empty.clone() };
     let point = scenes::point_light(LAMP.position, Vec3::ONE);
-    let whole = (-HALF_EDGES.0, HALF_EDGES.0);
+    let below = |(half_width, half_length): (f32, f32)| -> Box<dyn Fn(f32) -> f32> {
+        Box::new(move |x| floor_below_rectangle(x, (-half_width, half_width), half_length))
+    };
+    let large = (4.0, 2.5);
     vec![
         ("point", FlatScene { lights: vec![point], ..empty.clone() }, Box::new(floor_below_point)),
         ("sphere", with(sphere()), Box::new(|x| RADIUS * RADIUS * floor_below_point(x))),
         ("disk", with(disk()), Box::new(floor_below_disk)),
-        ("rectangle", with(rectangle()), Box::new(move |x| floor_below_rectangle(x, whole))),
+        ("rectangle", with(rectangle(HALF_EDGES)), below(HALF_EDGES)),
+        ("large rectangle", with(rectangle(large)), below(large)),
     ]
 }
 
@@ -219,11 +223,11 @@ fn assert_penumbra(lamp: AreaLight, half_width: f32) -> Vec<f32> {
 /// shows the part of the lamp that is seen past the screen.
 #[test]
 fn the_penumbra_of_a_rectangle_is_as_wide_as_similar_triangles_say() {
-    let found = assert_penumbra(rectangle(), HALF_EDGES.0 / (LAMP_HEIGHT - 1.0));
-    let full = floor_below_rectangle(0.0, (-HALF_EDGES.0, HALF_EDGES.0));
+    let found = assert_penumbra(rectangle(HALF_EDGES), HALF_EDGES.0 / (LAMP_HEIGHT - 1.0));
+    let full = floor_below_rectangle(0.0, (-HALF_EDGES.0, HALF_EDGES.0), HALF_EDGES.1);
     for (x, found) in places(WIDTH, N_COLUMNS).zip(found) {
         let low = (-(LAMP_HEIGHT - 1.0) * x).clamp(-HALF_EDGES.0, HALF_EDGES.0);
-        let expected = floor_below_rectangle(x, (low, HALF_EDGES.0));
+        let expected = floor_below_rectangle(x, (low, HALF_EDGES.0), HALF_EDGES.1);
         assert!((found - expected).abs() < 0.015 * full, "at {x}: {found}, {expected}");
     }
 }

@@ -151,13 +151,56 @@ fn irradiance_is_that_of_closed_forms() {
 /// A wrong density shifts the irradiance beyond what the comparison allows.
 #[test]
 fn a_wrong_area_changes_the_irradiance() {
-    let world = world(vec![rectangle()]);
+    let world = world(vec![disk()]);
     let mut emitters: Emitters = world.emitters().clone();
     emitters.area_lights[0].area *= 1.02;
     let frame = frame(&world);
     let inputs = KernelInputs { emitters: Some(&emitters), ..inputs_of(&world, &frame) };
     let found = irradiance(&inputs, Vec3::ZERO, Vec3::Z).x;
-    assert!((found / (2.0 * under_rectangle(1.0, 1.5)) - 1.0).abs() > 1e-2, "{found}");
+    assert!((found / (PI * 1.5 * 1.5 / (1.5 * 1.5 + 4.0)) - 1.0).abs() > 1e-2, "{found}");
+}
+
+/// The solid angle of a triangle whose corners are seen at these places (Van Oosterom, Strackee: The Solid Angle of a
+/// Plane Triangle, 1983).
+fn solid_angle([a, b, c]: [DVec3; 3]) -> f64 {
+    let lengths = [a.length(), b.length(), c.length()];
+    let below =
+        lengths[0] * lengths[1] * lengths[2] + a.dot(b) * lengths[2] + b.dot(c) * lengths[0] + c.dot(a) * lengths[1];
+    2.0 * a.dot(b.cross(c)).abs().atan2(below)
+}
+
+/// From nearby, all directions to a rectangle have the same density, which is that of the solid angle. From far away,
+/// and from where it is seen edge-on, the densities are those of points on its area. Both are finite.
+#[test]
+fn rectangles_are_picked_by_solid_angle_from_nearby() {
+    let world = world(vec![rectangle()]);
+    let frame = frame(&world);
+    let inputs = inputs_of(&world, &frame);
+    for (point, is_near) in [
+        (Vec3::ZERO, true),
+        (vec3(2.9, 1.9, 1.99), true),
+        (vec3(-7.0, 0.0, 1.0), true),
+        (vec3(0.0, 9.0, -3.0), true),
+        (vec3(3.5, 0.0, 1.9999), false),
+        (vec3(0.0, 0.0, -14.0), false),
+    ] {
+        let picks: Vec<_> = numbers(500).map(|u| pick_light(&inputs, point, u)).collect();
+        let densities = picks.iter().map(|pick| pick.density).filter(|density| *density > 0.0);
+        let (least, most) = densities.fold((f32::INFINITY, 0.0_f32), |(least, most), d| (least.min(d), most.max(d)));
+        assert_eq!(most / least < 1.0001, is_near, "{point}: {least} to {most}");
+        for pick in picks.iter().filter(|pick| pick.density > 0.0) {
+            assert!(pick.direction.is_normalized() && (pick.density / most - 1.0).is_finite(), "{pick:?}");
+            let at = point + pick.distance * pick.direction;
+            let beyond = (at.abs() - vec3(3.0, 2.0, 2.0)).max_element();
+            assert!(beyond < 1e-4 && (at.z - 2.0).abs() < 1e-4, "{point}: {at} is not on the rectangle");
+        }
+        if is_near {
+            let corner = |x, y| DVec3::new(x, y, 2.0) - point.as_dvec3();
+            let [a, b, c, d] = [corner(-3.0, -2.0), corner(3.0, -2.0), corner(3.0, 2.0), corner(-3.0, 2.0)];
+            assert_near(1.0 / most, (solid_angle([a, b, c]) + solid_angle([a, c, d])) as f32, 1e-4);
+        }
+    }
+    assert!(numbers(100).all(|u| pick_light(&inputs, vec3(0.0, 0.0, 2.5), u) == LightPick::NONE), "the back is dark");
 }
 
 #[test]
