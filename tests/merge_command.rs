@@ -55,7 +55,7 @@ fn samples_and_tiles_join_to_the_same_bits() {
     for cpu in [&[][..], &["--cpu"]] {
         let directory = TempDir::new().unwrap();
         let path = directory.path();
-        let aov = ["--aov", "depth,id"];
+        let aov = ["--aov", "depth,id,emission,direct,indirect"];
         // The last samples need not be a multiple of 16.
         let spp = ["--spp", "100"];
         render_paths(path, "whole.exr", &[&spp, &aov[..], cpu].concat());

@@ -25,6 +25,7 @@ fn kinds() -> Vec<FrameKind> {
                 primary,
                 n_bounces,
                 features,
+                light_layers: of_paths && has_lights,
                 is_lit,
                 has_lights,
                 adds_samples,
@@ -112,6 +113,7 @@ fn every_barrier_is_needed() {
             integrator,
             denoise,
             features: true,
+            light_layers: true,
             max_depth: 3,
             primary: Primary::SoftwareRaster,
             ..RenderOptions::default()

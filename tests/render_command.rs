@@ -73,6 +73,28 @@ fn a_time_is_filled_with_samples() {
     refused(path, 2, &["--time", "1s", "--spp", "4"], "--spp");
 }
 
+/// Layers of light are written by their names, in a film as well. Without other layers, no features are computed.
+#[test]
+fn light_is_written_in_layers() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    let of_paths = ["--integrator", "path", "--spp", "2"];
+    let arguments = ["-o", "light.exr", "--aov", "indirect,emission", "--profile", "light.json"];
+    render(path, &[&of_paths[..], &arguments].concat());
+    let written = channels(&path.join("light.exr"));
+    let found: Vec<_> = written.iter().map(|channel| channel.0.as_str()).collect();
+    let expected = ["B", "G", "R", "emission.B", "emission.G", "emission.R", "indirect.B", "indirect.G", "indirect.R"];
+    assert_eq!(found, expected);
+    let profile = fs::read_to_string(path.join("light.json")).unwrap();
+    assert!(profile.contains("path_layers") && !profile.contains("\"features\""), "{profile}");
+    fs::write(path.join("p.toml"), PATH).unwrap();
+    let film = ["--path", "p.toml", "--frames", "0-1", "-o", "f#.exr", "--aov", "direct"];
+    render(path, &[&of_paths[..], &film].concat());
+    let [first, second] = ["f0.exr", "f1.exr"].map(|name| channels(&path.join(name)));
+    assert!(first.len() == 6 && first[3].0 == "direct.B" && first != second);
+    refused(path, 2, &["--integrator", "whitted", "--aov", "direct", "-o", "a.exr"], "a layer of the light of paths");
+}
+
 #[test]
 fn curves_change_what_is_shown_and_not_what_is() {
     let directory = TempDir::new().unwrap();

@@ -69,7 +69,7 @@ fn pictures_have_the_bits_of_one_device() {
         (RenderOptions { denoise: Denoise::Off, ..of_paths.clone() }, 8),
         (RenderOptions { denoise: paper, crop: Some("3,5,40,33".parse().unwrap()), ..of_paths.clone() }, 48),
         (RenderOptions { denoise: Denoise::Edge, ..of_paths.clone() }, 32),
-        (RenderOptions { denoise: Denoise::Off, features: true, ..of_paths }, 32),
+        (RenderOptions { denoise: Denoise::Off, features: true, light_layers: true, ..of_paths }, 32),
         (RenderOptions { denoise: paper, features: true, ..RenderOptions::default() }, 3),
         (RenderOptions { crop: Some("0,1,48,2".parse().unwrap()), ..RenderOptions::default() }, 1),
     ] {
@@ -80,7 +80,7 @@ fn pictures_have_the_bits_of_one_device() {
         for several in [&contexts[..2], &contexts] {
             for (picture, drawn) in draw(several.to_vec(), &world, &options, n_samples) {
                 assert!(picture == one.0, "{options:?}");
-                assert!(drawn.features == one.1.features, "{options:?}");
+                assert!(drawn.features == one.1.features && drawn.light == one.1.light, "{options:?}");
                 assert_eq!(drawn.n_samples, n_samples);
                 let rays = |drawn: &kdray::frame::Drawn| drawn.profile.bounces[0].n_rays;
                 assert!(rays(&drawn) >= rays(&one.1), "all rays are counted");
@@ -102,10 +102,10 @@ fn other_samples_make_another_picture() {
     let range = |word: &str| word.parse().unwrap();
     let (_, first) = renderer.draw_range(&camera, range("0-64"), || ()).unwrap();
     let (_, later) = renderer.draw_range(&camera, range("64-128"), || ()).unwrap();
-    assert!(first.mean() != later.mean());
+    assert!(first.picture.mean() != later.picture.mean());
     let mut alone = Engine::on_device(device()).renderer(&world, &options).unwrap();
     let (_, same) = alone.draw_range(&camera, range("64-128"), || ()).unwrap();
-    assert!(later == same);
+    assert!(later.picture == same.picture);
 }
 
 #[test]

@@ -1,12 +1,12 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 // Path resolve: one invocation per pixel of the batch sums the radiance of the pixel's paths, and in w their squared
-// luminance. The sum is a binary tree over the samples, so that it does not depend on how many samples a frame draws
-// (path_accumulate.comp).
+// luminance.
 // Reads path_states; writes pixel_radiance.
 #include "layout.glsl"
 #include "paths.glsl"
 #include "noise.glsl"
+#include "sample_sums.glsl"
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_PATH_STATES) readonly buffer PathStatesBlock { vec4 path_states[]; };
@@ -15,15 +15,10 @@ layout(std430, set = 0, binding = BIND_PIXEL_RADIANCE) writeonly buffer PixelRad
 void main() {
     uint pixel = gl_GlobalInvocationID.x;
     if (pixel >= batch.n_pixels) return;
-    precise vec4 sums[MOST_SAMPLES_LOG2 + 1u]; // one for each level of the tree
     uint n_samples = 1u << frame.samples_log2;
     for (uint sample_ix = 0u; sample_ix < n_samples; ++sample_ix) {
         vec3 radiance = path_states[sample_ix * batch.n_pixels + pixel].xyz;
-        precise vec4 sum = vec4(radiance, squared_luminance(radiance));
-        // Two sums of 2^level samples make one of the next level.
-        uint level = 0u;
-        for (; ((sample_ix >> level) & 1u) != 0u; ++level) sum = sums[level] + sum;
-        sums[level] = sum;
+        add_sample(sample_ix, vec4(radiance, squared_luminance(radiance)));
     }
-    pixel_radiance[pixel_ix_of(pixel_of_path(pixel))] = sums[frame.samples_log2];
+    pixel_radiance[pixel_ix_of(pixel_of_path(pixel))] = sample_sums[frame.samples_log2];
 }

@@ -607,6 +607,8 @@ struct Segment {
 #define FILTER_GAUSSIAN 2u
 // Base-2 logarithm of the most samples that a frame of paths draws.
 #define MOST_SAMPLES_LOG2 4u
+// Number of the layers of light (path_layers.comp).
+#define LIGHT_LAYERS 3u
 // The bounce of a path, counted from 0, from which on it may end by Russian roulette.
 #define ROULETTE_DEPTH 3u
 // The least probability with which a path survives Russian roulette. It bounds the weight of those that survive.
@@ -1177,7 +1179,8 @@ struct GridSort {
 // A vec4 for each ray: its radiance, weighted by its throughput.
 #define BIND_RAY_RADIANCE 15u
 // A vec4 for each pixel: the sample's radiance, or the mean of all samples. In frames of paths, it is first the sum of
-// the frame's samples, and w has the same of the samples' squared luminance.
+// the frame's samples, and w has the same of the samples' squared luminance. If the picture has layers of light, as
+// many elements follow for each of the `LIGHT_LAYERS` layers.
 #define BIND_PIXEL_RADIANCE 16u
 // A vec4 for each pixel: the radiance after noise reduction. With the filter `edge`, as many elements follow: the light
 // on surfaces, and in w the variance of its luminance, between two steps of the filter.
@@ -1188,7 +1191,8 @@ struct GridSort {
 #define BIND_TRIANGLE_IDS 19u
 // `COUNTER_COPIES` of `Counters` for each batch and bounce, `COUNTER_STRIDE` elements apart.
 #define BIND_COUNTERS 20u
-// A vec4 for each pixel: the sum of its samples' radiance.
+// A vec4 for each element of `pixel_radiance`: the sum of its samples' radiance. Frames of paths have several such
+// sums, one after the other (path_accumulate.comp).
 #define BIND_PIXEL_ACCUMULATED 24u
 // One `Feature` for each pixel.
 #define BIND_PIXEL_FEATURES 25u
@@ -1201,8 +1205,8 @@ struct GridSort {
 // A row of counts, then `STALLED_RAY_ROWS` rows of four words for each slot (stalls.glsl).
 #define BIND_STALLS 32u
 
-// Bindings that only frames of paths have. `rays`, `hits` and the next two have an element for each path of a batch:
-// the first samples of all pixels, then the second ones, and so on.
+// Bindings that only frames of paths have. `rays`, `hits`, `path_states`, `segments` and `path_snapshots` have an
+// element for each path of a batch: the first samples of all pixels, then the second ones, and so on.
 
 // One `PathState` for each path.
 #define BIND_PATH_STATES 33u
@@ -1213,6 +1217,9 @@ struct GridSort {
 #define BIND_LIVE_PATHS 35u
 // One `Guide` for each pixel.
 #define BIND_PIXEL_GUIDES 36u
+// A vec4 for each path: its radiance when the last layer of light was complete. Empty unless the picture has layers of
+// light.
+#define BIND_PATH_SNAPSHOTS 37u
 
 // The scene's arrays as texels: the binding of each is this plus its own. All other bindings are below it.
 #define BIND_TEXELS 64u

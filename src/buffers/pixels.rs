@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::{
     frame::{Denoise, Integrator, Primary, RenderOptions},
     gpu::{Buffer, BufferUse, Context, GpuError, Target, TargetKind},
-    layout::{Feature, Frame, Guide, MOST_SAMPLES_LOG2},
+    layout::{Feature, Frame, Guide, LIGHT_LAYERS, MOST_SAMPLES_LOG2},
 };
 
 /// Sums of samples for which each pixel of a frame of paths has room at least. They are enough for 4096 samples.
@@ -16,10 +16,11 @@ const SUMS_OF_PATHS: usize = 8;
 #[derive(Clone)]
 pub struct Pixels {
     /// The radiance of the frame's sample, which the kernel `accumulate` replaces by the mean of all samples. There
-    /// are `width * height` elements, as in all buffers here.
+    /// are `width * height` elements, as in all buffers here. If the picture has layers of light, as many elements
+    /// follow for each of them.
     pub pixel_radiance: Buffer<[f32; 4]>,
-    /// The sums of all samples; none before there is a second sample. Frames of paths have several sums for each pixel
-    /// (glsl/passes/path_accumulate.comp).
+    /// The sums of all samples; none before there is a second sample. Frames of paths have several sums for each
+    /// element of `pixel_radiance` (glsl/passes/path_accumulate.comp).
     pub pixel_accumulated: Option<Buffer<[f32; 4]>>,
     /// The radiance after the noise filter. None without a noise filter, in which case later kernels read
     /// `pixel_radiance`. For the filter `edge`, it has twice as many elements: the second half is between two steps.
@@ -38,6 +39,8 @@ pub struct Pixels {
     pub triangle_ids: Arc<Target>,
     /// The depth image for `triangle_ids`. None if the options do not use the graphics pipeline.
     pub depth: Option<Arc<Target>>,
+    /// 1, and 1 for each layer of light: the number of elements of `pixel_radiance` for each pixel.
+    pub n_layers: u32,
 }
 
 impl Pixels {
@@ -59,7 +62,7 @@ impl Pixels {
             (Arc::new(Target::unread(context, "triangle_ids")?), None)
         };
         Ok(Self {
-            pixel_radiance: Buffer::new(context, "pixel_radiance", n_pixels, storage)?,
+            pixel_radiance: Buffer::new(context, "pixel_radiance", n_pixels * n_layers(options) as usize, storage)?,
             pixel_accumulated: None,
             pixel_filtered: (n_filtered > 0)
                 .then(|| Buffer::new(context, "pixel_filtered", n_filtered, storage))
@@ -70,19 +73,21 @@ impl Pixels {
             pixel_guides: Buffer::new(context, "pixel_guides", n_guides, storage)?,
             triangle_ids,
             depth,
+            n_layers: n_layers(options),
         })
     }
 
     /// Returns the bytes of a pixel in the widest buffer that the options need.
     pub fn bytes_per_pixel(options: &RenderOptions) -> u64 {
         let widest = if options.features { size_of::<Feature>() } else { 0 };
-        let sums = if options.integrator == Integrator::Path { SUMS_OF_PATHS * size_of::<[f32; 4]>() } else { 0 };
+        let n_sums = if options.integrator == Integrator::Path { SUMS_OF_PATHS } else { 0 };
+        let sums = n_sums * n_layers(options) as usize * size_of::<[f32; 4]>();
         widest.max(sums).max(size_of::<[f32; 4]>()).max(size_of::<u64>()) as u64
     }
 
     /// Returns the bytes that a pixel of a frame of paths takes for a picture of `n_samples` samples without a noise
-    /// filter: the mean, the sums, and the colour for display. The memory of the paths themselves does not grow with
-    /// the picture.
+    /// filter and without layers: the mean, the sums, and the colour for display. The memory of the paths themselves
+    /// does not grow with the picture.
     pub fn bytes_per_pixel_of_paths(n_samples: u32) -> u64 {
         let frames = n_samples >> MOST_SAMPLES_LOG2;
         // The sums before the last frame, one for each bit of their number, and that of the last frame.
@@ -94,7 +99,8 @@ impl Pixels {
     pub fn fit(&self, frame: &Frame, options: &RenderOptions) -> bool {
         let (width, height) = self.triangle_ids.size();
         let has_targets = width >= frame.picture_width && height >= frame.picture_height;
-        self.pixel_radiance.len() >= n_pixels(frame)
+        self.n_layers == n_layers(options)
+            && self.pixel_radiance.len() >= n_pixels(frame) * self.n_layers as usize
             && (has_targets || !uses_graphics_pipeline(options))
             && self.depth.is_some() == uses_graphics_pipeline(options)
             && self.pixel_features.is_empty() != options.features
@@ -113,6 +119,11 @@ impl Pixels {
     pub(super) fn accumulated(&self) -> &Buffer<[f32; 4]> {
         self.pixel_accumulated.as_ref().unwrap_or(&self.pixel_radiance)
     }
+}
+
+/// The number of elements of `pixel_radiance` for each pixel: the picture's, and those of its layers of light.
+fn n_layers(options: &RenderOptions) -> u32 {
+    if options.has_light_layers() { 1 + LIGHT_LAYERS } else { 1 }
 }
 
 /// Whether the graphics pipeline rasterizes the primary rays.

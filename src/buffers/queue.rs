@@ -16,24 +16,28 @@ pub struct PathQueue {
     pub segments: Buffer<Segment>,
     /// Two lists, each with room for all paths: those that are alive at this bounce, and at the next.
     pub live_paths: Buffer<u32>,
+    /// The radiance of each path when the last layer of light was complete. Empty if the picture has no such layers.
+    pub path_snapshots: Buffer<[f32; 4]>,
 }
 
 impl PathQueue {
-    /// Bytes that a path takes, with its ray and hit, whether it goes on, and its places in both lists.
+    /// Bytes that a path takes, with its ray and hit, whether it goes on, and its places in both lists. Layers of light
+    /// take 16 more.
     pub const BYTES_PER_PATH: usize =
         size_of::<PathRay>() + size_of::<Hit>() + size_of::<PathState>() + size_of::<Segment>() + 3 * size_of::<u32>();
 
-    /// Makes the buffers for `capacity` paths.
+    /// Makes the buffers for `capacity` paths. `has_layers`: whether the picture has layers of light.
     ///
     /// # Errors
     /// A buffer is beyond the device's limits, or memory runs out.
-    pub fn new(context: &Arc<Context>, capacity: u32) -> Result<Self, GpuError> {
+    pub fn new(context: &Arc<Context>, capacity: u32, has_layers: bool) -> Result<Self, GpuError> {
         let storage = BufferUse::Storage;
         let capacity = capacity as usize;
         Ok(Self {
             path_states: Buffer::new(context, "path_states", capacity, storage)?,
             segments: Buffer::new(context, "segments", capacity, storage)?,
             live_paths: Buffer::new(context, "live_paths", 2 * capacity, storage)?,
+            path_snapshots: Buffer::new(context, "path_snapshots", if has_layers { capacity } else { 0 }, storage)?,
         })
     }
 }

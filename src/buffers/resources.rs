@@ -48,8 +48,13 @@ const BINDINGS_OF_WHITTED: [u32; 5] = [
     layout::BIND_RASTER_GROUPS,
 ];
 /// Further bindings, for paths.
-const BINDINGS_OF_PATHS: [u32; 4] =
-    [layout::BIND_PATH_STATES, layout::BIND_SEGMENTS, layout::BIND_LIVE_PATHS, layout::BIND_PIXEL_GUIDES];
+const BINDINGS_OF_PATHS: [u32; 5] = [
+    layout::BIND_PATH_STATES,
+    layout::BIND_SEGMENTS,
+    layout::BIND_LIVE_PATHS,
+    layout::BIND_PIXEL_GUIDES,
+    layout::BIND_PATH_SNAPSHOTS,
+];
 
 /// The number of elements of `counters` for each bounce of each batch, including the unused elements between the
 /// copies of a counter.
@@ -135,7 +140,7 @@ impl Resources {
         let more = if is_of_paths { &BINDINGS_OF_PATHS[..] } else { &BINDINGS_OF_WHITTED };
         let own = OWN_BINDINGS.iter().chain(more).copied();
         let kinds: Vec<_> = own.chain(accel::bindings()).map(binding).collect();
-        let (queue, paths) = new_queues(context, constants, is_of_paths)?;
+        let (queue, paths) = new_queues(context, constants, options)?;
         let upload_indices = || new_vertex_indices(context, &vertex_indices(&scene.triangles));
         let mut resources = Self {
             frame: Buffer::with(context, "frame", &[*constants], BufferUse::Uniform)?,
@@ -200,6 +205,7 @@ impl Resources {
                 (layout::BIND_SEGMENTS, Binding::Buffer(paths.segments.any())),
                 (layout::BIND_LIVE_PATHS, Binding::Buffer(paths.live_paths.any())),
                 (layout::BIND_PIXEL_GUIDES, Binding::Buffer(pixels.pixel_guides.any())),
+                (layout::BIND_PATH_SNAPSHOTS, Binding::Buffer(paths.path_snapshots.any())),
             ],
         };
         BindingSet::new(&self.bindings, "frame", &[&self.accel.objects(), &own[..], &more].concat())
@@ -221,8 +227,9 @@ impl Resources {
                 next.vertex_indices =
                     uses_graphics_pipeline(options).then(|| next.make_vertex_indices(context)).transpose()?;
             }
-            if next.queue.capacity() < constants.queue_capacity {
-                (next.queue, next.paths) = new_queues(context, constants, next.paths.is_some())?;
+            let has_layers = next.paths.as_ref().is_some_and(|paths| !paths.path_snapshots.is_empty());
+            if next.queue.capacity() < constants.queue_capacity || has_layers != options.has_light_layers() {
+                (next.queue, next.paths) = new_queues(context, constants, options)?;
             }
             if !next.pixels.fit(constants, options) {
                 next.pixels = Pixels::new(context, constants, options)?;
@@ -296,12 +303,13 @@ impl Resources {
         Ok(())
     }
 
-    /// Makes room for `n_sums` sums of samples for each pixel. The sums that are there are kept.
+    /// Makes room for `n_sums` sums of samples for each pixel and each layer of light. The sums that are there are
+    /// kept.
     ///
     /// # Errors
     /// The buffer is beyond the device's limits, memory runs out, or a copy fails. Nothing has changed then.
     pub fn make_room_for_sums(&mut self, context: &Arc<Context>, n_sums: u32) -> Result<(), GpuError> {
-        let n_elements = n_sums as usize * self.n_pixels();
+        let n_elements = n_sums as usize * self.n_pixels() * self.pixels.n_layers as usize;
         let (before, n_before) = (&self.pixels.pixel_accumulated, self.pixels.accumulated().len());
         if before.is_some() && n_before >= n_elements {
             return Ok(());
@@ -391,8 +399,17 @@ impl Resources {
 
     /// A dispatch of one invocation for each pixel of the window.
     pub fn pixel_dispatch(&self) -> Dispatch<'_> {
+        self.layered_dispatch(1)
+    }
+
+    /// A dispatch of one invocation for each pixel of the window in the picture, and in each of its layers of light.
+    pub fn layer_dispatch(&self) -> Dispatch<'_> {
+        self.layered_dispatch(self.pixels.n_layers)
+    }
+
+    fn layered_dispatch(&self, n_layers: u32) -> Dispatch<'_> {
         let tile = layout::TILE_SIZE;
-        Dispatch::Threads([self.constants.width, self.constants.height, 1], [tile, tile, 1])
+        Dispatch::Threads([self.constants.width, self.constants.height, n_layers], [tile, tile, 1])
     }
 
     /// Binds everything that the kernels read and write.
@@ -409,13 +426,15 @@ impl Resources {
 fn new_queues(
     context: &Arc<Context>,
     constants: &Frame,
-    is_of_paths: bool,
+    options: &RenderOptions,
 ) -> Result<(Queue, Option<PathQueue>), GpuError> {
     let capacity = constants.queue_capacity;
-    if is_of_paths {
-        Ok((Queue::of_paths(context, capacity)?, Some(PathQueue::new(context, capacity)?)))
-    } else {
-        Ok((Queue::new(context, capacity, constants.n_lights)?, None))
+    match options.integrator {
+        Integrator::Path => {
+            let paths = PathQueue::new(context, capacity, options.has_light_layers())?;
+            Ok((Queue::of_paths(context, capacity)?, Some(paths)))
+        }
+        Integrator::Whitted => Ok((Queue::new(context, capacity, constants.n_lights)?, None)),
     }
 }
 

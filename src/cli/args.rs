@@ -118,8 +118,9 @@ pub struct RenderArgs {
     /// Number of CPU threads for loading, building and --cpu, 1 to 1024 [default: one per processor]
     #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
-    /// Vulkan devices that share the drawing: indices in `kdray devices` or parts of names, separated by commas, or `all`
-    /// for all devices of the best one's kind [default: a discrete GPU, else an integrated one, else a software driver]
+    /// Vulkan device to use, or several that share the drawing: indices in `kdray devices` or parts of names, separated
+    /// by commas, or `all` for all devices of the best one's kind [default: a discrete GPU, else an integrated one,
+    /// else a software driver]
     #[arg(long, value_name = "LIST|all")]
     pub device: Option<DeviceList>,
     /// Number of times to draw the frame, 1 to 10000; the report shows the frame of median time
@@ -344,11 +345,15 @@ impl RenderArgs {
             ));
         }
         if let Some(aov) = self.aov.iter().find(|aov| aov.is_of_paths() && options.integrator != Integrator::Path) {
-            return Err(CliError::Usage(format!("--aov {aov} needs --integrator path: it is about random samples")));
+            let reason =
+                if aov.is_of_light() { "it is a layer of the light of paths" } else { "it is about random samples" };
+            return Err(CliError::Usage(format!("--aov {aov} needs --integrator path: {reason}")));
         }
         // Passes are timed only if some output shows the times.
         let profile = !self.quiet || self.profile.is_some() || self.trace.is_some();
-        Ok(RenderOptions { crop, features: !self.aov.is_empty(), profile, ..options })
+        let features = self.aov.iter().any(|aov| !aov.is_of_light());
+        let light_layers = self.aov.iter().any(|aov| aov.is_of_light());
+        Ok(RenderOptions { crop, features, light_layers, profile, ..options })
     }
 }
 

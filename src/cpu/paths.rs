@@ -10,6 +10,7 @@ use crate::{
         inputs::KernelInputs,
         path_begin::path_begin,
         path_compact,
+        path_layers::path_layers,
         path_scatter::{PathBuffers, path_scatter},
         path_trace::{closest_hits_by, segments_by},
     },
@@ -21,6 +22,8 @@ use crate::{
 pub struct Paths {
     pub states: Vec<PathState>,
     segments: Vec<Segment>,
+    /// The radiance of each path when the last layer of light was complete.
+    snapshots: Vec<[f32; 4]>,
     /// The indices of the paths that are alive, for bounces of even depth and for those of odd depth.
     live: [Vec<u32>; 2],
 }
@@ -43,7 +46,7 @@ impl Paths {
     /// Finds the hits of the paths that are alive, and tests the segments of the bounce before. Returns the numbers of
     /// hits and of segments.
     pub fn trace(&mut self, inputs: &KernelInputs, traversal: Traversal, depth: u32, queue: &mut Queue) -> (u32, u32) {
-        let Self { states, segments, live } = self;
+        let Self { states, segments, live, .. } = self;
         let [live, before] = [depth, depth + 1].map(|depth| &live[depth as usize % 2]);
         let n_hits = closest_hits_by::<FastTracer>(inputs, traversal, live, &queue.rays, &mut queue.hits);
         if depth == 0 {
@@ -60,6 +63,12 @@ impl Paths {
         let Queue { rays, hits, child_kinds, scan_blocks, .. } = queue;
         let paths = PathBuffers { rays, states: &mut self.states, segments: &mut self.segments };
         path_scatter(inputs, batch, (live, hits), paths, (child_kinds, scan_blocks));
+    }
+
+    /// Adds up the layer of light that is complete after the batch's bounce.
+    pub fn layers(&mut self, frame: &Frame, batch: &Batch, pixel_layers: &mut [[f32; 4]]) {
+        self.snapshots.resize(self.states.len(), [0.0; 4]);
+        path_layers(frame, batch, &self.states, &mut self.snapshots, pixel_layers);
     }
 
     /// Computes the prefix sums of the numbers of paths that go on, and the row of the next bounce.

@@ -6,11 +6,12 @@ use super::{paths::Paths, queue::Queue, timing::Clock};
 use crate::{
     accel::kdtree::TraversalLinks,
     frame::{
-        BounceStats, Denoise, FrameKind, Integrator, Pass, Picture, Plan, Primary, Profile, RenderOptions, opaque,
-        plan::passes,
+        BounceStats, Denoise, FrameKind, Integrator, LightLayers, Pass, Picture, Plan, Primary, Profile, RenderOptions,
+        opaque, plan::passes,
     },
     layout::{
-        Batch, Bounce, EdgeStep, Feature, Frame, Guide, Hit, MOST_SAMPLES_LOG2, Material, PathRay, SCAN_GROUP_SIZE,
+        Batch, Bounce, EdgeStep, Feature, Frame, Guide, Hit, LIGHT_LAYERS, MOST_SAMPLES_LOG2, Material, PathRay,
+        SCAN_GROUP_SIZE,
     },
     reference::{
         accumulate,
@@ -58,6 +59,10 @@ pub struct Renderer {
     pixel_radiance: Vec<[f32; 4]>,
     /// Sums of the samples. Not in use before the second sample of a picture.
     pixel_accumulated: Vec<[f32; 4]>,
+    /// The layers of light, one after the other, as in `pixel_radiance`. Empty unless the options request them.
+    pixel_layers: Vec<[f32; 4]>,
+    /// Sums of the samples of the layers.
+    layers_accumulated: Vec<[f32; 4]>,
     /// Radiances after the noise filter. Empty if there is no filter.
     pixel_filtered: Vec<[f32; 4]>,
     pixel_display: Vec<[u8; 4]>,
@@ -90,6 +95,7 @@ impl Renderer {
     pub fn new(world: &World, options: &RenderOptions, batching: Batching) -> Self {
         let frame = world.frame_constants(options);
         let n_pixels = frame.width as usize * frame.height as usize;
+        let n_layers = if options.has_light_layers() { LIGHT_LAYERS as usize } else { 0 };
         Self {
             camera: world.scene().camera,
             world: world.clone(),
@@ -100,6 +106,8 @@ impl Renderer {
             triangle_ids: vec![0; n_pixels],
             pixel_radiance: vec![[0.0; 4]; n_pixels],
             pixel_accumulated: Vec::new(),
+            pixel_layers: vec![[0.0; 4]; n_layers * n_pixels],
+            layers_accumulated: Vec::new(),
             pixel_filtered: Vec::new(),
             pixel_display: vec![[0; 4]; n_pixels],
             pixel_features: vec![Feature::default(); if options.features { n_pixels } else { 0 }],
@@ -223,6 +231,15 @@ impl Renderer {
         self.options.window().part(&self.pixel_features, &self.options.crop_or_whole())
     }
 
+    /// Returns the layers of the picture's light, which are empty if the options do not request them.
+    pub fn light_layers(&self) -> LightLayers {
+        let (window, crop) = (self.options.window(), self.options.crop_or_whole());
+        let mut layers = LightLayers::default();
+        let pixels = self.pixel_layers.chunks_exact(self.pixel_radiance.len());
+        layers.0.iter_mut().zip(pixels).for_each(|(layer, pixels)| *layer = window.part(pixels, &crop));
+        layers
+    }
+
     /// Adds to features what the samples of each pixel tell of its noise. The frames must trace paths.
     pub(crate) fn note_noise(&self, features: &mut [Feature]) {
         let means = self.options.window().part(&self.pixel_radiance, &self.options.crop_or_whole());
@@ -275,7 +292,9 @@ impl Renderer {
                 break;
             }
         }
-        passes(&plan.light).for_each(|pass| self.run(pass, 0));
+        let after_bounces = plan.bounces.len() as u32;
+        self.batch.depth = after_bounces;
+        passes(&plan.light).for_each(|pass| self.run(pass, after_bounces));
         self.count();
     }
 
@@ -299,6 +318,7 @@ impl Renderer {
             Pass::PathTrace => self.path_trace(depth),
             Pass::PathScatter => self.path_scatter(depth),
             Pass::PathCompact => self.path_compact(depth),
+            Pass::PathLayers => self.path_layers(depth),
             Pass::PathResolve => self.path_resolve(),
             Pass::PathAccumulate => self.path_accumulate(),
             Pass::Guides => self.guides(),
@@ -367,6 +387,12 @@ impl Renderer {
         self.clock.time(Pass::PathCompact, Some(depth), || paths.compact(depth, queue));
     }
 
+    fn path_layers(&mut self, depth: u32) {
+        let Self { frame, batch, paths, pixel_layers, .. } = self;
+        let bounce = (depth + 1 < LIGHT_LAYERS).then_some(depth);
+        self.clock.time(Pass::PathLayers, bounce, || paths.layers(frame, batch, pixel_layers));
+    }
+
     fn path_resolve(&mut self) {
         let Self { frame, batch, paths, pixel_radiance, .. } = self;
         let resolve = || path_resolve::path_resolve(frame, batch, &paths.states, pixel_radiance);
@@ -374,8 +400,11 @@ impl Renderer {
     }
 
     fn path_accumulate(&mut self) {
-        let (frame, radiance, sums) = (&self.frame, &mut self.pixel_radiance, &mut self.pixel_accumulated);
-        self.clock.time(Pass::PathAccumulate, None, || path_accumulate::path_accumulate(frame, radiance, sums));
+        let Self { frame, pixel_radiance, pixel_accumulated, pixel_layers, layers_accumulated, .. } = self;
+        self.clock.time(Pass::PathAccumulate, None, || {
+            path_accumulate::path_accumulate(frame, pixel_radiance, pixel_accumulated);
+            path_accumulate::path_accumulate(frame, pixel_layers, layers_accumulated);
+        });
     }
 
     fn visibility(&mut self) {

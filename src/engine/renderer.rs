@@ -7,7 +7,7 @@ use tracing::info_span;
 use super::group::RendererGroup;
 use crate::{
     cpu::{self, Batching},
-    frame::{Drawn, Goal, Integrator, Pacer, Picture, RenderOptions, SampleRange, SampleSums, Watcher},
+    frame::{Drawn, Goal, Integrator, Pacer, Picture, RangeSums, RenderOptions, SampleRange, Watcher},
     gpu::{Context, GivenImage, GpuError, TimelinePoint},
     render::BandedRenderer,
     scene::Camera,
@@ -60,7 +60,8 @@ impl Renderer {
     }
 
     /// Draws the samples of a range with the path tracer, one aligned block after the other. Returns their sums, from
-    /// which [`SampleSums::mean`] makes the picture. The features are those of the first block, with the noise of all.
+    /// which [`SampleSums::mean`](crate::frame::SampleSums::mean) makes the picture. The features are those of the
+    /// first block, with the noise of all. The layers of light are those of all blocks.
     ///
     /// # Errors
     /// Fails as [`Renderer::draw`] does.
@@ -69,8 +70,8 @@ impl Renderer {
         camera: &Camera,
         samples: SampleRange,
         mut watcher: impl Watcher,
-    ) -> Result<(Drawn, SampleSums), GpuError> {
-        let (mut drawn, mut sums) = (None::<Drawn>, SampleSums::default());
+    ) -> Result<(Drawn, RangeSums), GpuError> {
+        let (mut drawn, mut sums) = (None::<Drawn>, RangeSums::default());
         for block in samples.blocks() {
             match &mut self.0 {
                 Backend::Device(renderer) => renderer.set_first_sample(block.first)?,
@@ -78,7 +79,7 @@ impl Renderer {
                 Backend::Cpu(renderer) => renderer.set_first_sample(block.first),
             }
             let next = self.draw_watched(camera, Goal::Samples(block.len()), &mut watcher)?;
-            sums.push_mean(block, &self.picture()?.radiance);
+            sums.push_mean(block, &self.picture()?.radiance, &next.light);
             match &mut drawn {
                 None => drawn = Some(next),
                 Some(all) => {
@@ -88,7 +89,8 @@ impl Renderer {
                 }
             }
         }
-        Ok((drawn.unwrap_or_default(), sums))
+        let drawn = Drawn { light: sums.mean_of_light(), ..drawn.unwrap_or_default() };
+        Ok((drawn, sums))
     }
 
     fn draw_watched(&mut self, camera: &Camera, goal: Goal, watcher: &mut impl Watcher) -> Result<Drawn, GpuError> {
@@ -113,8 +115,8 @@ impl Renderer {
     /// not wait for the copy.
     ///
     /// # Errors
-    /// The renderer runs on the CPU or on several devices. The picture was drawn in several bands, so it is not on the device. The image is
-    /// smaller than the picture. A call fails. In all these cases nothing is signalled.
+    /// The renderer runs on the CPU or on several devices. The picture was drawn in several bands, so it is not on the
+    /// device. The image is smaller than the picture. A call fails. In all these cases nothing is signalled.
     pub fn copy_picture_to(
         &self,
         image: &GivenImage,
@@ -166,5 +168,6 @@ fn draw_on_cpu(renderer: &mut cpu::Renderer, goal: Goal, watcher: &mut impl Watc
     if integrator == Integrator::Path {
         renderer.note_noise(&mut drawn.features);
     }
+    drawn.light = renderer.light_layers();
     drawn
 }

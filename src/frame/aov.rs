@@ -2,7 +2,10 @@
 //! file.
 
 use super::variance_of_joined;
-use crate::{layout::Feature, reference::noise};
+use crate::{
+    layout::{Feature, LIGHT_LAYERS},
+    reference::noise,
+};
 
 /// An output variable, in world space and world units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,6 +32,13 @@ pub enum Aov {
     Variance,
     /// Number of the pixel's samples. Only pictures of paths have it.
     Samples,
+    /// Light that the camera sees directly, before any bounce: of emitters, the environment and the background. Only
+    /// pictures of paths have it.
+    Emission,
+    /// Light that reaches the camera after one bounce. Only pictures of paths have it.
+    Direct,
+    /// Light that reaches the camera after more than one bounce. Only pictures of paths have it.
+    Indirect,
 }
 
 named_enum!(Aov {
@@ -42,6 +52,9 @@ named_enum!(Aov {
     Cost = "cost": "nodes or cells, and triangles that these rays read; also drawn as NAME.cost.png",
     Variance = "variance": "variance of the pixel's mean luminance, from its samples; needs --integrator path",
     Samples = "samples": "number of the pixel's samples; needs --integrator path",
+    Emission = "emission": "light that is seen directly: lamps, sky, background; needs --integrator path",
+    Direct = "direct": "light after one bounce; needs --integrator path",
+    Indirect = "indirect": "light after more than one bounce; needs --integrator path",
 });
 
 /// A named channel, with a number for each pixel.
@@ -78,12 +91,20 @@ impl Feature {
 }
 
 impl Aov {
+    /// The layers of light, whose sum is the radiance of a picture without noise filter.
+    pub const OF_LIGHT: [Self; LIGHT_LAYERS as usize] = [Self::Emission, Self::Direct, Self::Indirect];
+
     /// Whether only pictures of paths have the output.
     pub fn is_of_paths(self) -> bool {
-        matches!(self, Self::Variance | Self::Samples)
+        matches!(self, Self::Variance | Self::Samples) || self.is_of_light()
     }
 
-    /// Returns the output's channels, from a picture's features.
+    /// Whether the output is a layer of light.
+    pub fn is_of_light(self) -> bool {
+        Self::OF_LIGHT.contains(&self)
+    }
+
+    /// Returns the output's channels, from a picture's features. Those of light are none of them.
     pub fn channels(self, features: &[Feature]) -> Vec<Channel> {
         let float = |component: &str, value: fn(&Feature) -> f32| Channel {
             name: format!("{self}.{component}"),
@@ -114,6 +135,7 @@ impl Aov {
             Self::Cost => vec![uint("N", |f| f.n_steps)],
             Self::Variance => vec![float("Y", |f| f.variance)],
             Self::Samples => vec![uint("N", |f| f.n_samples)],
+            Self::Emission | Self::Direct | Self::Indirect => Vec::new(),
         }
     }
 }

@@ -56,6 +56,16 @@ impl Crop {
         let rows = pixels.chunks_exact(self.width() as usize).skip((crop.y0 - self.y0) as usize);
         rows.take(crop.height() as usize).flat_map(|row| &row[left..left + width]).copied().collect()
     }
+
+    /// Copies the pixels of `crop` to their places in those of this rectangle, which must contain it. `pixels`: the
+    /// pixels of this rectangle, rows from the top.
+    pub(crate) fn place<T: Copy>(&self, pixels: &mut [T], crop: &Crop, part: &[T]) {
+        let (left, width) = ((crop.x0 - self.x0) as usize, crop.width() as usize);
+        let rows = pixels.chunks_exact_mut(self.width() as usize).skip((crop.y0 - self.y0) as usize);
+        for (row, part) in rows.zip(part.chunks_exact(width)) {
+            row[left..left + width].copy_from_slice(part);
+        }
+    }
 }
 
 impl RenderOptions {
@@ -136,5 +146,13 @@ mod tests {
         assert_eq!(window.part(&pixels, &Crop { x0: 11, y0: 21, x1: 13, y1: 22 }), [4, 5]);
         assert_eq!(window.part(&pixels, &Crop { x0: 10, y0: 22, x1: 11, y1: 23 }), [6]);
         assert_eq!(window.part(&pixels, &window), pixels);
+    }
+
+    #[test]
+    fn a_part_is_put_back() {
+        let window = Crop { x0: 10, y0: 20, x1: 13, y1: 23 };
+        let mut pixels = [0; 9];
+        window.place(&mut pixels, &Crop { x0: 11, y0: 21, x1: 13, y1: 23 }, &[1, 2, 3, 4]);
+        assert_eq!(pixels, [0, 0, 0, 0, 1, 2, 0, 3, 4]);
     }
 }

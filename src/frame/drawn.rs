@@ -1,6 +1,6 @@
 //! Results of drawing a picture, and the watcher that follows its progress.
 
-use super::Profile;
+use super::{LightLayers, Profile};
 use crate::layout::Feature;
 
 /// Results of drawing, beside the picture.
@@ -9,6 +9,8 @@ pub struct Drawn {
     /// What the primary ray of each pixel hits in the first sample, and what all rays of that sample cost. Empty
     /// unless the options ask for features.
     pub features: Vec<Feature>,
+    /// The layers of the picture's light, the means of all samples. Empty unless the options ask for them.
+    pub light: LightLayers,
     /// Times and counts of all samples of all bands.
     pub profile: Profile,
     /// Number of samples of each pixel.

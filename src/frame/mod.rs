@@ -10,7 +10,7 @@
 //!   pass       what each pass does, reads and writes
 //!   resource   the buffers and images that passes write
 //! bounce     sizes of a bounce's dispatches
-//! results    drawn; profile and counts; aov and view: features beside the picture
+//! results    drawn; profile and counts; aov, light_layers and view: what there is beside the picture
 //! ```
 
 mod aov;
@@ -20,6 +20,7 @@ pub(crate) mod counts;
 mod crop;
 mod drawn;
 mod goal;
+mod light_layers;
 mod pass;
 pub mod plan;
 mod profile;
@@ -33,6 +34,7 @@ pub use self::{
     crop::Crop,
     drawn::{Drawn, Watcher},
     goal::{Goal, Pacer},
+    light_layers::{LightLayers, RangeSums},
     pass::{Pass, Role, Scope},
     plan::{FrameKind, Plan, Section, Step, Touch},
     profile::{BounceStats, PassTime, Profile},
@@ -72,6 +74,9 @@ pub struct RenderOptions {
     pub profile: bool,
     /// Whether the features of each pixel are written: what its primary ray hits, and what all its rays cost.
     pub features: bool,
+    /// Whether the picture has layers of its light: emission, direct and indirect light ([`Aov::OF_LIGHT`]). Only
+    /// frames of [`Integrator::Path`] have them. They take three times the memory of the pixels' samples in addition.
+    pub light_layers: bool,
     /// Whether [`Integrator::Whitted`] shows ambient light in place of light that only paths show: of an environment,
     /// of lights with an area and of surfaces that shine.
     pub stands_in: bool,
@@ -87,6 +92,11 @@ impl RenderOptions {
             Integrator::Whitted => self.max_depth,
             Integrator::Path => self.max_depth + 1,
         }
+    }
+
+    /// Whether frames have layers of light.
+    pub fn has_light_layers(&self) -> bool {
+        self.light_layers && self.integrator == Integrator::Path
     }
 
     /// Returns the noise filter that frames have: that of the options, but none in place of [`Denoise::Edge`] unless
@@ -137,6 +147,7 @@ impl Default for RenderOptions {
             primary: Primary::Raster,
             profile: true,
             features: false,
+            light_layers: false,
             stands_in: false,
             paths: PathOptions::default(),
         }

@@ -3,9 +3,9 @@
 use super::resource::{
     Resource,
     Resource::{
-        Bounces, ChildKinds, Counters, FirstChildren, Hits, LightVisibility, LivePaths, PathStates, PixelAccumulated,
-        PixelDisplay, PixelFeatures, PixelFiltered, PixelGuides, PixelNearest, PixelRadiance, RasterGroups,
-        RayRadiance, Rays, ScanBlocks, Segments, Stalls, TriangleIds,
+        Bounces, ChildKinds, Counters, FirstChildren, Hits, LightVisibility, LivePaths, PathSnapshots, PathStates,
+        PixelAccumulated, PixelDisplay, PixelFeatures, PixelFiltered, PixelGuides, PixelNearest, PixelRadiance,
+        RasterGroups, RayRadiance, Rays, ScanBlocks, Segments, Stalls, TriangleIds,
     },
 };
 
@@ -34,7 +34,8 @@ pub enum Scope {
     /// Once for each batch, for the rays of all its bounces together.
     Batch,
     /// Once for a bounce of a batch, in each bounce that has the pass. Not all bounces have it: `primary_hit`,
-    /// `features` and `guides` run for bounce 0 only, and the last bounce has no compaction.
+    /// `features` and `guides` run for bounce 0 only, and the last bounce has no compaction. `path_layers` runs for the
+    /// bounces 0 and 1, and once for all others together.
     Bounce,
 }
 
@@ -82,6 +83,8 @@ pub enum Pass {
     PathScatter,
     /// Lists the paths that go on, without gaps.
     PathCompact,
+    /// Adds up one layer of the light of each pixel's paths: emission, direct or indirect light.
+    PathLayers,
     /// Adds up the radiance of each pixel's paths.
     PathResolve,
     /// Turns the sum of the frame's samples into the mean of all samples.
@@ -108,7 +111,7 @@ struct Info {
 }
 
 /// A row for each pass, in the order of [`Pass`].
-const TABLE: [Info; 25] = [
+const TABLE: [Info; 26] = [
     Info {
         pass: Pass::Visibility,
         name: "visibility",
@@ -308,6 +311,16 @@ const TABLE: [Info; 25] = [
         reads: &[ChildKinds, ScanBlocks, Bounces, LivePaths],
         writes: &[LivePaths],
         indirect: Some(Bounces),
+    },
+    Info {
+        pass: Pass::PathLayers,
+        name: "path_layers",
+        role: Role::Light,
+        scope: Scope::Bounce,
+        color: [150, 190, 80],
+        reads: &[PathStates, PathSnapshots],
+        writes: &[PathSnapshots, PixelRadiance],
+        indirect: None,
     },
     Info {
         pass: Pass::PathResolve,

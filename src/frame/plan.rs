@@ -8,14 +8,14 @@ use super::{
     resource::{
         Resource,
         Resource::{
-            Bounces, ChildKinds, Counters, FirstChildren, Hits, LightVisibility, LivePaths, PathStates,
+            Bounces, ChildKinds, Counters, FirstChildren, Hits, LightVisibility, LivePaths, PathSnapshots, PathStates,
             PixelAccumulated, PixelFeatures, PixelFiltered, PixelGuides, PixelNearest, PixelRadiance, RasterGroups,
             RayRadiance, Rays, ScanBlocks, Segments,
         },
     },
     {Denoise, Integrator, Primary, RenderOptions},
 };
-use crate::layout::EDGE_STEPS;
+use crate::layout::{EDGE_STEPS, LIGHT_LAYERS};
 
 /// How the passes before or after a barrier access its resources.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,6 +61,8 @@ pub struct FrameKind {
     pub n_bounces: u32,
     /// Whether the features of each pixel are written: what its primary ray hits, and what all its rays cost.
     pub features: bool,
+    /// Whether the picture has layers of light. Only frames that trace paths have them.
+    pub light_layers: bool,
     /// Whether hits are lit. They are not if the frame displays a feature, such as depth, that depends on the hits of
     /// primary rays only.
     pub is_lit: bool,
@@ -83,6 +85,7 @@ impl FrameKind {
             primary: options.primary,
             n_bounces: options.n_bounces(),
             features: options.features,
+            light_layers: options.has_light_layers(),
             is_lit: true,
             has_lights: n_lights > 0,
             adds_samples: true,
@@ -120,7 +123,8 @@ impl Plan {
 
     /// Returns the passes of a frame that traces paths.
     fn of_paths(kind: &FrameKind) -> Self {
-        let light = vec![Step::Run(Pass::PathResolve), barrier(Touch::Write, Touch::Update, &[PixelRadiance])];
+        let mut light = if kind.light_layers { layer().to_vec() } else { Section::new() };
+        light.extend([Step::Run(Pass::PathResolve), barrier(Touch::Write, Touch::Update, &[PixelRadiance])]);
         let sums = vec![
             Step::Run(Pass::PathAccumulate),
             barrier(Touch::Write, Touch::Read, &[PixelAccumulated, PixelRadiance]),
@@ -199,6 +203,10 @@ fn bounce_of_paths(kind: &FrameKind, depth: u32) -> Section {
     if depth == 0 && kind.is_lit && kind.denoise == Denoise::Edge {
         bounce.extend([Step::Run(Pass::Guides), barrier(Touch::Write, Touch::Update, &[PixelGuides])]);
     }
+    // The last layer is complete after the last bounce.
+    if depth + 1 < LIGHT_LAYERS && kind.is_lit && kind.light_layers {
+        bounce.extend(layer());
+    }
     if depth + 1 < kind.n_bounces {
         bounce.extend([
             barrier(Touch::Indirect, Touch::Write, &[Bounces]),
@@ -210,6 +218,11 @@ fn bounce_of_paths(kind: &FrameKind, depth: u32) -> Section {
         ]);
     }
     bounce
+}
+
+/// Returns the steps that add up a layer of light.
+fn layer() -> [Step; 2] {
+    [Step::Run(Pass::PathLayers), barrier(Touch::Write, Touch::Update, &[PathSnapshots, PixelRadiance])]
 }
 
 /// Returns the section that finds the closest hits of one bounce's rays and, from these, makes the next bounce's

@@ -21,7 +21,8 @@ pub enum Resource {
     LightVisibility,
     /// The radiance that each ray contributes to its pixel, weighted by the ray's throughput.
     RayRadiance,
-    /// The sample's radiance in each pixel, then the mean of all samples.
+    /// The sample's radiance in each pixel, then the mean of all samples. The layers of light follow, if the picture
+    /// has them.
     PixelRadiance,
     /// The sum of the radiances of all samples of each pixel.
     PixelAccumulated,
@@ -51,11 +52,13 @@ pub enum Resource {
     Segments,
     /// The indices of the paths that are alive, for this bounce and the next.
     LivePaths,
+    /// The radiance of each path when the last layer of light was complete.
+    PathSnapshots,
 }
 
 impl Resource {
     /// Every resource.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 23] = [
         Self::Rays,
         Self::Hits,
         Self::ChildKinds,
@@ -78,6 +81,7 @@ impl Resource {
         Self::PathStates,
         Self::Segments,
         Self::LivePaths,
+        Self::PathSnapshots,
     ];
 
     /// Returns its binding in the frame's descriptor set.
@@ -105,6 +109,7 @@ impl Resource {
             Self::PathStates => layout::BIND_PATH_STATES,
             Self::Segments => layout::BIND_SEGMENTS,
             Self::LivePaths => layout::BIND_LIVE_PATHS,
+            Self::PathSnapshots => layout::BIND_PATH_SNAPSHOTS,
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Part, coverage::Tile};
+use super::{Part, coverage::Tile, part::Mean};
 use crate::{
     cpu,
     frame::{Aov, Channel, Crop, Picture, SampleRange, SampleSums, Samples, Tonemap, variance_of_joined},
@@ -54,7 +54,7 @@ pub fn join(tiles: Vec<Tile>) -> Merged {
     if devices.len() > 1 {
         (record.device, record.driver) = (devices.join("; "), String::new());
     }
-    let n_pixels = width as usize * height as usize;
+    let (n_pixels, all) = (width as usize * height as usize, Crop::whole(width, height));
     let mut radiance = vec![[0.0; 4]; n_pixels];
     let mut channels: Vec<_> = tiles[0][0]
         .channels
@@ -70,11 +70,15 @@ pub fn join(tiles: Vec<Tile>) -> Merged {
     let n_parts = parts().count();
     for tile in tiles {
         let crop = tile[0].record.crop;
-        place(&mut radiance, width, &crop, &mean_of(&tile));
+        all.place(&mut radiance, &crop, &mean_of(&tile, |part| &part.picture));
+        let light: Vec<_> = (0..tile[0].light.len())
+            .map(|layer_ix| (tile[0].light[layer_ix].0, mean_of(&tile, |part| &part.light[layer_ix].1)))
+            .collect();
         for (channel_ix, whole) in channels.iter_mut().enumerate() {
-            match (&mut whole.samples, joined_channel(&tile, channel_ix)) {
-                (Samples::Float(whole), Samples::Float(part)) => place(whole, width, &crop, &part),
-                (Samples::Uint(whole), Samples::Uint(part)) => place(whole, width, &crop, &part),
+            let joined = channel_of_light(&light, &whole.name).unwrap_or_else(|| joined_channel(&tile, channel_ix));
+            match (&mut whole.samples, joined) {
+                (Samples::Float(whole), Samples::Float(part)) => all.place(whole, &crop, &part),
+                (Samples::Uint(whole), Samples::Uint(part)) => all.place(whole, &crop, &part),
                 _ => (),
             }
         }
@@ -88,16 +92,23 @@ fn device_of(record: &Record) -> String {
     if record.driver.is_empty() { record.device.clone() } else { format!("{}, {}", record.device, record.driver) }
 }
 
-/// Returns the mean of all samples of a tile.
-fn mean_of(tile: &Tile) -> Vec<[f32; 4]> {
+/// Returns the mean of all samples of a tile. `mean`: of a part.
+fn mean_of(tile: &Tile, mean: impl Fn(&Part) -> &Mean) -> Vec<[f32; 4]> {
     match &tile[..] {
-        [part] => part.radiance.clone(),
+        [part] => mean(part).radiance.clone(),
         parts => {
             let mut sums = SampleSums::default();
-            parts.iter().for_each(|part| part.add_to(&mut sums));
+            parts.iter().for_each(|part| mean(part).add_to(part.record.samples, &mut sums));
             sums.mean()
         }
     }
+}
+
+/// Returns a channel of a layer of light, if it is one. `light`: the layers of a tile.
+fn channel_of_light(light: &[(Aov, Vec<[f32; 4]>)], name: &str) -> Option<Samples> {
+    let (_, mean) = light.iter().find(|(aov, _)| is_of(name, *aov))?;
+    let component = ["R", "G", "B"].iter().position(|component| name.ends_with(component))?;
+    Some(Samples::Float(mean.iter().map(|pixel| pixel[component]).collect()))
 }
 
 /// Returns a channel of a tile. It is that of the part with the first samples, unless it is about all samples.
@@ -130,12 +141,4 @@ fn joined_channel(tile: &Tile, channel_ix: usize) -> Samples {
 /// Whether a channel is one of an output variable's.
 fn is_of(channel: &str, aov: Aov) -> bool {
     channel.split_once('.').is_some_and(|(layer, _)| layer == aov.to_string())
-}
-
-/// Copies the pixels of a crop to their places in a picture of the given width.
-fn place<T: Copy>(picture: &mut [T], width: u32, crop: &Crop, pixels: &[T]) {
-    let rows = picture.chunks_exact_mut(width as usize).skip(crop.y0 as usize);
-    for (row, part) in rows.zip(pixels.chunks_exact(crop.width() as usize)) {
-        row[crop.x0 as usize..crop.x1 as usize].copy_from_slice(part);
-    }
 }

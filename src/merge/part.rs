@@ -15,8 +15,8 @@ use exr::{
 
 use super::MergeError;
 use crate::{
-    frame::{BlockSum, Channel, SampleRange, SampleSums, Samples},
-    output::{RECORD_ATTRIBUTE, Record},
+    frame::{Aov, BlockSum, Channel, SampleRange, SampleSums, Samples},
+    output::{self, RECORD_ATTRIBUTE, Record},
     util::{memory, text::short_line},
 };
 
@@ -27,12 +27,35 @@ pub struct Part {
     pub path: PathBuf,
     /// What it shows.
     pub record: Record,
-    /// The mean of its samples, linear RGB, rows from the top. The fourth component is 1.
-    pub radiance: Vec<[f32; 4]>,
-    /// The sums of its samples, if they are some of the picture's samples, but not one aligned block of them.
-    sums: Vec<BlockSum>,
-    /// Its channels beside colour.
+    /// The mean of its samples.
+    pub(super) picture: Mean,
+    /// The layers of light that it has, each with its name.
+    pub(super) light: Vec<(Aov, Mean)>,
+    /// Its channels beside colour, with the means of the layers of light.
     pub channels: Vec<Channel>,
+}
+
+/// A mean of samples.
+#[derive(Clone, Debug)]
+pub(super) struct Mean {
+    /// Linear RGB, rows from the top. The fourth component is 1.
+    pub radiance: Vec<[f32; 4]>,
+    /// The sums of the samples, if they are some of the picture's samples, but not one aligned block of them.
+    sums: Vec<BlockSum>,
+}
+
+impl Mean {
+    /// Adds the samples of a part to the sums of earlier ones. `samples`: of the part.
+    ///
+    /// # Panics
+    /// The samples do not follow those of the sums.
+    pub fn add_to(&self, samples: SampleRange, sums: &mut SampleSums) {
+        if self.sums.is_empty() {
+            sums.push_mean(samples, &self.radiance);
+        } else {
+            self.sums.iter().for_each(|block| sums.push(block.clone()));
+        }
+    }
 }
 
 impl Part {
@@ -54,18 +77,6 @@ impl Part {
         Self::of_layer(path, &image.layer_data)
     }
 
-    /// Adds the part's samples to the sums of earlier ones.
-    ///
-    /// # Panics
-    /// The samples do not follow those of the sums.
-    pub(super) fn add_to(&self, sums: &mut SampleSums) {
-        if self.sums.is_empty() {
-            sums.push_mean(self.record.samples, &self.radiance);
-        } else {
-            self.sums.iter().for_each(|block| sums.push(block.clone()));
-        }
-    }
-
     fn of_layer(path: &Path, layer: &Layer<AnyChannels<FlatSamples>>) -> Result<Self, String> {
         let record = record_of(&layer.attributes)?;
         let channels: Vec<_> = layer.channel_data.list.iter().map(channel_of).collect();
@@ -75,16 +86,21 @@ impl Part {
                 "its checksum is not that of its contents: the file is damaged, render the part again".to_owned()
             );
         }
-        let radiance = colours(&channels, "")?.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect();
         let blocks: Vec<_> = record.samples.blocks().collect();
         let is_whole = record.samples == SampleRange::whole(record.whole.n_samples);
         let blocks = if is_whole || blocks.len() == 1 { Vec::new() } else { blocks };
-        let sum =
-            |samples: SampleRange| Ok(BlockSum { samples, sums: colours(&channels, &format!("sum {samples}."))? });
-        let sums = blocks.into_iter().map(sum).collect::<Result<_, String>>()?;
-        let is_colour = |name: &str| ["R", "G", "B"].contains(&name) || name.starts_with("sum ");
-        let channels = channels.into_iter().filter(|channel| !is_colour(&channel.name)).collect();
-        Ok(Self { path: path.to_owned(), record, radiance, sums, channels })
+        let picture = mean_of(&channels, "", &blocks)?;
+        let mut light = Vec::new();
+        for aov in Aov::OF_LIGHT {
+            let prefix = format!("{aov}.");
+            if channels.iter().any(|channel| channel.name.starts_with(&prefix)) {
+                light.push((aov, mean_of(&channels, &prefix, &blocks)?));
+            }
+        }
+        let is_sum = |name: &str| name.starts_with("sum ") || name.contains(".sum ");
+        let is_colour = |name: &str| ["R", "G", "B"].contains(&name);
+        let channels = channels.into_iter().filter(|Channel { name, .. }| !is_sum(name) && !is_colour(name)).collect();
+        Ok(Self { path: path.to_owned(), record, picture, light, channels })
     }
 }
 
@@ -127,6 +143,15 @@ fn channel_of(channel: &AnyChannel<FlatSamples>) -> Channel {
         FlatSamples::U32(samples) => Samples::Uint(samples.clone()),
     };
     Channel { name: channel.name.to_string(), samples }
+}
+
+/// Returns the mean of samples, and the sums of its blocks, whose channels' names begin with `prefix`.
+fn mean_of(channels: &[Channel], prefix: &str, blocks: &[SampleRange]) -> Result<Mean, String> {
+    let radiance = colours(channels, prefix)?.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect();
+    let sum = |&samples: &SampleRange| {
+        Ok(BlockSum { samples, sums: colours(channels, &output::sum_prefix(prefix, samples))? })
+    };
+    Ok(Mean { radiance, sums: blocks.iter().map(sum).collect::<Result<_, String>>()? })
 }
 
 /// Returns the colours of the channels whose names begin with `prefix`.

@@ -11,7 +11,7 @@ use tracing::info_span;
 
 use super::{OutputError, RECORD_ATTRIBUTE, Record, dimension_mismatch, write};
 use crate::{
-    frame::{Aov, BlockSum, Channel, Crop, Picture, Samples},
+    frame::{Aov, BlockSum, Channel, Crop, Picture, SampleRange, Samples},
     layout::Feature,
 };
 
@@ -22,8 +22,12 @@ pub struct Layers<'a> {
     pub aovs: &'a [Aov],
     /// An entry for each pixel; may be empty without AOVs.
     pub features: &'a [Feature],
+    /// The layers of light. Those that `aovs` lists have the pixels of the picture.
+    pub light: [&'a [[f32; 4]]; Aov::OF_LIGHT.len()],
     /// Sums of blocks of samples, for parts of a picture whose means do not tell the sums.
     pub sums: &'a [BlockSum],
+    /// The same sums of the layers of light.
+    pub light_sums: [&'a [BlockSum]; Aov::OF_LIGHT.len()],
     /// What the picture shows. It places a crop in the whole picture.
     pub record: Option<&'a Record>,
 }
@@ -76,27 +80,35 @@ fn write_channels(
 }
 
 fn channels(picture: &Picture, layers: &Layers) -> Vec<Channel> {
-    let colour = |(name, ix): (&str, usize)| Channel {
-        name: name.to_owned(),
-        samples: Samples::Float(picture.radiance.iter().map(|pixel| pixel[ix]).collect()),
-    };
-    let sum = |block: &BlockSum, (name, ix): (&str, usize)| Channel {
-        name: format!("{}.{name}", sums_name(block)),
-        samples: Samples::Float(block.sums.iter().map(|sum| sum[ix]).collect()),
-    };
-    let mut channels: Vec<_> = COLOUR.into_iter().map(colour).collect();
-    channels.extend(layers.sums.iter().flat_map(|block| COLOUR.map(|component| sum(block, component))));
-    for (i, aov) in layers.aovs.iter().enumerate() {
-        if !layers.aovs[..i].contains(aov) {
-            channels.extend(aov.channels(layers.features));
+    let mut channels = colours("", &picture.radiance, layers.sums);
+    let is_first = |(i, aov): &(usize, &Aov)| !layers.aovs[..*i].contains(aov);
+    for (_, aov) in layers.aovs.iter().enumerate().filter(is_first) {
+        match Aov::OF_LIGHT.iter().position(|layer| layer == aov) {
+            Some(layer_ix) => {
+                channels.extend(colours(&format!("{aov}."), layers.light[layer_ix], layers.light_sums[layer_ix]));
+            }
+            None => channels.extend(aov.channels(layers.features)),
         }
     }
     channels
 }
 
-/// Returns the name of the layer with the sums of a block of samples.
-fn sums_name(block: &BlockSum) -> String {
-    format!("sum {}", block.samples)
+/// Returns the channels of a mean of samples, and of the sums of its blocks. `prefix`: the layer and a dot, or nothing.
+fn colours(prefix: &str, mean: &[[f32; 4]], sums: &[BlockSum]) -> Vec<Channel> {
+    fn channels<const N: usize>(prefix: &str, pixels: &[[f32; N]]) -> [Channel; 3] {
+        COLOUR.map(|(name, ix)| Channel {
+            name: format!("{prefix}{name}"),
+            samples: Samples::Float(pixels.iter().map(|pixel| pixel[ix]).collect()),
+        })
+    }
+    let sums = sums.iter().flat_map(|block| channels(&sum_prefix(prefix, block.samples), &block.sums));
+    channels(prefix, mean).into_iter().chain(sums).collect()
+}
+
+/// Returns what the names of the channels begin with that have the sums of a block of samples. `prefix`: what those of
+/// the mean begin with.
+pub(crate) fn sum_prefix(prefix: &str, samples: SampleRange) -> String {
+    format!("{prefix}sum {samples}.")
 }
 
 fn encode(

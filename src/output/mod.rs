@@ -20,6 +20,7 @@ use image::{
 use tempfile::SpooledTempFile;
 use tracing::info_span;
 
+pub(crate) use self::layers::sum_prefix;
 use self::{destination::Destination, temporary::Temporary};
 pub use self::{
     destination::regular_file,

@@ -58,8 +58,8 @@ pub enum PackError {
 /// has to give the same scene; otherwise nothing is written.
 ///
 /// # Errors
-/// The scene cannot be loaded, or names files that do not exist; a file has a name that is not UTF-8; the pack cannot be
-/// written, or gives another scene.
+/// The scene cannot be loaded, or names files that do not exist; a file has a name that is not UTF-8; the pack cannot
+/// be written, or gives another scene.
 pub fn pack(
     scene_file: &Path,
     path_file: Option<&Path>,

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{
     Demodulate, Denoise, EdgeFilter, FalseColor, Features, Guides, Inputs, Passes, PathAccumulate, PathBegin,
-    PathCompact, PathResolve, PathScatter, PathTrace, Tonemap, record::record_steps,
+    PathCompact, PathLayers, PathResolve, PathScatter, PathTrace, Tonemap, record::record_steps,
 };
 use crate::{
     buffers::Resources,
@@ -88,6 +88,8 @@ pub struct PathPasses {
     pub path_trace: Arc<PathTrace>,
     pub path_scatter: Arc<PathScatter>,
     pub path_compact: Arc<PathCompact>,
+    /// None unless the options ask for layers of light.
+    pub path_layers: Option<Arc<PathLayers>>,
     pub path_resolve: Arc<PathResolve>,
     pub path_accumulate: Arc<PathAccumulate>,
     pub features: Arc<Features>,
@@ -112,6 +114,7 @@ impl PathPasses {
             path_trace: PathTrace::new(context, bindings, options)?.into(),
             path_scatter: PathScatter::new(context, bindings)?.into(),
             path_compact: PathCompact::new(context, bindings)?.into(),
+            path_layers: path_layers(context, bindings, options)?,
             path_resolve: PathResolve::new(context, bindings)?.into(),
             path_accumulate: PathAccumulate::new(context, bindings)?.into(),
             features: Features::new(context, bindings)?.into(),
@@ -137,6 +140,9 @@ impl PathPasses {
         if from.tonemap != to.tonemap {
             next.tonemap = Tonemap::new(context, bindings, to.tonemap)?.into();
         }
+        if from.light_layers != to.light_layers {
+            next.path_layers = path_layers(context, bindings, to)?;
+        }
         Ok(next)
     }
 
@@ -157,6 +163,9 @@ impl PathPasses {
             Pass::PathScatter => self.path_scatter.record(commands, resources, batch),
             Pass::CompactSpine => self.path_compact.spine(commands, batch),
             Pass::PathCompact => self.path_compact.record(commands, resources, batch),
+            Pass::PathLayers => {
+                self.path_layers.as_ref().expect("the options ask for layers of light").record(commands, batch);
+            }
             Pass::PathResolve => self.path_resolve.record(commands, batch),
             Pass::PathAccumulate => self.path_accumulate.record(commands, resources),
             Pass::Features => self.features.record(commands, batch),
@@ -169,4 +178,13 @@ impl PathPasses {
             _ => panic!("a frame of paths has no `{}`", pass.name()),
         }
     }
+}
+
+fn path_layers(
+    context: &Arc<Context>,
+    bindings: &Arc<BindingLayout>,
+    options: &RenderOptions,
+) -> Result<Option<Arc<PathLayers>>, GpuError> {
+    let wants = options.has_light_layers();
+    wants.then(|| PathLayers::new(context, bindings).map(Arc::new)).transpose()
 }

@@ -42,6 +42,7 @@ mod guides;
 mod path_accumulate;
 mod path_begin;
 mod path_compact;
+mod path_layers;
 mod path_resolve;
 mod path_scatter;
 mod path_trace;
@@ -71,6 +72,7 @@ pub use self::{
     path_accumulate::PathAccumulate,
     path_begin::PathBegin,
     path_compact::PathCompact,
+    path_layers::PathLayers,
     path_resolve::PathResolve,
     path_scatter::PathScatter,
     path_trace::PathTrace,

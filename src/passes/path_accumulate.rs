@@ -22,6 +22,6 @@ impl PathAccumulate {
 
     /// Updates `pixel_accumulated` and `pixel_radiance`.
     pub fn record(&self, commands: &Commands, resources: &Resources) {
-        commands.dispatch(&self.kernel, None, &Batch::default(), resources.pixel_dispatch());
+        commands.dispatch(&self.kernel, None, &Batch::default(), resources.layer_dispatch());
     }
 }

@@ -15,7 +15,8 @@
 //!               kdtree, leaf, slab, kd_boxes, ropes, brute and the pending_* of each algorithm; grid; candidate
 //! geometry    triangle, surface, camera; search_ray and traversal_ray: a ray in the form that searches use
 //! light       light, material, microfacet, fresnel, children, display, tone_curves
-//! paths       sampler, path_camera, paths, path_vertex; bsdf: surfaces; emitters: lights; noise: variances
+//! paths       sampler, path_camera, paths, path_vertex; bsdf: surfaces; emitters: lights; noise: variances;
+//!             sample_sums
 //! textures    texture, maps, cutout
 //! inputs      the data that kernels only read
 //! counting    the same traversal with its reads counted
@@ -27,6 +28,8 @@ pub mod bsdf;
 pub mod camera;
 pub mod candidate;
 pub mod cast;
+#[cfg(test)]
+mod chi_square;
 pub mod children;
 pub mod compact;
 pub mod counting;
@@ -55,6 +58,7 @@ pub mod path_accumulate;
 pub mod path_begin;
 pub mod path_camera;
 pub mod path_compact;
+pub mod path_layers;
 pub mod path_resolve;
 pub mod path_scatter;
 pub mod path_trace;
@@ -69,6 +73,7 @@ pub mod pending_stack;
 pub mod primary_hit;
 pub mod resolve;
 pub mod ropes;
+pub mod sample_sums;
 pub mod sampler;
 pub mod search_ray;
 pub mod shade;

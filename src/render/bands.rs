@@ -1,5 +1,6 @@
-//! Draws pictures whose pixels take more bytes than a device can bind as one buffer: in bands of full rows, one after
-//! the other, which the host joins.
+//! Draws pictures whose pixels take more bytes than a device can bind as one buffer: in bands, one after the other,
+//! which the host joins. Bands are full rows, or parts of rows if there are fewer bands then, because a noise filter
+//! reads a border around each band.
 
 use std::{
     borrow::Cow,
@@ -12,16 +13,15 @@ use crate::{
     buffers::Pixels,
     frame::{Crop, Drawn, Goal, Integrator, Pacer, PathOptions, Picture, Profile, RenderOptions, Watcher},
     gpu::{Context, GivenImage, GpuError, Limits, TimelinePoint},
-    layout::Feature,
     scene::Camera,
     world::World,
 };
 
 /// Renderer of whole pictures of any size. If the widest buffer of pixels exceeds what the device can bind as one
-/// storage buffer, bands of full rows are drawn. The joined picture has the same bits as one that is drawn at once.
+/// storage buffer, bands are drawn. The joined picture has the same bits as one that is drawn at once.
 pub struct BandedRenderer {
     renderer: Renderer,
-    /// The bands from top to bottom. Together they are the picture, or its crop.
+    /// The bands from top to bottom, and from left to right. Together they are the picture, or its crop.
     bands: Vec<Crop>,
     /// The picture that was drawn last, joined from its bands. None before the first picture is complete. Always None
     /// if there is a single band: its picture stays on the device.
@@ -105,7 +105,8 @@ impl BandedRenderer {
             return self.draw_band(goal, watcher);
         }
         let mut all = Drawn::default();
-        let mut joined = self.room_for_all(&mut all.features)?;
+        let mut joined = self.room_for_all(&mut all)?;
+        let whole = self.whole();
         let mut goal = match goal {
             Goal::Time(time) => Goal::Time(time / self.n_bands()),
             samples => samples,
@@ -115,9 +116,12 @@ impl BandedRenderer {
             let drawn = self.draw_band(goal, watcher)?;
             goal = Goal::Samples(drawn.n_samples);
             let picture = self.renderer.picture()?;
-            joined.radiance.extend(picture.radiance);
-            joined.display.extend(picture.display);
-            all.features.extend(drawn.features);
+            whole.place(&mut joined.radiance, &band, &picture.radiance);
+            whole.place(&mut joined.display, &band, &picture.display);
+            if !drawn.features.is_empty() {
+                whole.place(&mut all.features, &band, &drawn.features);
+            }
+            all.light.place(&whole, &band, &drawn.light);
             all.n_samples = drawn.n_samples;
             if band_ix == 0 {
                 all.profile = drawn.profile;
@@ -222,6 +226,7 @@ impl BandedRenderer {
         if !drawn.features.is_empty() && integrator == Integrator::Path {
             self.renderer.note_noise(&mut drawn.features)?;
         }
+        drawn.light = self.renderer.light_layers()?;
         Ok(drawn)
     }
 
@@ -253,47 +258,83 @@ impl BandedRenderer {
         }
     }
 
-    /// Reserves memory for the joined picture and for `features` of all bands, so that a lack of memory is found
-    /// before the first band is drawn. Returns the joined picture, which has no pixels yet.
-    fn room_for_all(&mut self, features: &mut Vec<Feature>) -> Result<Picture, GpuError> {
+    /// Returns the part of the picture that all bands are together.
+    fn whole(&self) -> Crop {
+        let (first, last) = (self.bands[0], self.bands[self.bands.len() - 1]);
+        Crop { x1: last.x1, y1: last.y1, ..first }
+    }
+
+    /// Makes room for the joined picture, and for the features and layers of all bands, so that a lack of memory is
+    /// found before the first band is drawn. Returns the joined picture, which is black.
+    fn room_for_all(&mut self, drawn: &mut Drawn) -> Result<Picture, GpuError> {
         self.joined = None;
-        let n_pixels = self.bands.iter().map(|band| band.width() as usize * band.height() as usize).sum();
-        let (width, height) = (self.bands[0].width(), self.bands.iter().map(Crop::height).sum());
-        let mut picture = Picture { width, height, radiance: Vec::new(), display: Vec::new() };
-        reserve("picture's radiance", &mut picture.radiance, n_pixels)?;
-        reserve("displayed picture", &mut picture.display, n_pixels)?;
+        let whole = self.whole();
+        let n_pixels = whole.width() as usize * whole.height() as usize;
+        let picture = Picture {
+            width: whole.width(),
+            height: whole.height(),
+            radiance: room("picture's radiance", n_pixels)?,
+            display: room("displayed picture", n_pixels)?,
+        };
         if self.renderer.options().features {
-            reserve("picture's features", features, n_pixels)?;
+            drawn.features = room("picture's features", n_pixels)?;
+        }
+        if self.renderer.options().has_light_layers() {
+            for layer in &mut drawn.light.0 {
+                *layer = room("picture's layers of light", n_pixels)?;
+            }
         }
         Ok(picture)
     }
 }
 
-fn reserve<T>(object: &'static str, elements: &mut Vec<T>, len: usize) -> Result<(), GpuError> {
+/// Returns `len` elements, or an error if there is no memory for them.
+fn room<T: Clone + Default>(object: &'static str, len: usize) -> Result<Vec<T>, GpuError> {
+    let mut elements = Vec::new();
     let bytes = (len * size_of::<T>()) as u64;
-    elements.try_reserve_exact(len).map_err(|_| GpuError::HostMemory { object, bytes })
+    elements.try_reserve_exact(len).map_err(|_| GpuError::HostMemory { object, bytes })?;
+    elements.resize(len, T::default());
+    Ok(elements)
 }
 
-/// Returns as few bands as possible, of equal height except for the last. Each buffer of a band's pixels, with the
-/// neighbouring rows that the noise filter reads, is small enough for the device to bind. A band has at least one
-/// row, even if that row is too long for the device.
+/// The most bands side by side.
+const MOST_COLUMNS: u32 = 256;
+
+/// Returns as few bands as possible, of equal size except for the last ones. Each buffer of a band's pixels, with the
+/// border that the noise filter reads, is small enough for the device to bind. If no band of a row's
+/// [`MOST_COLUMNS`]th part is small enough, the bands are single rows, which the device refuses.
 fn bands(limits: &Limits, options: &RenderOptions) -> Vec<Crop> {
-    let (asked, window) = (options.crop_or_whole(), options.window());
-    let row_bytes = u64::from(window.width()) * Pixels::bytes_per_pixel(options);
-    let most_rows = u32::try_from(limits.storage_range / row_bytes).unwrap_or(u32::MAX);
-    if window.height() <= most_rows {
+    let (asked, window, border) = (options.crop_or_whole(), options.window(), options.border());
+    let most_pixels = limits.storage_range / Pixels::bytes_per_pixel(options);
+    if u64::from(window.width()) * u64::from(window.height()) <= most_pixels {
         return vec![asked];
     }
-    let most_rows = most_rows.saturating_sub(2 * options.border()).max(1);
+    // The most rows of bands of this many columns that the device can bind.
+    let most_rows = |width: u32| {
+        let of_window = most_pixels / u64::from((width + 2 * border).min(window.width()));
+        u32::try_from(of_window).unwrap_or(u32::MAX).saturating_sub(2 * border)
+    };
+    let size = (1..=MOST_COLUMNS.min(asked.width()))
+        .map(|n_columns| asked.width().div_ceil(n_columns))
+        .filter_map(|width| Some((width, Some(most_rows(width)).filter(|rows| *rows > 0)?)))
+        .min_by_key(|(width, rows)| asked.width().div_ceil(*width) * asked.height().div_ceil(*rows));
+    let (width, most_rows) = size.unwrap_or((asked.width(), 1));
     let n_rows = asked.height().div_ceil(asked.height().div_ceil(most_rows));
-    let band = |y0| Crop { y0, y1: (y0 + n_rows).min(asked.y1), ..asked };
-    (asked.y0..asked.y1).step_by(n_rows as usize).map(band).collect()
+    let rows = (asked.y0..asked.y1).step_by(n_rows as usize);
+    rows.flat_map(|y0| {
+        let columns = (asked.x0..asked.x1).step_by(width as usize);
+        columns.map(move |x0| Crop { x0, y0, x1: (x0 + width).min(asked.x1), y1: (y0 + n_rows).min(asked.y1) })
+    })
+    .collect()
 }
 
 /// Returns the band that needs the most memory, or None if there is only one band.
 fn largest(bands: &[Crop], options: &RenderOptions) -> Option<Crop> {
-    let height = |crop: &&Crop| RenderOptions { crop: Some(**crop), ..options.clone() }.window().height();
-    bands.iter().max_by_key(height).copied().filter(|_| bands.len() > 1)
+    let n_pixels = |crop: &&Crop| {
+        let window = RenderOptions { crop: Some(**crop), ..options.clone() }.window();
+        u64::from(window.width()) * u64::from(window.height())
+    };
+    bands.iter().max_by_key(n_pixels).copied().filter(|_| bands.len() > 1)
 }
 
 #[cfg(test)]
@@ -305,6 +346,7 @@ mod tests {
         Limits { storage_range, n_texels: 0, buffer_bytes: u64::MAX, target_size: 1 << 14, n_groups: 65_535 }
     }
 
+    /// Each pixel of the picture is in one band, whose window fits the device.
     #[test]
     fn bands_are_the_picture_and_fit_the_device() {
         let filter = Denoise::Paper { threshold: 1.0 };
@@ -313,28 +355,46 @@ mod tests {
             [(Denoise::Off, false, None), (filter, false, None), (filter, true, None), (filter, false, Some(part))]
         {
             let options = RenderOptions { width: 64, height: 48, denoise, features, crop, ..RenderOptions::default() };
-            for range in [16 << 10, 20_000, 24 << 10, 48 << 10, 1 << 30] {
-                let (bands, asked) = (bands(&limits(range), &options), options.crop_or_whole());
-                let mut y = asked.y0;
-                for band in &bands {
-                    assert_eq!((band.x0, band.y0, band.x1), (asked.x0, y, asked.x1));
-                    y = band.y1;
-                    let window = RenderOptions { crop: Some(*band), ..options.clone() }.window();
-                    let n_pixels = u64::from(window.width()) * u64::from(window.height());
-                    assert!(n_pixels * Pixels::bytes_per_pixel(&options) <= range, "{range}: {band}");
-                }
-                assert_eq!(y, asked.y1);
-                assert_eq!(bands.len() == 1, largest(&bands, &options).is_none());
+            for range in [2 << 10, 16 << 10, 20_000, 24 << 10, 48 << 10, 1 << 30] {
+                assert_fit(&options, range);
             }
         }
+        let (integrator, denoise) = (Integrator::Path, Denoise::Edge);
+        for (width, height) in [(16_384, 500), (3000, 3000), (500, 16_384)] {
+            let options = RenderOptions { width, height, integrator, denoise, ..RenderOptions::default() };
+            for range in [8 << 20, 128 << 20] {
+                assert_fit(&options, range);
+            }
+        }
+    }
+
+    fn assert_fit(options: &RenderOptions, range: u64) {
+        let (bands, asked) = (bands(&limits(range), options), options.crop_or_whole());
+        let mut n_bands_of = vec![0_u8; asked.width() as usize * asked.height() as usize];
+        for band in &bands {
+            let window = RenderOptions { crop: Some(*band), ..options.clone() }.window();
+            let n_pixels = u64::from(window.width()) * u64::from(window.height());
+            assert!(n_pixels * Pixels::bytes_per_pixel(options) <= range, "{range}: {band}");
+            let mut n_before = asked.part(&n_bands_of, band);
+            n_before.iter_mut().for_each(|n| *n += 1);
+            asked.place(&mut n_bands_of, band, &n_before);
+        }
+        assert!(n_bands_of.iter().all(|n| *n == 1), "{range}: {bands:?}");
+        assert_eq!(bands.len() == 1, largest(&bands, options).is_none());
     }
 
     #[test]
     fn there_are_no_more_bands_than_needed() {
         let options = |denoise| RenderOptions { width: 64, height: 48, denoise, ..RenderOptions::default() };
-        let n_bands = |n_rows: u64, denoise| bands(&limits(n_rows * 64 * 16), &options(denoise)).len();
+        let of = |n_rows: u64, denoise| bands(&limits(n_rows * 64 * 16), &options(denoise));
+        let n_bands = |n_rows: u64, denoise| of(n_rows, denoise).len();
         let filter = Denoise::Paper { threshold: 1.0 };
         assert_eq!([48, 47, 24, 23, 1].map(|n_rows| n_bands(n_rows, Denoise::Off)), [1, 2, 2, 3, 48]);
-        assert_eq!([48, 47, 26, 25, 3].map(|n_rows| n_bands(n_rows, filter)), [1, 2, 2, 3, 48]);
+        assert_eq!([48, 47, 26, 25].map(|n_rows| n_bands(n_rows, filter)), [1, 2, 2, 3]);
+        // Full rows would be 48 bands, each with two rows of border.
+        let narrow = of(3, filter);
+        assert!(narrow.len() < 30 && narrow[0].width() < 64, "{narrow:?}");
+        // Nothing fits a device that binds less than a pixel with its border.
+        assert_eq!(bands(&limits(64), &options(filter)).len(), 48);
     }
 }

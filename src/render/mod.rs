@@ -33,8 +33,8 @@ use self::{
 use crate::{
     buffers::{Needs, Resources},
     frame::{
-        Denoise, FrameKind, Integrator, Pass, Picture, Plan, Primary, Profile, RenderOptions, Step, make_opaque,
-        opaque, plan,
+        Denoise, FrameKind, Integrator, LightLayers, Pass, Picture, Plan, Primary, Profile, RenderOptions, Step,
+        make_opaque, opaque, plan,
     },
     gpu::{Access, AnyBuffer, CommandBuffer, Commands, Context, GpuError},
     layout::{Batch, FalseColor, Feature, MATERIAL_REFLECT, MATERIAL_REFRACT},
@@ -284,6 +284,24 @@ impl Renderer {
         Ok(self.in_use.window().part(features, &self.in_use.crop_or_whole()))
     }
 
+    /// Downloads the layers of the picture's light, which are empty if the options do not ask for them. The last sample
+    /// must be complete, as for [`Renderer::picture`].
+    ///
+    /// # Errors
+    /// A copy fails.
+    pub fn light_layers(&self) -> Result<LightLayers, GpuError> {
+        let mut layers = LightLayers::default();
+        if !self.in_use.has_light_layers() {
+            return Ok(layers);
+        }
+        let (n_pixels, radiance) = (self.resources.n_pixels(), &self.resources.pixels.pixel_radiance);
+        let (window, crop) = (self.in_use.window(), self.in_use.crop_or_whole());
+        for (layer_ix, layer) in (1..).zip(&mut layers.0) {
+            *layer = window.part(radiance.download_part(layer_ix * n_pixels, n_pixels)?, &crop);
+        }
+        Ok(layers)
+    }
+
     /// Adds to features what the samples of each pixel tell of its noise. The frames must trace paths.
     ///
     /// # Errors
@@ -312,7 +330,8 @@ impl Renderer {
             }
             // Light is computed for the hits of all bounces together.
             if !plan.light.is_empty() {
-                frame.extend(self.parts("light", &plan.light, &batch)?);
+                let after_bounces = Batch { depth: plan.bounces.len() as u32, ..batch };
+                frame.extend(self.parts("light", &plan.light, &after_bounces)?);
             }
             frame.last_mut().expect("the parts of the batch").ends_batch = true;
         }

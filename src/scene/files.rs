@@ -1,4 +1,5 @@
-//! The files that a scene is read from: on disk, or in a pack, which is used like a folder. Here alone, files are opened.
+//! The files that a scene is read from: on disk, or in a pack, which is used like a folder. Here alone, files are
+//! opened.
 
 use std::{
     ffi::OsString,

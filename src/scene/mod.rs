@@ -159,8 +159,8 @@ pub struct Instance {
 
 impl Scene {
     /// Loads a scene file, `.toml`, a glTF file, `.gltf` or `.glb`, a mesh file, `.obj`, `.ply` or `.stl`, or a pack,
-    /// `.kdpack`. The content of a glTF or mesh file says which of the four it is. Emits `tracing` warnings for unknown OBJ
-    /// statements, material libraries and images that are missing or leave the folder of the mesh file, undefined
+    /// `.kdpack`. The content of a glTF or mesh file says which of the four it is. Emits `tracing` warnings for unknown
+    /// OBJ statements, material libraries and images that are missing or leave the folder of the mesh file, undefined
     /// materials, names in the wrong case, normals that an OBJ file names and does not have, terms of MTL files that
     /// are not taken as they are, what is not shown of a file, creases and overrides without effect, and coordinates
     /// too large for the scene's detail.

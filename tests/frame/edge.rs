@@ -131,6 +131,27 @@ fn batches_and_bands_change_no_bit() {
     [&context, &narrow].into_iter().for_each(|context| assert_silent(context));
 }
 
+/// A device that cannot bind full rows with their border draws parts of rows, with layers of all kinds.
+#[test]
+fn bands_of_parts_of_rows_change_no_bit() {
+    let (scene, context) = (scenes::mixed_outdoors(), device());
+    let options = RenderOptions { features: true, light_layers: true, max_depth: 2, ..options(300, 150) };
+    let world = world_of(&scene);
+    // Rows of the border alone take 300 * 130 pixels.
+    let range = Some(150 * 140 * 512);
+    let narrow = pretended(DeviceOverrides { storage_range: range, ..DeviceOverrides::default() });
+    let draw = |context| {
+        let mut renderer = BandedRenderer::new(context, &world, &options).expect("a renderer");
+        let drawn = renderer.draw(Goal::Samples(1), &mut || ()).expect("a picture");
+        (renderer.n_bands(), renderer.picture().expect("a picture").into_owned(), drawn)
+    };
+    let ((n_whole, whole, expected), (n_bands, joined, found)) = (draw(context.clone()), draw(narrow.clone()));
+    assert!(n_whole == 1 && n_bands > 3, "{n_whole}, {n_bands}");
+    assert!(identical(&whole, &joined) && expected.light == found.light);
+    assert!(bytemuck::cast_slice::<_, u8>(&expected.features) == bytemuck::cast_slice::<_, u8>(&found.features));
+    [&context, &narrow].into_iter().for_each(|context| assert_silent(context));
+}
+
 /// Returns the mean of the squared errors of two pictures' luminance.
 fn squared_error(a: &Picture, b: &Picture) -> f32 {
     let luminance = |&[r, g, b, _]: &[f32; 4]| Vec3::new(r, g, b).dot(vec3(0.2126, 0.7152, 0.0722));

@@ -18,6 +18,7 @@ mod guides;
 mod path_accumulate;
 mod path_begin;
 mod path_compact;
+mod path_layers;
 mod path_resolve;
 mod path_scatter;
 mod path_stage;

@@ -34,8 +34,18 @@ impl PathStage {
 
     /// Makes the same stage with a noise filter.
     pub fn with_filter(scene: FlatScene, samples_log2: u32, denoise: Denoise) -> Self {
-        let size = RenderOptions { width: 40, height: 30, ..RenderOptions::default() };
-        let options = RenderOptions { integrator: Integrator::Path, denoise, max_depth: 3, ..size };
+        Self::with_options(scene, samples_log2, &RenderOptions { denoise, ..RenderOptions::default() })
+    }
+
+    /// Makes the same stage for a picture with layers of light.
+    pub fn with_light_layers(scene: FlatScene, samples_log2: u32) -> Self {
+        let denoise = Denoise::Off;
+        Self::with_options(scene, samples_log2, &RenderOptions { denoise, light_layers: true, ..Default::default() })
+    }
+
+    fn with_options(scene: FlatScene, samples_log2: u32, options: &RenderOptions) -> Self {
+        let (integrator, max_depth) = (Integrator::Path, 3);
+        let options = RenderOptions { width: 40, height: 30, integrator, max_depth, ..options.clone() };
         let context = device();
         let world = World::of_flat(scene, &BuildOptions::default()).expect("a world");
         let mut constants = Frame { queue_capacity: 1200 << samples_log2, ..world.frame_constants(&options) };

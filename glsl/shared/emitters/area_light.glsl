@@ -55,8 +55,10 @@ SeenLight seen_light(vec3 origin, vec3 direction, float t_max) {
     }
     if (isinf(nearest)) return SeenLight(nearest, vec3(0.0), 0.0);
     AreaLight light = area_light_at(nearest_ix);
-    float density = light.kind == AREA_SPHERE ? sphere_density(light, origin)
-        : flat_density(light, direction, nearest);
+    float density;
+    if (light.kind == AREA_RECTANGLE) density = rectangle_density(light, origin, direction, nearest);
+    else if (light.kind == AREA_DISK) density = flat_density(light, direction, nearest);
+    else density = sphere_density(light, origin);
     return SeenLight(nearest, light.radiance, light.probability * density);
 }
 

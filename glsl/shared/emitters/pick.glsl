@@ -46,11 +46,12 @@ LightPick pick_of_point(Towards way, vec3 radiance, float density) {
 }
 
 // A vector that is `cosine` along the axis, and `sine` aside of it at an azimuth in turns. The three axes are
-// orthonormal.
+// orthonormal. Drivers may compute sines and cosines with errors of 2^-11. They are scaled so that the vector has unit
+// length nevertheless: distances along it are compared to 1e-4.
 vec3 around(vec3 axis, vec3 aside_u, vec3 aside_v, vec3 cosine_sine_turns) {
     float azimuth = 2.0 * EMITTER_PI * cosine_sine_turns.z;
-    return cosine_sine_turns.x * axis
-        + cosine_sine_turns.y * (cos(azimuth) * aside_u + sin(azimuth) * aside_v);
+    vec2 aside = normalize(vec2(cos(azimuth), sin(azimuth)));
+    return cosine_sine_turns.x * axis + cosine_sine_turns.y * (aside.x * aside_u + aside.y * aside_v);
 }
 
 #endif

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use kdray::{
     cpu,
     engine::Renderer,
-    frame::{Drawn, Goal, Picture, Profile, RenderOptions, SampleRange, SampleSums, Watcher},
+    frame::{Drawn, Goal, Picture, Profile, RangeSums, RenderOptions, SampleRange, SampleSums, Watcher},
     output::{Layers, Record, WholeRecord},
     scene::Camera,
 };
@@ -74,30 +74,31 @@ pub fn draw_and_write(
     let mut n_samples = common.n_drawn;
     for view in views {
         let camera = view.camera.unwrap_or(common.camera);
-        let (picture, sums, features);
+        let (picture, sums, drawn);
         match common.some_samples {
             Some(range) => {
-                let (drawn, drawn_sums) = renderer.draw_range(&camera, range, Bar(&mut steps))?;
-                picture = part(common, &drawn_sums);
+                (drawn, sums) = renderer.draw_range(&camera, range, Bar(&mut steps))?;
+                picture = part(common, &sums.picture);
                 profiles.push(drawn.profile);
-                (sums, features) = (drawn_sums, drawn.features);
             }
             None => {
-                let mut drawn = Drawn::default();
+                let mut last = Drawn::default();
                 for _ in 0..args.repeat {
-                    drawn = renderer.draw(&camera, common.goal, Bar(&mut steps))?;
-                    profiles.push(std::mem::take(&mut drawn.profile));
+                    last = renderer.draw(&camera, common.goal, Bar(&mut steps))?;
+                    profiles.push(std::mem::take(&mut last.profile));
                 }
-                n_samples = drawn.n_samples;
+                n_samples = last.n_samples;
                 picture = renderer.picture()?.into_owned();
-                (sums, features) = (SampleSums::default(), drawn.features);
+                (drawn, sums) = (last, RangeSums::default());
             }
         }
         drawing += last.elapsed();
         let record = record_of(common, &camera, n_samples);
-        // The mean of a single block tells its sums.
-        let sums = if sums.blocks().len() > 1 { sums.blocks() } else { &[] };
-        view.files.write(&picture, &Layers { aovs: &args.aov, features: &features, sums, record: Some(&record) })?;
+        let (sums, light_sums) = sums.untold();
+        let light = drawn.light.0.each_ref().map(Vec::as_slice);
+        let (aovs, features) = (&args.aov[..], &drawn.features[..]);
+        let layers = Layers { aovs, features, light, sums, light_sums, record: Some(&record) };
+        view.files.write(&picture, &layers)?;
         last = Instant::now();
     }
     Ok(DrawnPictures { profiles, n_samples, render_ms: drawing.as_secs_f64() * 1e3 })

@@ -1,6 +1,10 @@
 //! The memory that a picture takes, checked before it is allocated.
 
-use kdray::{frame::RenderOptions, layout::Feature, util::memory::require};
+use kdray::{
+    frame::{Aov, RenderOptions},
+    layout::Feature,
+    util::memory::require,
+};
 
 use crate::cli::error::CliError;
 
@@ -17,16 +21,23 @@ pub fn check_memory(options: &RenderOptions, n_samples: u32, on_cpu: bool) -> Re
     let n_pixels = |width: u32, height: u32| u64::from(width) * u64::from(height);
     let n_rendered = if on_cpu { n_pixels(window.width(), window.height()) } else { 0 };
     let needed = n_rendered * rendered_bytes(options, n_samples)
-        + n_pixels(crop.width(), crop.height()) * (RADIANCE + DISPLAY + ENCODED + feature_bytes(options));
+        + n_pixels(crop.width(), crop.height())
+            * (RADIANCE + DISPLAY + ENCODED + feature_bytes(options) + layer_bytes(options));
     require(&format!("a picture of {}x{} pixels", crop.width(), crop.height()), needed)?;
     Ok(())
 }
 
 /// Returns the bytes per pixel of the CPU renderer's buffers: the index of the visible triangle, the sample, the sum
-/// of samples, the filtered picture and the picture for display.
+/// of samples, the filtered picture and the picture for display. Layers of light have samples and sums of their own.
 fn rendered_bytes(options: &RenderOptions, n_samples: u32) -> u64 {
     let sums = if n_samples > 1 { RADIANCE } else { 0 };
-    size_of::<u32>() as u64 + RADIANCE + sums + RADIANCE + DISPLAY + feature_bytes(options)
+    let layers = layer_bytes(options) * (1 + sums / RADIANCE);
+    size_of::<u32>() as u64 + RADIANCE + sums + RADIANCE + DISPLAY + feature_bytes(options) + layers
+}
+
+/// Returns the bytes of a pixel in the layers of light.
+fn layer_bytes(options: &RenderOptions) -> u64 {
+    if options.has_light_layers() { Aov::OF_LIGHT.len() as u64 * RADIANCE } else { 0 }
 }
 
 fn feature_bytes(options: &RenderOptions) -> u64 {
@@ -35,6 +46,8 @@ fn feature_bytes(options: &RenderOptions) -> u64 {
 
 #[cfg(test)]
 mod tests {
+    use kdray::frame::Integrator;
+
     use super::*;
 
     #[test]
@@ -45,5 +58,8 @@ mod tests {
         assert_eq!(rendered_bytes(&usual, 2), 56);
         let with_features = RenderOptions { features: true, ..usual };
         assert_eq!(rendered_bytes(&with_features, 1), 40 + size_of::<Feature>() as u64);
+        let integrator = Integrator::Path;
+        let with_layers = RenderOptions { light_layers: true, integrator, ..RenderOptions::default() };
+        assert_eq!([1, 2].map(|n_samples| rendered_bytes(&with_layers, n_samples)), [40 + 48, 56 + 96]);
     }
 }

@@ -60,7 +60,7 @@ impl Handout {
         let n_left = self.left.len() as u32;
         let speeds = self.speeds();
         // If each gets one range, the units that are left are for the devices that have none.
-        let counts = |device: &Device| !device.is_lost && !(self.portions == Portions::OneEach && device.has_range);
+        let counts = |device: &Device| !device.is_lost && (self.portions != Portions::OneEach || !device.has_range);
         let counted = self.devices.iter().zip(&speeds).enumerate();
         let all: f64 =
             counted.filter(|(ix, (device, _))| *ix == device_ix || counts(device)).map(|(_, (_, speed))| speed).sum();
@@ -90,7 +90,7 @@ impl Handout {
         self.devices[device_ix].is_lost = true;
     }
 
-    /// Returns each device's units a second. The speed of a device that has not been measured is the mean of the others.
+    /// Returns each device's units a second. A device that has not been measured has the mean speed of the others.
     fn speeds(&self) -> Vec<f64> {
         let measured = |device: &Device| (device.seconds > 0.0).then(|| device.n_units / device.seconds);
         let known: Vec<f64> = self.devices.iter().filter_map(measured).collect();
@@ -103,8 +103,8 @@ impl Handout {
 mod tests {
     use super::*;
 
-    /// Draws a picture of `n_units` units with devices of the given units a second. Returns each range with its device, and
-    /// the time at which each device ends.
+    /// Does `n_units` units with devices of the given units a second. Returns each range with its device, and the time
+    /// at which each device ends.
     fn draw(handout: &mut Handout, n_units: u32, speeds: &[f64]) -> (Vec<(usize, Range<u32>)>, Vec<f64>) {
         handout.begin(0..n_units);
         let (mut ends, mut ranges) = (vec![0.0_f64; speeds.len()], Vec::new());

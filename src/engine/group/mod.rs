@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! handout   ranges of units of work for each device, by its measured speed
-//! samples   units are blocks of samples of all pixels, which cost the same everywhere: paths without a filter or layers
+//! samples   units are blocks of samples of all pixels, which cost the same everywhere: paths without `edge` or layers
 //! rows      units are rows of pixels, of which tiles are made: everything else
 //! ```
 
@@ -144,7 +144,8 @@ impl RendererGroup {
 /// Whether samples of all pixels can be drawn apart. The noise filter `edge` and layers need all samples of a pixel on
 /// one device.
 fn can_share_samples(options: &RenderOptions) -> bool {
-    options.integrator == Integrator::Path && !options.features && options.noise_filter() != Denoise::Edge
+    let has_layers = options.features || options.has_light_layers();
+    options.integrator == Integrator::Path && !has_layers && options.noise_filter() != Denoise::Edge
 }
 
 /// Work that all members share.

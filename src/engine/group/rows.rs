@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::{RendererGroup, handout::Portions, lock, share};
 use crate::{
-    frame::{Crop, Drawn, Goal, Picture, RenderOptions, Watcher},
+    frame::{Crop, Drawn, Goal, LightLayers, Picture, RenderOptions, Watcher},
     gpu::{Context, GpuError},
     layout::Feature,
 };
@@ -54,14 +54,16 @@ impl RendererGroup {
             Ok(drawn)
         })?;
         let (mut all, mut features) = (None::<Drawn>, Vec::<Feature>::new());
+        let mut light = LightLayers::default();
         for (_, mut drawn) in tiles {
             features.append(&mut drawn.features);
+            light.0.iter_mut().zip(&mut drawn.light.0).for_each(|(all, part)| all.append(part));
             match &mut all {
                 None => all = Some(drawn),
                 Some(all) => all.profile.append(drawn.profile),
             }
         }
         self.picture = picture.into_inner().unwrap_or_else(PoisonError::into_inner);
-        Ok(Drawn { features, ..all.expect("a picture has rows") })
+        Ok(Drawn { features, light, ..all.expect("a picture has rows") })
     }
 }

@@ -42,6 +42,6 @@ impl RendererGroup {
             }
         }
         self.picture = self.members[0].renderer.picture_of(sums.into_mean())?;
-        Ok(Drawn { features: Vec::new(), profile: profile.unwrap_or_default(), n_samples })
+        Ok(Drawn { profile: profile.unwrap_or_default(), n_samples, ..Drawn::default() })
     }
 }

@@ -6,11 +6,11 @@ use glam::{Vec2, Vec3};
 use super::{
     disk::{hit_disk, pick_disk},
     pick::LightPick,
-    rectangle::{flat_density, hit_rectangle, pick_rectangle},
+    rectangle::{flat_density, hit_rectangle, pick_rectangle, rectangle_density},
     sphere::{hit_sphere, pick_sphere, sphere_density},
 };
 use crate::{
-    layout::{AREA_DISK, AREA_RECTANGLE, AREA_SPHERE, AreaLight},
+    layout::{AREA_DISK, AREA_RECTANGLE, AreaLight},
     reference::inputs::KernelInputs,
 };
 
@@ -46,8 +46,9 @@ pub fn seen_light(inputs: &KernelInputs, origin: Vec3, direction: Vec3, t_max: f
     }
     let Some(light) = seen else { return SeenLight { t: nearest, radiance: Vec3::ZERO, density: 0.0 } };
     let density = match light.kind {
-        AREA_SPHERE => sphere_density(light, origin),
-        _ => flat_density(light, direction, nearest),
+        AREA_RECTANGLE => rectangle_density(light, origin, direction, nearest),
+        AREA_DISK => flat_density(light, direction, nearest),
+        _ => sphere_density(light, origin),
     };
     SeenLight { t: nearest, radiance: light.radiance, density: light.probability * density }
 }

@@ -53,6 +53,7 @@ pub(super) fn pick_of_point(way: Towards, radiance: Vec3, density: f32) -> Light
 }
 
 /// A vector that is `cosine` along the first of three orthonormal axes, and `sine` aside of it at an azimuth in turns.
+/// The sines of this twin are exact enough as they are.
 pub(super) fn around([axis, aside_u, aside_v]: [Vec3; 3], [cosine, sine, turns]: [f32; 3]) -> Vec3 {
     let azimuth = TAU * turns;
     cosine * axis + sine * (azimuth.cos() * aside_u + azimuth.sin() * aside_v)

@@ -12,7 +12,10 @@ use crate::{
     accel::kdtree::BuildOptions,
     frame::RenderOptions,
     layout::{Frame, Material, Triangle},
-    reference::inputs::KernelInputs,
+    reference::{
+        chi_square::{LARGEST_DEVIATION, Uniform, chi_square},
+        inputs::KernelInputs,
+    },
     scene::{Environment, Light, Scene, Sky, Up},
     world::{Emitters, FlatScene, World},
 };
@@ -148,13 +151,56 @@ fn irradiance_is_that_of_closed_forms() {
 /// A wrong density shifts the irradiance beyond what the comparison allows.
 #[test]
 fn a_wrong_area_changes_the_irradiance() {
-    let world = world(vec![rectangle()]);
+    let world = world(vec![disk()]);
     let mut emitters: Emitters = world.emitters().clone();
     emitters.area_lights[0].area *= 1.02;
     let frame = frame(&world);
     let inputs = KernelInputs { emitters: Some(&emitters), ..inputs_of(&world, &frame) };
     let found = irradiance(&inputs, Vec3::ZERO, Vec3::Z).x;
-    assert!((found / (2.0 * under_rectangle(1.0, 1.5)) - 1.0).abs() > 1e-2, "{found}");
+    assert!((found / (PI * 1.5 * 1.5 / (1.5 * 1.5 + 4.0)) - 1.0).abs() > 1e-2, "{found}");
+}
+
+/// The solid angle of a triangle whose corners are seen at these places (Van Oosterom, Strackee: The Solid Angle of a
+/// Plane Triangle, 1983).
+fn solid_angle([a, b, c]: [DVec3; 3]) -> f64 {
+    let lengths = [a.length(), b.length(), c.length()];
+    let below =
+        lengths[0] * lengths[1] * lengths[2] + a.dot(b) * lengths[2] + b.dot(c) * lengths[0] + c.dot(a) * lengths[1];
+    2.0 * a.dot(b.cross(c)).abs().atan2(below)
+}
+
+/// From nearby, all directions to a rectangle have the same density, which is that of the solid angle. From far away,
+/// and from where it is seen edge-on, the densities are those of points on its area. Both are finite.
+#[test]
+fn rectangles_are_picked_by_solid_angle_from_nearby() {
+    let world = world(vec![rectangle()]);
+    let frame = frame(&world);
+    let inputs = inputs_of(&world, &frame);
+    for (point, is_near) in [
+        (Vec3::ZERO, true),
+        (vec3(2.9, 1.9, 1.99), true),
+        (vec3(-7.0, 0.0, 1.0), true),
+        (vec3(0.0, 9.0, -3.0), true),
+        (vec3(3.5, 0.0, 1.9999), false),
+        (vec3(0.0, 0.0, -14.0), false),
+    ] {
+        let picks: Vec<_> = numbers(500).map(|u| pick_light(&inputs, point, u)).collect();
+        let densities = picks.iter().map(|pick| pick.density).filter(|density| *density > 0.0);
+        let (least, most) = densities.fold((f32::INFINITY, 0.0_f32), |(least, most), d| (least.min(d), most.max(d)));
+        assert_eq!(most / least < 1.0001, is_near, "{point}: {least} to {most}");
+        for pick in picks.iter().filter(|pick| pick.density > 0.0) {
+            assert!(pick.direction.is_normalized() && (pick.density / most - 1.0).is_finite(), "{pick:?}");
+            let at = point + pick.distance * pick.direction;
+            let beyond = (at.abs() - vec3(3.0, 2.0, 2.0)).max_element();
+            assert!(beyond < 1e-4 && (at.z - 2.0).abs() < 1e-4, "{point}: {at} is not on the rectangle");
+        }
+        if is_near {
+            let corner = |x, y| DVec3::new(x, y, 2.0) - point.as_dvec3();
+            let [a, b, c, d] = [corner(-3.0, -2.0), corner(3.0, -2.0), corner(3.0, 2.0), corner(-3.0, 2.0)];
+            assert_near(1.0 / most, (solid_angle([a, b, c]) + solid_angle([a, c, d])) as f32, 1e-4);
+        }
+    }
+    assert!(numbers(100).all(|u| pick_light(&inputs, vec3(0.0, 0.0, 2.5), u) == LightPick::NONE), "the back is dark");
 }
 
 #[test]
@@ -166,6 +212,40 @@ fn densities_of_area_lights_are_whole() {
         for point in [Vec3::ZERO, vec3(1.0, -0.5, 0.5)] {
             let sum = over_sphere(|direction| seen_light(&inputs, point, direction, f32::INFINITY).density);
             assert_near(sum, 1.0, 5e-3);
+        }
+    }
+}
+
+/// Picked directions are distributed by the density that is stated for rays that meet the light.
+#[test]
+fn picks_have_the_stated_density() {
+    let worlds = [
+        world(vec![rectangle()]),
+        world(vec![disk()]),
+        world(vec![sphere()]),
+        world(vec![sun()]),
+        world_with(Vec::new(), |scene| scene.environment = Some(map(40.0))),
+    ];
+    for (ix, world) in worlds.iter().enumerate() {
+        let frame = frame(world);
+        let inputs = inputs_of(world, &frame);
+        for point in [Vec3::ZERO, vec3(0.3, -0.5, 1.0)] {
+            let mut random = Uniform(ix as u64);
+            let mut sample = || {
+                let pick = pick_light(&inputs, point, random.point());
+                (pick != LightPick::NONE).then_some(pick.direction)
+            };
+            let density = |direction| {
+                let seen = seen_light(&inputs, point, direction, f32::INFINITY).density;
+                seen + environment_density(&inputs, direction)
+            };
+            // Lights have sharp edges, which many points in a cell resolve.
+            let found = chi_square((30_000, 100), &mut sample, &density);
+            assert!(found < LARGEST_DEVIATION, "{found} deviations of light {ix} at {point}");
+            // A density that is 15 % higher on one side is noticed.
+            let skewed = |direction: Vec3| density(direction) * (1.0 + 0.15 * direction.x.signum());
+            let found = chi_square((30_000, 100), &mut sample, &skewed);
+            assert!(found > LARGEST_DEVIATION, "{found} deviations of light {ix} at {point}");
         }
     }
 }
