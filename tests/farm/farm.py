@@ -1,0 +1,233 @@
+#!/usr/bin/env python3
+"""Tests of farm/: the same film from one process and from each engine, with workers that are killed on the way.
+
+Needs `openjd-cli` and `distributed` (PyPI). KDRAY names the command. Slurm is tested by tests/long/slurm.py.
+"""
+
+import json
+import os
+import pathlib
+import random
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+FARM = ROOT / "farm"
+KDRAY = os.environ.get("KDRAY", str(ROOT / "target/release/kdray"))
+BIN = pathlib.Path(sys.executable).parent
+FRAMES, TILES, BLOCKS, SPP = 10, 4, 2, 32
+OPTIONS = "--size 40x30 --integrator path --max-depth 3 --cpu --threads 1 -q"
+PATH = """
+[[keyframe]]
+frame = 0
+eye = [0.0, 2.75, 10.7]
+target = [0.0, 2.75, 0.0]
+
+[[keyframe]]
+frame = 9
+eye = [2.0, 2.75, 9.5]
+target = [0.0, 2.0, 0.0]
+"""
+
+
+def run(*command, **options):
+    return subprocess.run([str(word) for word in command], capture_output=True, text=True, check=True, **options)
+
+
+def film(folder):
+    """The bytes of all frames, in order."""
+    return [(folder / f"{frame:04}.exr").read_bytes() for frame in range(FRAMES)]
+
+
+class Farm(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="kdray-farm-"))
+        cls.addClassCleanup(shutil.rmtree, cls.folder, ignore_errors=True)
+        (cls.folder / "path.toml").write_text(PATH)
+        cls.pack = cls.folder / "film.kdpack"
+        run(KDRAY, "pack", ROOT / "scenes/cornell.toml", "--path", cls.folder / "path.toml", "-o", cls.pack)
+        alone = cls.folder / "alone"
+        alone.mkdir()
+        options = [*OPTIONS.split(), "--spp", SPP, "--denoise", "off", "--frames", f"0-{FRAMES - 1}"]
+        run(KDRAY, "render", cls.pack, *options, "-o", alone / "####.exr")
+        cls.alone = film(alone)
+
+    def out(self):
+        return pathlib.Path(tempfile.mkdtemp(dir=self.folder))
+
+    def unit(self, out, *words, scene=None, **options):
+        """Starts a unit."""
+        env = {
+            **os.environ, "SCENE": str(scene or self.pack), "OUT": str(out), "KDRAY": KDRAY, "OPTIONS": OPTIONS,
+            "TILES": str(TILES), "BLOCKS": str(BLOCKS), "SPP": str(SPP),
+        }  # fmt: skip
+        command = [FARM / "unit", *map(str, words)]
+        return subprocess.Popen(command, env=env, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, **options)
+
+    def do(self, out, *words, code=0, named="", **options):
+        """Does a unit, which has to end with an exit code and a message that contains `named`."""
+        unit = self.unit(out, *words, **options)
+        _, errors = unit.communicate()
+        self.assertEqual(unit.returncode, code, errors)
+        self.assertIn(named, errors)
+
+    def finish(self, out, frames=f"0-{FRAMES - 1}"):
+        """Does all units one after the other. Those that are done already are left out."""
+        for tile in range(1, TILES + 1):
+            for block in range(1, BLOCKS + 1):
+                self.do(out, "render", frames, tile, block)
+        self.do(out, "merge", frames)
+
+    def test_openjd(self):
+        out, template = self.out(), FARM / "openjd.yaml"
+        run(BIN / "openjd", "check", template)
+        values = {
+            "Scene": self.pack, "Out": out, "Unit": FARM / "unit", "Kdray": KDRAY, "Frames": f"0-{FRAMES - 1}",
+            "Tiles": TILES, "Blocks": BLOCKS, "Spp": SPP, "Options": OPTIONS,
+        }  # fmt: skip
+        parameters = [word for name, value in values.items() for word in ("-p", f"{name}={value}")]
+        summary = run(BIN / "openjd", "summary", template, *parameters).stdout
+        self.assertIn(f"Total tasks: {FRAMES * TILES * BLOCKS + FRAMES}", summary)
+        log = run(BIN / "openjd", "run", template, *parameters, "--step", "Merge", "--run-dependencies").stdout
+        self.assertIn("openjd_progress: 100", log)
+        self.assertEqual(film(out), self.alone)
+        # What fails is told to the engine.
+        parameters += ["-p", "Options=--size none", "-p", f"Out={self.out()}"]
+        command = [BIN / "openjd", "run", template, *parameters, "--step", "Render", "--maximum-tasks", "1"]
+        failed = subprocess.run([str(word) for word in command], capture_output=True, text=True)
+        self.assertNotEqual(failed.returncode, 0)
+        self.assertIn("openjd_fail: error: invalid value 'none'", failed.stdout)
+
+    def test_dask_loses_a_worker(self):
+        out, addresses = self.out(), self.out()
+        address = addresses / "scheduler.json"
+        engine = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "start_new_session": True}
+        scheduler = [BIN / "dask", "scheduler", "--scheduler-file", address, "--port", "0", "--no-dashboard"]
+        worker = [BIN / "dask", "worker", "--scheduler-file", address, "--nthreads", "1", "--no-dashboard"]
+        started = [subprocess.Popen([*map(str, command)], **engine) for command in (scheduler, worker, worker)]
+        self.addCleanup(lambda: [end(process) for process in started])
+        command = [
+            sys.executable, FARM / "dask_film.py", self.pack, out, "--frames", f"0-{FRAMES - 1}", "--tiles", TILES,
+            "--blocks", BLOCKS, "--spp", SPP, "--options", OPTIONS, "--kdray", KDRAY, "--scheduler-file", address,
+        ]  # fmt: skip
+        driver = subprocess.Popen([*map(str, command)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.wait_for(lambda: len(list(out.glob("parts/*.exr"))) >= 3)
+        end(started[1])
+        self.assertLess(len(list(out.glob("[0-9]*.exr"))), FRAMES, "the worker is lost before the film is complete")
+        output, errors = driver.communicate(timeout=300)
+        self.assertEqual(driver.returncode, 0, errors)
+        self.assertIn(f"{FRAMES} of {FRAMES}", output)
+        self.assertEqual(film(out), self.alone)
+
+    def wait_for(self, is_so):
+        until = time.monotonic() + 120
+        while not is_so():
+            self.assertLess(time.monotonic(), until, "it takes too long")
+            time.sleep(0.02)
+
+    def test_units_that_are_killed_at_any_time(self):
+        out, chance = self.out(), random.Random(1)
+        begin = time.monotonic()
+        self.do(self.out(), "render", "0", 1, 1)
+        duration = time.monotonic() - begin
+        n_killed = 0
+        for _ in range(100):
+            words = (chance.randrange(FRAMES), chance.randint(1, TILES), chance.randint(1, BLOCKS))
+            unit = self.unit(out, "render", *words, start_new_session=True)
+            time.sleep(chance.uniform(0, 1.2 * duration))
+            signal_of_kill = chance.choice([signal.SIGKILL, signal.SIGTERM])
+            os.killpg(unit.pid, signal_of_kill)
+            begin = time.monotonic()
+            n_killed += unit.wait() != 0
+            self.assertLess(time.monotonic() - begin, 1.0, "a unit ends within a second")
+            unit.communicate()
+        self.assertGreater(n_killed, 30)
+        # The parts that are there are not rendered again, so each of them must be whole.
+        self.assertGreater(len(list(out.glob("parts/t*.exr"))), 10)
+        self.finish(out)
+        self.assertEqual(film(out), self.alone)
+
+    def test_two_workers_have_one_unit(self):
+        out = self.out()
+        units = [self.unit(out, "render", f"0-{FRAMES - 1}", 1, 1) for _ in range(2)]
+        for unit in units:
+            _, errors = unit.communicate()
+            self.assertEqual(unit.returncode, 0, errors)
+        self.finish(out)
+        self.assertEqual(film(out), self.alone)
+
+    def test_wrong_parts_are_refused(self):
+        out = self.out()
+        self.finish(out, "0")
+        part = out / "parts/t2_b1.0000.exr"
+        good = part.read_bytes()
+
+        part.write_bytes(good[: len(good) // 2])
+        self.do(out, "merge", "0", code=3, named="t2_b1.0000.exr")
+        flipped = bytearray(good)
+        flipped[-40] ^= 16
+        part.write_bytes(flipped)
+        self.do(out, "merge", "0", code=3, named="t2_b1.0000.exr")
+        part.unlink()
+        self.do(out, "merge", "0", code=3, named="the parts have gaps")
+        # A scene that has changed between units.
+        text = (ROOT / "scenes/cornell.toml").read_text()
+        changed = self.out() / "cornell.toml"
+        changed.write_text(text.replace("intensity = [", "intensity = [1", 1))
+        self.assertNotEqual(changed.read_text(), text)
+        self.do(out, "render", "0", 2, 1, scene=self.packed(changed))
+        self.do(out, "merge", "0", code=3, named="scene_hash")
+        part.write_bytes(good)
+        self.do(out, "merge", "0")
+        self.assertEqual((out / "0000.exr").read_bytes(), self.alone[0])
+
+    def packed(self, scene):
+        pack = scene.with_suffix(".kdpack")
+        run(KDRAY, "pack", scene, "--path", self.folder / "path.toml", "-o", pack)
+        return pack
+
+    def test_exit_codes_tell_whether_to_try_again(self):
+        self.do(self.out(), "render", "0", 1, 1, scene="none.kdpack", code=3, named="none.kdpack")
+        self.do(self.out(), "render", "9-0", 1, 1, code=2, named="--frames")
+        # The folder is gone, or the disk is full.
+        gone = self.out()
+        (gone / "parts").write_text("no folder")
+        self.do(gone, "render", "0", 1, 1, code=5, named="parts")
+        full = self.out()
+        few_bytes = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))
+        self.do(full, "render", "0", 1, 1, code=5, named="cannot write", preexec_fn=few_bytes)
+        self.assertEqual(list(full.glob("parts/*")), [])
+        self.do(full, "render", "0", 1, 1)
+
+    def test_report(self):
+        out = self.out()
+        self.finish(out, "0")
+        (out / "parts/t1_b1.0000.exr").unlink()
+        self.do(out, "render", "0", 1, 1)
+        self.do(out, "render", "0", 1, 1, scene="none.kdpack", code=3)
+        text = run(sys.executable, FARM / "report.py", out, "--json", out / "report.json").stdout
+        report = json.loads((out / "report.json").read_text())
+        self.assertEqual(len(report["units"]), TILES * BLOCKS + 1)
+        self.assertEqual(report["done_again"], {"frames 0 tile 1/4 block 1/2": 2})
+        self.assertEqual(report["failed"], {"frames 0 tile 1/4 block 1/2": 1})
+        self.assertIn(f"{TILES * BLOCKS + 1} units", text)
+
+
+def end(process):
+    """Kills a process and its children, whatever they do."""
+    try:
+        os.killpg(process.pid, signal.SIGKILL)
+    except ProcessLookupError:
+        pass
+    process.wait()
+
+
+if __name__ == "__main__":
+    unittest.main()
