@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Renders a film on a Dask cluster, or on processes of this computer: `dask_film.py film.kdpack out --frames 0-9`.
 
-Needs `distributed` (PyPI). The folder of the pictures and the pack must have the same paths on all workers. A unit whose
-worker is lost runs again elsewhere; parts that were written are not rendered again.
+Needs `distributed` (PyPI). The folder of the pictures and the pack must have the same paths on all workers. A unit
+whose worker is lost runs again elsewhere; parts that were written are not rendered again.
 """
 
 import argparse
@@ -52,9 +52,14 @@ def main():
     args = arguments()
     args.out.mkdir(parents=True, exist_ok=True)
     job = {
-        "SCENE": str(args.scene.resolve()), "OUT": str(args.out.resolve()), "KDRAY": args.kdray, "OPTIONS": args.options,
-        "TILES": str(args.tiles), "BLOCKS": str(args.blocks), "SPP": str(args.spp),
-    }  # fmt: skip
+        "SCENE": str(args.scene.resolve()),
+        "OUT": str(args.out.resolve()),
+        "KDRAY": args.kdray,
+        "OPTIONS": args.options,
+        "TILES": str(args.tiles),
+        "BLOCKS": str(args.blocks),
+        "SPP": str(args.spp),
+    }
     first, last = int(args.frames.split("-")[0]), int(args.frames.split("-")[-1])
     with connect(args) as client:
         # A unit of a lost worker is tried on three others, and one that fails three times more.

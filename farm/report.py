@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Reports what a film has cost: `report.py out` reads out/units.tsv, which `farm/unit` writes, and prints a table.
 
-With --json FILE, the same is written as JSON: seconds of each unit, seconds of all, units that failed or were done twice,
-and stragglers (units that took more than twice as long as half of their kind).
+With --json FILE, the same is written as JSON: seconds of each unit, seconds of all, units that failed or were done
+twice, and stragglers (units that took more than twice as long as half of their kind).
 """
 
 import argparse
