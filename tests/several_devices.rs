@@ -124,10 +124,36 @@ fn a_device_that_fails_leaves_its_work_to_the_others() {
         // It is not asked again.
         renderer.draw(&camera, Goal::Samples(n_samples), || ()).unwrap();
         assert!(*renderer.picture().unwrap() == one);
+        // The last device is not given up.
         contexts[0].fail_creations_after(Some(0));
         assert!(renderer.draw(&camera, Goal::Samples(n_samples), || ()).is_err(), "no device is left");
         contexts.iter().for_each(|context| context.fail_creations_after(None));
     }
+}
+
+/// A device may fail at any time, also when the others have done all of their work.
+#[test]
+fn a_device_may_fail_late() {
+    let options = RenderOptions { integrator: Integrator::Path, denoise: Denoise::Off, ..RenderOptions::default() };
+    let options = RenderOptions { width: 16, height: 12, max_depth: 2, ..options };
+    let world = world(&options);
+    let [(one, _), _] = draw(vec![device()], &world, &options, 32);
+    let contexts = [device(), device()];
+    let camera = world.scene().camera;
+    let mut n_failures = 0;
+    for n_creations in (0..).step_by(3) {
+        let mut renderer = Engine::on_devices(contexts.to_vec()).renderer(&world, &options).unwrap();
+        contexts[1].fail_creations_after(Some(n_creations));
+        renderer.draw(&camera, Goal::Samples(32), || ()).unwrap();
+        assert!(*renderer.picture().unwrap() == one, "after {n_creations} creations");
+        let is_whole = renderer.draw(&camera, Goal::Samples(32), || ()).unwrap().profile.device.starts_with("2 x");
+        contexts[1].fail_creations_after(None);
+        if is_whole {
+            break;
+        }
+        n_failures += 1;
+    }
+    assert!(n_failures > 3, "{n_failures}");
 }
 
 #[test]

@@ -101,7 +101,7 @@ impl RendererGroup {
     /// frame is what the clock shows.
     ///
     /// # Errors
-    /// All devices have failed, or the goal is a time.
+    /// All devices have failed, or the goal is a time. The last one that has failed is asked again next time.
     pub fn draw(&mut self, goal: Goal, watcher: &mut impl Watcher) -> Result<Drawn, GpuError> {
         let Goal::Samples(n_samples) = goal else {
             let device = "several devices".to_owned();
@@ -180,29 +180,35 @@ fn share<T: Send>(
     let n_units = units.len();
     handout.begin(units);
     let job = Job { handout: Mutex::new(handout), freed: Mutex::default(), work };
-    let (send, receive) = mpsc::channel();
-    let (mut results, mut failed, mut progress) = (Vec::new(), Vec::new(), WholeSamples { n_done: 0.0 });
-    thread::scope(|scope| {
-        for member in &mut *members {
-            let (job, send) = (&job, send.clone());
-            scope.spawn(move || job.run(member, &send));
-        }
-        drop(send);
-        for message in receive {
-            match message {
-                Message::Samples(share) => progress.add(share, watcher),
-                Message::Done(range, result) => results.push((range, result)),
-                Message::Failed(ix, error) => failed.push((ix, error)),
+    let (mut results, mut progress) = (Vec::new(), WholeSamples { n_done: 0.0 });
+    // A device may fail when the others have nothing left to do, and then they begin again.
+    while results.iter().map(|(range, _): &(Range<u32>, T)| range.len()).sum::<usize>() < n_units {
+        let (send, receive) = mpsc::channel();
+        let mut failed = Vec::new();
+        thread::scope(|scope| {
+            for member in &mut *members {
+                let (job, send) = (&job, send.clone());
+                scope.spawn(move || job.run(member, &send));
             }
+            drop(send);
+            for message in receive {
+                match message {
+                    Message::Samples(share) => progress.add(share, watcher),
+                    Message::Done(range, result) => results.push((range, result)),
+                    Message::Failed(ix, error) => failed.push((ix, error)),
+                }
+            }
+        });
+        for (ix, error) in failed {
+            if let [only] = &members[..]
+                && only.ix == ix
+            {
+                return Err(error);
+            }
+            let name = members.iter().find(|member| member.ix == ix).map_or("", |member| &member.name);
+            tracing::warn!("device {ix} of the list, {name}, has failed, and the others do its work: {error}");
+            members.retain(|member| member.ix != ix);
         }
-    });
-    if results.iter().map(|(range, _)| range.len()).sum::<usize>() < n_units {
-        return Err(failed.pop().expect("units are missing only if a device has failed").1);
-    }
-    for (ix, error) in failed {
-        let name = members.iter().find(|member| member.ix == ix).map_or("", |member| &member.name);
-        tracing::warn!("device {ix} of the list, {name}, has failed, and the others do its work: {error}");
-        members.retain(|member| member.ix != ix);
     }
     results.sort_by_key(|(range, _)| range.start);
     Ok(results)
