@@ -170,8 +170,37 @@ fn a_pack_reads_no_file_on_disk() {
     }
 }
 
+/// A manifest cannot make names of files on disk of those in its pack, whatever it says of its folder.
+#[test]
+fn the_folder_of_a_manifest_leads_nowhere() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    let folder = path.join("scene");
+    fs::create_dir(&folder).unwrap();
+    let scene_file = write_scene(&folder);
+    let output = path.join("s.kdpack");
+    pack(&scene_file, None, &outside(), &output).unwrap();
+    fs::write(path.join("secret.obj"), OBJ).unwrap();
+    let secret = path.join("secret.obj").display().to_string();
+    fs::write(&scene_file, SCENE.replace("parts/panel.obj", &secret)).unwrap();
+    let hostile = path.join("t.kdpack");
+    for folder in ["", ".", "/", "..", &path.display().to_string()] {
+        rewrite_with(&output, &hostile, &scene_file, |manifest| manifest["folder"] = folder.into());
+        let error = Scene::load(&hostile).unwrap_err().to_string();
+        let is_refused =
+            error.contains("its folder is no absolute path") || error.contains("the pack does not have it");
+        assert!(is_refused, "folder `{folder}`: {error}");
+    }
+    assert!(Scene::load_with(&scene_file, &outside()).is_ok(), "read from disk, the name is that of a file");
+}
+
 /// Copies a pack with another scene file, and with the hashes of that file.
 fn rewrite(from: &Path, to: &Path, scene_file: &Path) {
+    rewrite_with(from, to, scene_file, |_| ());
+}
+
+/// Does what [`rewrite`] does, and changes the manifest.
+fn rewrite_with(from: &Path, to: &Path, scene_file: &Path, change: impl FnOnce(&mut serde_json::Value)) {
     use std::io::{Read, Write};
     let mut archive = zip::ZipArchive::new(fs::File::open(from).unwrap()).unwrap();
     let mut files: Vec<(String, Vec<u8>)> = Vec::new();
@@ -190,6 +219,7 @@ fn rewrite(from: &Path, to: &Path, scene_file: &Path) {
         }
     }
     files.iter_mut().find(|(name, _)| name == "s.toml").unwrap().1 = scene;
+    change(&mut manifest);
     files[0].1 = sealed(manifest);
     let mut archive = zip::ZipWriter::new(fs::File::create(to).unwrap());
     for (name, content) in files {

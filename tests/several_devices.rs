@@ -7,14 +7,14 @@ use std::{fs, path::Path, sync::Arc};
 use kdray::{
     engine::{Engine, choices::Workload},
     frame::{Denoise, Goal, Integrator, Picture, RenderOptions, Watcher},
-    gpu::Context,
+    gpu::{Context, DeviceOverrides},
     scene::Scene,
     world::World,
 };
 use support::{
     assert_silent,
     command::{cornell, fail, stderr, stdout, succeed},
-    device,
+    device, pretended,
 };
 use tempfile::TempDir;
 
@@ -128,6 +128,42 @@ fn a_device_that_fails_leaves_its_work_to_the_others() {
         contexts[0].fail_creations_after(Some(0));
         assert!(renderer.draw(&camera, Goal::Samples(n_samples), || ()).is_err(), "no device is left");
         contexts.iter().for_each(|context| context.fail_creations_after(None));
+    }
+}
+
+/// Pictures of few samples, whose rows are shared, and of many, whose samples are, may follow each other.
+#[test]
+fn numbers_of_samples_may_alternate() {
+    let options = RenderOptions { integrator: Integrator::Path, denoise: Denoise::Off, ..RenderOptions::default() };
+    let options = RenderOptions { width: 24, height: 18, max_depth: 2, ..options };
+    let world = world(&options);
+    let camera = world.scene().camera;
+    let mut alone = Engine::on_device(device()).renderer(&world, &options).unwrap();
+    let mut several = Engine::on_devices(vec![device(), device(), device()]).renderer(&world, &options).unwrap();
+    for n_samples in [64, 8, 32, 8, 64] {
+        let pictures = [&mut alone, &mut several].map(|renderer| {
+            renderer.draw(&camera, Goal::Samples(n_samples), || ()).unwrap();
+            renderer.picture().unwrap().into_owned()
+        });
+        assert!(pictures[0] == pictures[1], "{n_samples} samples");
+    }
+    for range in ["0-48", "16-64", "0-48"] {
+        let sums = [&mut alone, &mut several]
+            .map(|renderer| renderer.draw_range(&camera, range.parse().unwrap(), || ()).unwrap().1.picture);
+        assert!(sums[0] == sums[1], "{range}");
+    }
+}
+
+/// Pictures that a device draws in several bands have them again in the next picture.
+#[test]
+fn bands_are_drawn_again() {
+    let options = RenderOptions { integrator: Integrator::Path, denoise: Denoise::Off, ..RenderOptions::default() };
+    let options = RenderOptions { width: 64, height: 96, max_depth: 2, ..options };
+    let world = world(&options);
+    let [(one, _), _] = draw(vec![device()], &world, &options, 32);
+    let small = || pretended(DeviceOverrides { storage_range: Some(64 * 128 * 50), ..DeviceOverrides::default() });
+    for (picture, _) in draw(vec![small(), small()], &world, &options, 32) {
+        assert!(picture == one);
     }
 }
 

@@ -75,7 +75,7 @@ impl Renderer {
         for block in samples.blocks() {
             match &mut self.0 {
                 Backend::Device(renderer) => renderer.set_first_sample(block.first)?,
-                Backend::Group(group) => group.set_first_sample(block.first)?,
+                Backend::Group(group) => group.set_first_sample(block.first),
                 Backend::Cpu(renderer) => renderer.set_first_sample(block.first),
             }
             let next = self.draw_watched(camera, Goal::Samples(block.len()), &mut watcher)?;

@@ -31,6 +31,8 @@ use crate::{
 pub struct RendererGroup {
     members: Vec<Member>,
     options: RenderOptions,
+    /// Whether samples of all pixels can be drawn apart.
+    shares_samples: bool,
     /// Index of the next picture's first sample.
     first_sample: u32,
     rows: Handout,
@@ -67,6 +69,11 @@ impl RendererGroup {
             let threads: Vec<_> = contexts.iter().map(|context| scope.spawn(|| open(context))).collect();
             threads.into_iter().map(|thread| thread.join().expect("no panic")).collect()
         });
+        // Bands of a picture cannot be replaced by their mean.
+        let has_one_band = |renderer: &Result<BandedRenderer, GpuError>| {
+            renderer.as_ref().is_ok_and(|renderer| renderer.n_bands() == 1)
+        };
+        let shares_samples = can_share_samples(options) && renderers.iter().all(has_one_band);
         let members = (contexts.iter().zip(renderers).enumerate())
             .map(|(ix, (context, renderer))| Ok(Member { ix, name: context.info().name.clone(), renderer: renderer? }))
             .collect::<Result<_, GpuError>>()?;
@@ -75,6 +82,7 @@ impl RendererGroup {
         Ok(Self {
             members,
             options: options.clone(),
+            shares_samples,
             first_sample: 0,
             rows: Handout::new(n_devices, rows::portions(contexts, options)),
             samples: Handout::new(n_devices, of_samples),
@@ -88,12 +96,8 @@ impl RendererGroup {
     }
 
     /// Sets the index of the next picture's first sample, as [`BandedRenderer::set_first_sample`] does.
-    ///
-    /// # Errors
-    /// A Vulkan call fails.
-    pub fn set_first_sample(&mut self, first_sample: u32) -> Result<(), GpuError> {
+    pub fn set_first_sample(&mut self, first_sample: u32) {
         self.first_sample = first_sample;
-        self.members.iter_mut().try_for_each(|member| member.renderer.set_first_sample(first_sample))
     }
 
     /// Draws a new picture. The watcher is told of the samples of the whole picture. If a device fails, the others do
@@ -108,9 +112,7 @@ impl RendererGroup {
             return Err(GpuError::Lacks { device, missing: "pictures that end by time".to_owned() });
         };
         let begin = Instant::now();
-        let has_one_band = |member: &Member| member.renderer.n_bands() == 1;
-        let by_samples =
-            can_share_samples(&self.options) && n_samples >= 2 * samples::UNIT && self.members.iter().all(has_one_band);
+        let by_samples = self.shares_samples && n_samples >= 2 * samples::UNIT;
         let mut drawn = match by_samples {
             true => self.draw_samples(n_samples, watcher)?,
             false => self.draw_rows(n_samples, watcher)?,

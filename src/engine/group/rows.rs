@@ -33,7 +33,7 @@ pub fn portions(contexts: &[Arc<Context>], options: &RenderOptions) -> Portions 
 impl RendererGroup {
     /// Draws a picture from tiles of full rows.
     pub(super) fn draw_rows(&mut self, n_samples: u32, watcher: &mut impl Watcher) -> Result<Drawn, GpuError> {
-        let asked = self.options.crop_or_whole();
+        let (asked, first) = (self.options.crop_or_whole(), self.first_sample);
         // The memory of the last picture is used again.
         let mut whole = std::mem::take(&mut self.picture);
         (whole.width, whole.height) = (asked.width(), asked.height());
@@ -43,6 +43,7 @@ impl RendererGroup {
         let picture = Mutex::new(whole);
         let tiles = share(&mut self.members, &mut self.rows, asked.y0..asked.y1, watcher, |renderer, rows, tell| {
             let crop = Crop { y0: rows.start, y1: rows.end, ..asked };
+            renderer.set_first_sample(first)?;
             renderer.set_crop(crop)?;
             let of_all = f64::from(crop.height()) / f64::from(asked.height());
             let drawn = renderer.draw(Goal::Samples(n_samples), &mut || tell(of_all))?;

@@ -41,7 +41,10 @@ impl RendererGroup {
                 Some(profile) => profile.add(&part_profile),
             }
         }
-        self.picture = self.members[0].renderer.picture_of(sums.into_mean())?;
+        let display = &mut self.members[0].renderer;
+        // It may have had no samples to draw.
+        display.set_crop(asked)?;
+        self.picture = display.picture_of(sums.into_mean())?;
         Ok(Drawn { profile: profile.unwrap_or_default(), n_samples, ..Drawn::default() })
     }
 }

@@ -104,6 +104,9 @@ impl Manifest {
         if let Some(file) = manifest.files.iter().find(|file| !is_below(&file.name)) {
             return Err(damaged(format!("`{}` is no path below the pack", file.name)));
         }
+        if manifest.folder.as_ref().is_some_and(|folder| !Path::new(folder).is_absolute()) {
+            return Err(damaged("its folder is no absolute path".to_owned()));
+        }
         for name in [Some(&manifest.scene), manifest.path.as_ref()].into_iter().flatten() {
             if !manifest.files.iter().any(|file| file.name == *name) {
                 return Err(damaged(format!("there is no file `{name}`")));

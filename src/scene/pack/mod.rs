@@ -88,9 +88,10 @@ pub(super) fn place(path: &Path) -> Option<io::Result<Place>> {
 pub(super) fn absolute(root: &Path, name: &Path) -> Option<PathBuf> {
     let (pack, _) = split(root)?;
     let folder = Pack::open(pack).ok().and_then(|pack| pack.manifest.folder.clone());
-    let below = folder.and_then(|folder| Some(normalized(name)?.strip_prefix(folder).ok()?.to_owned()));
-    // A file that the pack does not have: no file has an empty name.
-    Some(pack.join(below.unwrap_or_else(|| PathBuf::from(MANIFEST))))
+    // Joined to the pack, an absolute path would lead out of it.
+    let below = folder.and_then(|folder| name_of(normalized(name)?.strip_prefix(folder).ok()?));
+    // The manifest is no file of the pack, so it stands for a file that the pack does not have.
+    Some(pack.join(below.unwrap_or_else(|| MANIFEST.to_owned())))
 }
 
 /// Returns the path without `.` and `..`, or `None` if it leads above its beginning.
@@ -109,10 +110,14 @@ pub(crate) fn normalized(path: &Path) -> Option<PathBuf> {
     Some(plain)
 }
 
-/// Returns a relative path as a name in a pack, or `None` if it leads out of the pack or is not UTF-8.
+/// Returns a relative path as a name in a pack, or `None` if it leads out of the pack, is absolute or is not UTF-8.
 pub(crate) fn name_of(path: &Path) -> Option<String> {
     let plain = normalized(path)?;
-    let parts: Option<Vec<&str>> = plain.components().map(|part| part.as_os_str().to_str()).collect();
+    let part = |part| match part {
+        Component::Normal(name) => name.to_str(),
+        _ => None,
+    };
+    let parts: Option<Vec<&str>> = plain.components().map(part).collect();
     Some(parts?.join("/"))
 }
 
