@@ -48,7 +48,7 @@ def film(folder):
 class Farm(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="kdray-farm-"))
+        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="kdray farm's "))
         cls.addClassCleanup(shutil.rmtree, cls.folder, ignore_errors=True)
         (cls.folder / "path.toml").write_text(PATH)
         cls.pack = cls.folder / "film.kdpack"
@@ -166,15 +166,15 @@ class Farm(unittest.TestCase):
     def test_wrong_parts_are_refused(self):
         out = self.out()
         self.finish(out, "0")
-        part = out / "parts/t2_b1.0000.exr"
+        part = out / "parts/t2of4_b1of2.0000.exr"
         good = part.read_bytes()
 
         part.write_bytes(good[: len(good) // 2])
-        self.do(out, "merge", "0", code=3, named="t2_b1.0000.exr")
+        self.do(out, "merge", "0", code=3, named="t2of4_b1of2.0000.exr")
         flipped = bytearray(good)
         flipped[-40] ^= 16
         part.write_bytes(flipped)
-        self.do(out, "merge", "0", code=3, named="t2_b1.0000.exr")
+        self.do(out, "merge", "0", code=3, named="t2of4_b1of2.0000.exr")
         part.unlink()
         self.do(out, "merge", "0", code=3, named="the parts have gaps")
         # A scene that has changed between units.
@@ -195,7 +195,15 @@ class Farm(unittest.TestCase):
 
     def test_exit_codes_tell_whether_to_try_again(self):
         self.do(self.out(), "render", "0", 1, 1, scene="none.kdpack", code=3, named="none.kdpack")
-        self.do(self.out(), "render", "9-0", 1, 1, code=2, named="--frames")
+        for words in (("render", "9-0", 1, 1), ("merge", "9-0"), ("merge", "0-4x2"), ("merge", "abc"), ("merge",)):
+            self.do(self.out(), *words, code=2, named="are no frames A-B")
+        self.do(self.out(), "render", "0", 5, 1, code=2, named="there is no tile 5 of 4")
+        self.do(self.out(), "render", "0", 1, 3, code=2, named="there is no block 3 of 2")
+        # What cannot be noted does not change the code.
+        unwritable = self.out()
+        (unwritable / "units.tsv").symlink_to("/dev/full")
+        self.do(unwritable, "render", "0", 1, 1)
+        self.do(unwritable, "render", "0", 1, 2, scene="none.kdpack", code=3, named="none.kdpack")
         # The folder is gone, or the disk is full.
         gone = self.out()
         (gone / "parts").write_text("no folder")
@@ -209,7 +217,7 @@ class Farm(unittest.TestCase):
     def test_report(self):
         out = self.out()
         self.finish(out, "0")
-        (out / "parts/t1_b1.0000.exr").unlink()
+        (out / "parts/t1of4_b1of2.0000.exr").unlink()
         self.do(out, "render", "0", 1, 1)
         self.do(out, "render", "0", 1, 1, scene="none.kdpack", code=3)
         text = run(sys.executable, FARM / "report.py", out, "--json", out / "report.json").stdout
