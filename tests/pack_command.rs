@@ -92,10 +92,8 @@ fn equal_scenes_make_equal_packs() {
     let packs = directories.each_ref().map(|directory| {
         let scene_file = write_scene(directory.path());
         let output = directory.path().join("s.kdpack");
-        let options = LoadOptions::default();
-        fs::write(directory.path().join("parts/panel.mtl"), "newmtl painted\n").unwrap();
         let path = directory.path().join("path.toml");
-        (pack(&scene_file, Some(&path), &options, &output).unwrap(), fs::read(output).unwrap())
+        (pack(&scene_file, Some(&path), &outside(), &output).unwrap(), fs::read(output).unwrap())
     });
     assert!(packs[0] == packs[1]);
     let scene_file = write_scene(directories[0].path());
@@ -145,61 +143,63 @@ fn damage_is_noticed() {
     }
 }
 
+/// A folder with a pack, and a mesh beside the pack that is in no pack.
+struct Beside {
+    directory: TempDir,
+    /// The scene of the pack.
+    scene_file: PathBuf,
+    pack: PathBuf,
+    secret: PathBuf,
+}
+
+impl Beside {
+    fn new() -> Self {
+        let directory = TempDir::new().unwrap();
+        let path = directory.path().to_owned();
+        fs::create_dir(path.join("scene")).unwrap();
+        let scene_file = write_scene(&path.join("scene"));
+        let (output, secret) = (path.join("s.kdpack"), path.join("secret.obj"));
+        pack(&scene_file, None, &outside(), &output).unwrap();
+        fs::write(&secret, OBJ).unwrap();
+        Self { directory, scene_file, pack: output, secret }
+    }
+
+    /// Makes a pack whose scene names this mesh. Read from disk, the name is that of a file. Returns the error of
+    /// loading it.
+    fn error_of(&self, mesh: &str, change: impl FnOnce(&mut serde_json::Value)) -> String {
+        fs::write(&self.scene_file, SCENE.replace("parts/panel.obj", mesh)).unwrap();
+        let on_disk = Scene::load_with(&self.scene_file, &outside());
+        assert!(on_disk.is_ok(), "{on_disk:?}");
+        let hostile = self.directory.path().join("t.kdpack");
+        rewrite_with(&self.pack, &hostile, &self.scene_file, change);
+        assert!(Scene::load_with(&hostile, &outside()).is_err());
+        Scene::load(&hostile).unwrap_err().to_string()
+    }
+}
+
 #[test]
 fn a_pack_reads_no_file_on_disk() {
-    let directory = TempDir::new().unwrap();
-    let path = directory.path();
-    let folder = path.join("scene");
-    fs::create_dir(&folder).unwrap();
-    let scene_file = write_scene(&folder);
-    let output = path.join("s.kdpack");
-    pack(&scene_file, None, &outside(), &output).unwrap();
-    // The same file beside the pack, and by its absolute name.
-    fs::write(path.join("secret.obj"), OBJ).unwrap();
-    for name in ["../secret.obj".to_owned(), path.join("secret.obj").display().to_string()] {
-        let hostile = path.join("t.kdpack");
-        let text = SCENE.replace("parts/panel.obj", &name);
-        fs::write(&scene_file, text).unwrap();
-        rewrite(&output, &hostile, &scene_file);
-        let error = Scene::load(&hostile).unwrap_err().to_string();
+    let beside = Beside::new();
+    for name in ["../secret.obj", &beside.secret.display().to_string()] {
+        let error = beside.error_of(name, |_| ());
         assert!(error.contains("the pack"), "{error}");
-        assert!(Scene::load_with(&hostile, &outside()).is_err());
-        // Read from disk, the name is that of a file.
-        let on_disk = Scene::load_with(&scene_file, &outside());
-        assert!(on_disk.is_ok(), "{on_disk:?}");
     }
 }
 
 /// A manifest cannot make names of files on disk of those in its pack, whatever it says of its folder.
 #[test]
 fn the_folder_of_a_manifest_leads_nowhere() {
-    let directory = TempDir::new().unwrap();
-    let path = directory.path();
-    let folder = path.join("scene");
-    fs::create_dir(&folder).unwrap();
-    let scene_file = write_scene(&folder);
-    let output = path.join("s.kdpack");
-    pack(&scene_file, None, &outside(), &output).unwrap();
-    fs::write(path.join("secret.obj"), OBJ).unwrap();
-    let secret = path.join("secret.obj").display().to_string();
-    fs::write(&scene_file, SCENE.replace("parts/panel.obj", &secret)).unwrap();
-    let hostile = path.join("t.kdpack");
-    for folder in ["", ".", "/", "..", &path.display().to_string()] {
-        rewrite_with(&output, &hostile, &scene_file, |manifest| manifest["folder"] = folder.into());
-        let error = Scene::load(&hostile).unwrap_err().to_string();
+    let beside = Beside::new();
+    for folder in ["", ".", "/", "..", &beside.directory.path().display().to_string()] {
+        let error =
+            beside.error_of(&beside.secret.display().to_string(), |manifest| manifest["folder"] = folder.into());
         let is_refused =
             error.contains("its folder is no absolute path") || error.contains("the pack does not have it");
         assert!(is_refused, "folder `{folder}`: {error}");
     }
-    assert!(Scene::load_with(&scene_file, &outside()).is_ok(), "read from disk, the name is that of a file");
 }
 
-/// Copies a pack with another scene file, and with the hashes of that file.
-fn rewrite(from: &Path, to: &Path, scene_file: &Path) {
-    rewrite_with(from, to, scene_file, |_| ());
-}
-
-/// Does what [`rewrite`] does, and changes the manifest.
+/// Copies a pack with another scene file and another manifest, with the hashes of both.
 fn rewrite_with(from: &Path, to: &Path, scene_file: &Path, change: impl FnOnce(&mut serde_json::Value)) {
     use std::io::{Read, Write};
     let mut archive = zip::ZipArchive::new(fs::File::open(from).unwrap()).unwrap();
@@ -263,6 +263,7 @@ fn absolute_names_are_found_in_the_pack() {
     let scene = Scene::load_with(&scene_file, &outside()).unwrap();
     drop(directory);
     assert_eq!(Scene::load(&output).unwrap(), scene);
+    assert!(fs::read(&output).unwrap().windows(8).any(|text| text == b"\"folder\""));
 }
 
 #[test]

@@ -18,6 +18,7 @@ pub use super::view_args::ViewArgs;
 use super::{
     device_args::{DeviceList, device},
     error::CliError,
+    file_roles::require_ending,
     load_args::LoadArgs,
     look_args::LookArgs,
     or_auto::OrAuto,
@@ -75,10 +76,10 @@ pub struct RenderArgs {
     /// Move the camera along the keyframes of this TOML file, and write one picture per frame
     #[arg(long, value_name = "FILE", conflicts_with = "repeat")]
     pub path: Option<PathBuf>,
-    /// Frames of the path to render, both ends included, for example 0-99, 7, or 0-99x4 for every fourth; the path is
-    /// that of --path, or the one in a pack [default: from the first keyframe to the last]
-    #[arg(long, value_name = "A-BxS", conflicts_with = "repeat")]
-    pub frames: Option<Frames>,
+    /// Frames of the path to render, both ends included, for example 0-99, 7, 0-99x4 for every fourth, or all; the path
+    /// is that of --path, or the one in a pack [default with --path: all, from the first keyframe to the last]
+    #[arg(long, value_name = "A-BxS|all", conflicts_with = "repeat")]
+    pub frames: Option<FrameChoice>,
     /// Leave out pictures whose files exist already, whatever they show, so that a film that was interrupted goes on
     /// where it ended
     #[arg(long, conflicts_with_all = ["repeat", "profile", "trace"])]
@@ -361,11 +362,7 @@ impl CastArgs {
     /// Refuses arguments that contradict each other.
     pub fn check(&self) -> Result<(), CliError> {
         check_accel(self.accel, self.traversal, self.build)?;
-        if self.output.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("npz")) {
-            let path = self.output.display();
-            return Err(CliError::Usage(format!("cannot write `{path}`: the name of a file of hits must end in .npz")));
-        }
-        Ok(())
+        require_ending(&self.output, "npz", "a file of hits")
     }
 
     /// Returns the user's choice of structure, build and traversal.
@@ -402,6 +399,22 @@ impl FromStr for Size {
     }
 }
 
+/// Value of `--frames`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FrameChoice {
+    /// All whole frames of the path.
+    All,
+    Some(Frames),
+}
+
+impl FromStr for FrameChoice {
+    type Err = &'static str;
+
+    fn from_str(word: &str) -> Result<Self, Self::Err> {
+        if word == "all" { Ok(Self::All) } else { word.parse().map(Self::Some) }
+    }
+}
+
 /// Range of frame numbers; both ends are included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frames {
@@ -421,7 +434,7 @@ impl FromStr for Frames {
         match (number(first), number(last), number(step)) {
             (Some(first), Some(last), Some(step)) if first <= last && step > 0 => Ok(Self { first, last, step }),
             (Some(first), Some(last), Some(_)) if first > last => Err("the first frame comes after the last"),
-            _ => Err("expected A, A-B or A-BxS, whole numbers up to 1000000, S above 0"),
+            _ => Err("expected all, A, A-B or A-BxS, whole numbers up to 1000000, S above 0"),
         }
     }
 }
@@ -493,12 +506,14 @@ mod tests {
 
     #[test]
     fn frames() {
+        assert_eq!("all".parse(), Ok(FrameChoice::All));
+        assert_eq!("3-17".parse(), Ok(FrameChoice::Some(Frames { first: 3, last: 17, step: 1 })));
         assert_eq!("3-17".parse(), Ok(Frames { first: 3, last: 17, step: 1 }));
         assert_eq!("0".parse(), Ok(Frames { first: 0, last: 0, step: 1 }));
         assert_eq!("0-9x4".parse(), Ok(Frames { first: 0, last: 9, step: 4 }));
         for word in ["", "0-9x0", "0-9x", "x2", "0-9x1x1", "-", "3-", "-3", "4-3", "1-2-3", "1.5-2", "0-1000001", "a-b"]
         {
-            assert!(word.parse::<Frames>().is_err(), "{word}");
+            assert!(word.parse::<FrameChoice>().is_err(), "{word}");
         }
     }
 }

@@ -5,14 +5,17 @@ use kdray::{
     scene::{LoadOptions, scene_file_of},
 };
 
-use super::{args::ConvertArgs, error::CliError, file_roles::FileRoles, print};
+use super::{
+    args::ConvertArgs,
+    error::CliError,
+    file_roles::{FileRoles, require_ending},
+    print,
+};
 
 /// Loads the input and writes a scene file that shows the same. An existing file is only replaced with `--force`.
 pub fn run(args: &ConvertArgs) -> Result<(), CliError> {
     let path = args.output.display();
-    if args.output.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("toml")) {
-        return Err(CliError::Usage(format!("cannot write `{path}`: the name of a scene file must end in .toml")));
-    }
+    require_ending(&args.output, "toml", "a scene file")?;
     let mut roles = FileRoles::default();
     roles.read_scene("IN", &args.input, args.load.options());
     roles.write("OUT", &args.output)?;

@@ -13,6 +13,17 @@ use kdray::{
 
 use super::error::CliError;
 
+/// Refuses the name of an output that does not have the ending of its format. `what` names the format: "a pack".
+pub fn require_ending(path: &Path, ending: &str, what: &str) -> Result<(), CliError> {
+    match path.extension().is_some_and(|found| found.eq_ignore_ascii_case(ending)) {
+        true => Ok(()),
+        false => {
+            let path = path.display();
+            Err(CliError::Usage(format!("cannot write `{path}`: the name of {what} must end in .{ending}")))
+        }
+    }
+}
+
 /// The use of a file by a command, and the argument that names the file.
 struct Role {
     name: String,

@@ -5,18 +5,21 @@ use std::path::PathBuf;
 use kdray::{
     output,
     pack::{Packed, pack},
-    scene::Scene,
+    scene::{PACK_ENDING, Scene},
 };
 
-use super::{args::PackArgs, error::CliError, file_roles::FileRoles, print};
+use super::{
+    args::PackArgs,
+    error::CliError,
+    file_roles::{FileRoles, require_ending},
+    print,
+};
 
 /// Packs the scene, and reports the files and the pack's hash.
 pub fn run(args: &PackArgs) -> Result<(), CliError> {
     let output = args.output.clone().unwrap_or_else(|| default_output(args));
     let shown = output.display();
-    if output.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("kdpack")) {
-        return Err(CliError::Usage(format!("cannot write `{shown}`: the name of a pack must end in .kdpack")));
-    }
+    require_ending(&output, PACK_ENDING, "a pack")?;
     let mut roles = FileRoles::default();
     roles.read_scene("SCENE", &args.scene, args.load.options());
     args.path.iter().for_each(|path| roles.read("--path", path));
@@ -37,5 +40,5 @@ pub fn run(args: &PackArgs) -> Result<(), CliError> {
 
 /// Returns a file in the working directory, named after the scene.
 fn default_output(args: &PackArgs) -> PathBuf {
-    format!("{}.kdpack", output::stem_of(&Scene::name_of(&args.scene))).into()
+    format!("{}.{PACK_ENDING}", output::stem_of(&Scene::name_of(&args.scene))).into()
 }

@@ -70,12 +70,10 @@ pub fn pack(
     if pack_of(scene_file).is_some() {
         return Err(failed("is in a pack already".to_owned()));
     }
-    let scene = Scene::load_with(scene_file, options)?;
+    let path = path_file.map(CameraPath::load).transpose()?;
+    let original = Original { scene: Scene::load_with(scene_file, options)?, path, options };
     let mut files = source_files_with(scene_file, options);
-    if let Some(path) = path_file {
-        CameraPath::load(path)?;
-        files.push(path.to_owned());
-    }
+    files.extend(path_file.map(Path::to_owned));
     let missing: Vec<_> = files.iter().filter(|file| !file.is_file()).map(|file| file.display().to_string()).collect();
     if !missing.is_empty() {
         return Err(failed(format!("names files that do not exist: {}", missing.join(", "))));
@@ -84,28 +82,45 @@ pub fn pack(
     let mut manifest = Manifest::new(sources.name(scene_file).map_err(failed)?);
     (manifest.scene_name, manifest.camera) = (options.scene.clone(), options.camera.clone());
     manifest.path = path_file.map(|path| sources.name(path)).transpose().map_err(failed)?;
-    if options.allow_outside {
-        let folder = sources.folder.to_str().ok_or_else(|| failed("its folder's name is not UTF-8".to_owned()))?;
-        manifest.folder = Some(folder.to_owned());
-    }
     for (name, path) in &sources.files {
-        manifest.files.push(
-            described(name, path)
-                .map_err(|error| PackError::Refused { path: path.clone(), message: error.to_string() })?,
-        );
+        let unread = |error: io::Error| PackError::Refused { path: path.clone(), message: error.to_string() };
+        manifest.files.push(described(name, path).map_err(unread)?);
     }
-    let manifest = manifest.sealed();
-    let check = |written: &Path| {
-        let packed = Scene::load_with(written, &LoadOptions { look: options.look.clone(), ..LoadOptions::default() });
-        match packed {
-            Ok(packed) if packed == scene => Ok(()),
-            Ok(_) => Err(failed(OTHER_SCENE.to_owned())),
-            Err(error) => Err(failed(format!("cannot be read from its pack: {error}"))),
-        }
+    let write_as = |manifest: Manifest| {
+        let manifest = manifest.sealed();
+        let check = |written: &Path| original.check(written, &manifest).map_err(failed);
+        output::write_checked::<PackError>(output, |file| write(file, &manifest, &sources), check)?;
+        Ok(manifest)
     };
-    output::write_checked::<PackError>(output, |file| write(file, &manifest, &sources), check)?;
-    let files = manifest.files.into_iter().map(|file| (file.name, file.n_bytes)).collect();
-    Ok(Packed { hash: manifest.hash, files })
+    let written = match write_as(manifest.clone()) {
+        // Absolute names are found in the pack if it states the folder that they begin with.
+        Err(PackError::Refused { .. }) if options.allow_outside => {
+            let folder = sources.folder.to_str().ok_or_else(|| failed("its folder's name is not UTF-8".to_owned()))?;
+            write_as(Manifest { folder: Some(folder.to_owned()), ..manifest })
+        }
+        written => written,
+    };
+    let Manifest { hash, files, .. } = written?;
+    Ok(Packed { hash, files: files.into_iter().map(|file| (file.name, file.n_bytes)).collect() })
+}
+
+/// What a pack has to give when it is read.
+struct Original<'a> {
+    scene: Scene,
+    path: Option<CameraPath>,
+    options: &'a LoadOptions,
+}
+
+impl Original<'_> {
+    /// Refuses a pack that gives another scene or another path. An error is a message for people.
+    fn check(&self, written: &Path, manifest: &Manifest) -> Result<(), String> {
+        let unread = |error: SceneError| format!("cannot be read from its pack: {error}");
+        let options = LoadOptions { look: self.options.look.clone(), ..LoadOptions::default() };
+        let scene = Scene::load_with(written, &options).map_err(unread)?;
+        let path = manifest.path.as_ref().map(|name| CameraPath::load(&written.join(name))).transpose();
+        let is_same = scene == self.scene && path.map_err(unread)? == self.path;
+        if is_same { Ok(()) } else { Err(OTHER_SCENE.to_owned()) }
+    }
 }
 
 /// The files of a pack.

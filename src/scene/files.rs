@@ -12,16 +12,16 @@ use super::pack;
 
 /// Reads a regular file.
 pub(super) fn read(path: &Path) -> io::Result<Vec<u8>> {
-    match pack::place(path) {
-        Some(place) => place?.read(),
+    match pack::entry(path) {
+        Some(entry) => entry?.read(),
         None => regular(path).and_then(|()| fs::read(path)),
     }
 }
 
 /// Opens a regular file, of which only the beginning may be needed.
 pub(super) fn open(path: &Path) -> io::Result<Box<dyn Read>> {
-    match pack::place(path) {
-        Some(place) => Ok(Box::new(Cursor::new(place?.read()?))),
+    match pack::entry(path) {
+        Some(entry) => Ok(Box::new(Cursor::new(entry?.read()?))),
         None => regular(path).and_then(|()| Ok(Box::new(fs::File::open(path)?) as Box<dyn Read>)),
     }
 }
@@ -36,32 +36,32 @@ fn regular(path: &Path) -> io::Result<()> {
 
 /// Returns the size of a file in bytes, 0 if it cannot be found.
 pub(super) fn n_bytes(path: &Path) -> u64 {
-    match pack::place(path) {
-        Some(place) => place.ok().and_then(|place| place.n_bytes()).unwrap_or(0),
+    match pack::entry(path) {
+        Some(entry) => entry.ok().and_then(|entry| entry.n_bytes()).unwrap_or(0),
         None => fs::metadata(path).map_or(0, |metadata| metadata.len()),
     }
 }
 
 /// Whether the path is that of a regular file.
 pub(super) fn is_file(path: &Path) -> bool {
-    match pack::place(path) {
-        Some(place) => place.is_ok_and(|place| place.n_bytes().is_some()),
+    match pack::entry(path) {
+        Some(entry) => entry.is_ok_and(|entry| entry.n_bytes().is_some()),
         None => path.is_file(),
     }
 }
 
 /// Whether the path is that of a file or folder.
 pub(super) fn exists(path: &Path) -> bool {
-    match pack::place(path) {
-        Some(place) => place.is_ok_and(|place| place.exists()),
+    match pack::entry(path) {
+        Some(entry) => entry.is_ok_and(|entry| entry.exists()),
         None => path.exists(),
     }
 }
 
 /// Returns the absolute path of a file or folder without links. The empty path is that of the working directory.
 pub(super) fn canonical(path: &Path) -> io::Result<PathBuf> {
-    match pack::place(path) {
-        Some(place) => place?.canonical(),
+    match pack::entry(path) {
+        Some(entry) => entry?.canonical(),
         None => fs::canonicalize(if path.as_os_str().is_empty() { Path::new(".") } else { path }),
     }
 }
@@ -69,8 +69,8 @@ pub(super) fn canonical(path: &Path) -> io::Result<PathBuf> {
 /// Returns the names of what a folder has, none if it cannot be listed. The empty path is that of the working
 /// directory.
 pub(super) fn names_in(folder: &Path) -> Vec<OsString> {
-    match pack::place(folder) {
-        Some(place) => place.map_or_else(|_| Vec::new(), |place| place.names()),
+    match pack::entry(folder) {
+        Some(entry) => entry.map_or_else(|_| Vec::new(), |entry| entry.names()),
         None => {
             let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
             fs::read_dir(folder).map_or_else(|_| Vec::new(), |dir| dir.flatten().map(|it| it.file_name()).collect())

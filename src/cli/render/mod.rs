@@ -3,8 +3,9 @@
 mod draw;
 mod files;
 mod memory;
+mod views;
 
-use std::{path::Path, time::Instant};
+use std::time::Instant;
 
 use kdray::{
     engine::{
@@ -14,23 +15,23 @@ use kdray::{
     frame::{Goal, Profile, RenderOptions, SampleRange},
     gpu::{Context, DeviceInfo, GpuError},
     output::{self, Record, WholeRecord},
-    scene::{CameraPath, LoadOptions, Scene},
+    scene::{LoadOptions, Scene},
     util::progress::Work,
     world::World,
 };
 use tracing::info_span;
 
 use self::{
-    draw::{Common, DrawnPictures, FrameJob, draw_and_write},
-    files::{Files, check_outputs, numbered, output_of, roles},
+    draw::{Common, DrawnPictures, draw_and_write},
+    files::{check_outputs, roles},
     memory::check_memory,
+    views::{NamedPath, views},
 };
 use super::{
-    args::{Frames, RenderArgs},
+    args::RenderArgs,
     build,
     device_args::open_devices,
     error::CliError,
-    file_roles::FileRoles,
     print, print_line,
     progress::Progress,
     report::{FrameTimeRange, Report},
@@ -49,14 +50,17 @@ pub fn run(args: RenderArgs) -> Result<(), CliError> {
 
     let (begun_at, spans) = (Instant::now(), Spans::default());
     let progress = Progress::with_spans(args.quiet, 3, args.trace.is_some().then_some(&spans));
-    let mut views = views(args, roles, &progress)?;
+    let path = args.path.as_deref().map(NamedPath::load).transpose()?;
+    let mut views = views(args, path.as_ref(), roles, &progress)?;
     if views.is_empty() {
         return Ok(());
     }
     let (scene, load_ms) = load(args, &progress)?;
-    if let Some(path) = &args.path {
-        let path = CameraPath::load(path)?.from_origin(scene.origin);
-        views.iter_mut().for_each(|view| view.camera = path.camera_at(f64::from(view.frame)).or(view.camera));
+    if let Some(path) = path {
+        let path = path.from_origin(scene.origin);
+        for view in &mut views {
+            view.camera = Some(path.camera_at(view.frame)?);
+        }
     }
     let options = args.options(&scene)?;
     let n_samples = args.samples(&scene);
@@ -170,52 +174,6 @@ fn load(args: &RenderArgs, progress: &Progress) -> Result<(Scene, f64), CliError
     scene.warn_of_missing_light(&args.scene, args.picture.options(&scene.defaults).integrator);
     args.look.note_up(&args.scene, &scene).into_iter().for_each(|note| progress.note(&note));
     Ok((scene, load_ms))
-}
-
-/// Returns the scene's own view or, with a path, one view per frame. Leaves out views whose files exist, if the user
-/// wants that. Refuses views whose files cannot be written or have another role.
-fn views(args: &RenderArgs, mut roles: FileRoles, progress: &Progress) -> Result<Vec<FrameJob>, CliError> {
-    let output = output_of(args);
-    let mut views = match &args.path {
-        None => vec![FrameJob { camera: None, frame: 0, files: Files::of(output, &args.aov) }],
-        Some(path) => {
-            let views = views_along(path, args, &output)?;
-            views.iter().try_for_each(|view| view.files.note(&mut roles))?;
-            views
-        }
-    };
-    if args.skip_existing {
-        let n_all = views.len();
-        views.retain(|view| !view.files.exist());
-        match n_all - views.len() {
-            0 => (),
-            1 => progress.note("1 picture exists already"),
-            n => progress.note(&format!("{n} pictures exist already")),
-        }
-    }
-    views.iter().try_for_each(|view| view.files.check())?;
-    Ok(views)
-}
-
-/// Returns one view per frame of the path.
-fn views_along(path_file: &Path, args: &RenderArgs, output: &Path) -> Result<Vec<FrameJob>, CliError> {
-    let path = CameraPath::load(path_file)?;
-    let Frames { first, last, step } =
-        args.frames.unwrap_or(Frames { first: path.begin().ceil() as u32, last: path.end().floor() as u32, step: 1 });
-    if first > last {
-        return Err(CliError::Usage(format!(
-            "{}: no whole frame number lies between its first and last keyframe",
-            path_file.display()
-        )));
-    }
-    let view = |frame| {
-        let camera = path.camera_at(f64::from(frame)).ok_or_else(|| {
-            let file = path_file.display();
-            CliError::Usage(format!("{file}: at frame {frame}, eye and target coincide, or up points along the view"))
-        })?;
-        Ok(FrameJob { camera: Some(camera), frame, files: Files::of(numbered(output, frame)?, &args.aov) })
-    };
-    (first..=last).step_by(step as usize).map(view).collect()
 }
 
 /// Sets the number of threads of rayon's global pool. Without a number, rayon chooses.

@@ -2,11 +2,11 @@
 
 use std::{
     ffi::OsStr,
-    fs, io,
+    io,
     path::{Component, Path, PathBuf},
 };
 
-use crate::scene::{SceneError, outside::Access};
+use crate::scene::{SceneError, files::canonical, outside::Access};
 
 /// The folder of a file that is to be written.
 pub(super) struct Places {
@@ -51,8 +51,4 @@ impl Places {
 /// Returns the folder of a file without links. The file need not exist.
 fn folder_of(file: &Path) -> io::Result<PathBuf> {
     canonical(file.parent().unwrap_or(Path::new("")))
-}
-
-fn canonical(folder: &Path) -> io::Result<PathBuf> {
-    fs::canonicalize(if folder.as_os_str().is_empty() { Path::new(".") } else { folder })
 }

@@ -8,10 +8,8 @@ use crate::scene::error::Checked;
 
 /// The name of the manifest in the pack.
 pub const MANIFEST: &str = "kdpack.json";
-/// The number of the format, which changes if packs of before cannot be read any more.
+/// The number of the format. It changes when older packs can no longer be read.
 const FORMAT: u32 = 1;
-/// Number of files that a pack has at most.
-const MOST_FILES: usize = 1 << 20;
 
 /// What a pack has.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -33,11 +31,17 @@ pub struct Manifest {
     /// The name of the camera path's file in the pack.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub path: Option<String>,
-    /// The absolute path of the folder whose files the pack has, if they may name files beyond their own folders.
+    /// The absolute path of the folder whose files the pack has, if they name each other by absolute paths.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub folder: Option<String>,
     /// All files, by their names in the pack.
     pub files: Vec<PackedFile>,
+}
+
+/// What is read first: the rest depends on the format.
+#[derive(Deserialize)]
+struct OfFormat {
+    format: u32,
 }
 
 /// A file of a pack.
@@ -87,19 +91,14 @@ impl Manifest {
     /// Returns the manifest that a text states. An error is a message for people.
     pub fn of_json(json: &[u8]) -> Checked<Self> {
         let damaged = |what: String| format!("is damaged: {MANIFEST}: {what}");
-        let value: serde_json::Value = serde_json::from_slice(json).map_err(|error| damaged(error.to_string()))?;
-        match value.get("format").and_then(serde_json::Value::as_u64) {
-            Some(format) if format != u64::from(FORMAT) => {
-                return Err(format!("is a pack of format {format}, and this version of kdray reads format {FORMAT}"));
-            }
-            _ => (),
+        let unread = |error: serde_json::Error| damaged(error.to_string());
+        let OfFormat { format } = serde_json::from_slice(json).map_err(unread)?;
+        if format != FORMAT {
+            return Err(format!("is a pack of format {format}, and this version of kdray reads format {FORMAT}"));
         }
-        let manifest: Self = serde_json::from_value(value).map_err(|error| damaged(error.to_string()))?;
+        let manifest: Self = serde_json::from_slice(json).map_err(unread)?;
         if manifest.hash != manifest.own_hash() {
             return Err(damaged("it does not have the hash that it states".to_owned()));
-        }
-        if manifest.files.len() > MOST_FILES {
-            return Err(damaged(format!("it has more than {MOST_FILES} files")));
         }
         if let Some(file) = manifest.files.iter().find(|file| !is_below(&file.name)) {
             return Err(damaged(format!("`{}` is no path below the pack", file.name)));

@@ -8,10 +8,11 @@
 mod manifest;
 
 use std::{
-    collections::{BTreeSet, HashMap},
+    collections::BTreeMap,
     ffi::OsString,
     fs::File,
     io::{self, Read},
+    ops::Bound,
     path::{Component, Path, PathBuf},
     sync::{Arc, Mutex, OnceLock, PoisonError, Weak},
     time::SystemTime,
@@ -29,23 +30,28 @@ use crate::util::memory::require;
 
 /// The ending of a pack's name.
 pub const ENDING: &str = "kdpack";
-/// Size of the largest manifest, bytes.
-const MOST_MANIFEST_BYTES: u64 = 1 << 28;
+/// Size of the largest manifest, bytes: it describes half a million files.
+const MOST_MANIFEST_BYTES: u64 = 1 << 26;
 
 /// An open pack.
 pub(super) struct Pack {
-    path: PathBuf,
-    archive: Mutex<ZipArchive<File>>,
+    archive: Archive,
     manifest: Manifest,
     /// Indices into the manifest's files, by their names.
-    by_name: HashMap<String, usize>,
+    by_name: BTreeMap<String, usize>,
     /// Why a file that the pack has could not be read, if there is one. Scenes are shown without images that cannot be
     /// read, but not if a pack is damaged.
     failure: OnceLock<String>,
 }
 
+/// The ZIP archive of a pack.
+struct Archive {
+    path: PathBuf,
+    zip: Mutex<ZipArchive<File>>,
+}
+
 /// A file or a folder in a pack, which need not exist.
-pub(super) struct Place {
+pub(super) struct Entry {
     pack: Arc<Pack>,
     /// Its name in the pack; empty for the pack itself.
     name: String,
@@ -74,12 +80,12 @@ pub(crate) fn pack_of(path: &Path) -> Option<&Path> {
     split(path).map(|(pack, _)| pack)
 }
 
-/// Returns the place in a pack that a path leads to, or `None` for a path that leads into no pack.
-pub(super) fn place(path: &Path) -> Option<io::Result<Place>> {
+/// Returns the entry of a pack that a path leads to, or `None` for a path that leads into no pack.
+pub(super) fn entry(path: &Path) -> Option<io::Result<Entry>> {
     let (pack, rest) = split(path)?;
     Some(Pack::open(pack).map_err(io::Error::other).and_then(|pack| {
         let outside = || io::Error::new(io::ErrorKind::NotFound, "the path leads out of the pack");
-        Ok(Place { name: name_of(rest).ok_or_else(outside)?, pack })
+        Ok(Entry { name: name_of(rest).ok_or_else(outside)?, pack })
     }))
 }
 
@@ -144,7 +150,8 @@ pub(super) fn scene_of(path: &Path, options: &LoadOptions) -> Result<Option<Pack
     let mut options = options.clone();
     options.scene = options.scene.or_else(|| pack.manifest.scene_name.clone());
     options.camera = options.camera.or_else(|| pack.manifest.camera.clone());
-    options.allow_outside = pack.manifest.folder.is_some();
+    // No name in a pack leads out of it.
+    options.allow_outside = true;
     Ok(Some(PackedScene { path: path.join(&pack.manifest.scene), pack, options }))
 }
 
@@ -179,27 +186,53 @@ impl Pack {
 
     /// Reads the list of files and the manifest.
     fn read(path: PathBuf, file: File) -> Checked<Self> {
-        let archive = ZipArchive::new(file).map_err(|error| format!("is no pack: {error}"))?;
-        let mut pack = Self {
-            path,
-            archive: Mutex::new(archive),
-            manifest: Manifest::new(String::new()),
-            by_name: HashMap::new(),
-            failure: OnceLock::new(),
-        };
-        let json = pack.content(MANIFEST, MOST_MANIFEST_BYTES).map_err(|error| format!("is no pack: {error}"))?;
-        pack.manifest = Manifest::of_json(&json)?;
-        pack.by_name = (pack.manifest.files.iter().enumerate()).map(|(ix, file)| (file.name.clone(), ix)).collect();
-        Ok(pack)
+        let zip = ZipArchive::new(file).map_err(|error| format!("is no pack: {error}"))?;
+        let archive = Archive { path, zip: Mutex::new(zip) };
+        let json = archive.content(MANIFEST, MOST_MANIFEST_BYTES).map_err(|error| format!("is no pack: {error}"))?;
+        let manifest = Manifest::of_json(&json)?;
+        let by_name = manifest.files.iter().enumerate().map(|(ix, file)| (file.name.clone(), ix)).collect();
+        Ok(Self { archive, manifest, by_name, failure: OnceLock::new() })
     }
 
-    /// Returns the content of a file of the archive, which has at most `most` bytes.
+    /// Returns an error if a file could not be read at any time since the pack was opened.
+    pub fn check(&self) -> Result<(), SceneError> {
+        self.failure.get().map_or(Ok(()), |what| Err(SceneError::file(&self.archive.path, what)))
+    }
+
+    fn file(&self, name: &str) -> Option<&PackedFile> {
+        self.by_name.get(name).map(|ix| &self.manifest.files[*ix])
+    }
+}
+
+/// Returns the names of the files and folders in a folder, whose name ends with `/` unless it is the pack itself.
+fn names_in<'a>(folder: &str, files: &'a BTreeMap<String, usize>) -> Vec<&'a str> {
+    let (mut names, mut from) = (Vec::new(), folder.to_owned());
+    while let Some(below) = first_from(&from, files).and_then(|name| name.strip_prefix(folder)) {
+        // All files of a folder follow each other, since their names begin with the folder's and `/`. The first name
+        // that can follow them has `0` there, which is the next character.
+        let (name, end) = match below.split_once('/') {
+            Some((name, _)) => (name, '0'),
+            None => (below, '\0'),
+        };
+        names.push(name);
+        from = format!("{folder}{name}{end}");
+    }
+    names
+}
+
+/// Returns the first name, in alphabetical order, that is not before `from`.
+fn first_from<'a>(from: &str, files: &'a BTreeMap<String, usize>) -> Option<&'a str> {
+    files.range::<str, _>((Bound::Included(from), Bound::Unbounded)).next().map(|(name, _)| name.as_str())
+}
+
+impl Archive {
+    /// Returns the content of a file, which has at most `most` bytes.
     fn content(&self, name: &str, most: u64) -> io::Result<Vec<u8>> {
         let (method, packed) = {
             // Others may decompress their files at the same time.
-            let mut archive = self.archive.lock().unwrap_or_else(PoisonError::into_inner);
-            let ix = archive.index_for_name(name).ok_or(io::ErrorKind::NotFound)?;
-            let mut file = archive.by_index_raw(ix)?;
+            let mut zip = self.zip.lock().unwrap_or_else(PoisonError::into_inner);
+            let ix = zip.index_for_name(name).ok_or(io::ErrorKind::NotFound)?;
+            let mut file = zip.by_index_raw(ix)?;
             // What a file states of its size may be wrong.
             let n_bytes = self.path.metadata()?.len().min(file.compressed_size());
             require("reading a pack", n_bytes).map_err(io::Error::other)?;
@@ -217,18 +250,9 @@ impl Pack {
         }
         if content.len() as u64 > most { Err(io::Error::other("it is larger than stated")) } else { Ok(content) }
     }
-
-    /// Returns an error if a file could not be read since the pack is open.
-    pub fn check(&self) -> Result<(), SceneError> {
-        self.failure.get().map_or(Ok(()), |what| Err(SceneError::file(&self.path, what)))
-    }
-
-    fn file(&self, name: &str) -> Option<&PackedFile> {
-        self.by_name.get(name).map(|ix| &self.manifest.files[*ix])
-    }
 }
 
-impl Place {
+impl Entry {
     /// Reads the file, which has to be what the manifest says.
     pub fn read(&self) -> io::Result<Vec<u8>> {
         let file = self.pack.file(&self.name);
@@ -240,7 +264,7 @@ impl Place {
 
     fn read_file(&self, file: &PackedFile) -> io::Result<Vec<u8>> {
         require("reading a file of a pack", file.n_bytes).map_err(io::Error::other)?;
-        let content = self.pack.content(&file.name, file.n_bytes)?;
+        let content = self.pack.archive.content(&file.name, file.n_bytes)?;
         let mut hasher = blake3::Hasher::new();
         let hash = hasher.update_rayon(&content).finalize().to_hex();
         if content.len() as u64 == file.n_bytes && hash.as_str() == file.blake3 {
@@ -257,12 +281,14 @@ impl Place {
 
     /// Whether it is a file, or a folder with files.
     pub fn exists(&self) -> bool {
-        self.n_bytes().is_some() || !self.names().is_empty()
+        let folder = self.folder();
+        let has_files = || first_from(&folder, &self.pack.by_name).is_some_and(|name| name.starts_with(&folder));
+        self.n_bytes().is_some() || has_files()
     }
 
     /// Returns the absolute path.
     pub fn canonical(&self) -> io::Result<PathBuf> {
-        let pack = self.pack.path.canonicalize()?;
+        let pack = self.pack.archive.path.canonicalize()?;
         match self.exists() {
             true => Ok(if self.name.is_empty() { pack } else { pack.join(&self.name) }),
             false => Err(io::ErrorKind::NotFound.into()),
@@ -271,13 +297,32 @@ impl Place {
 
     /// Returns the names of the files and folders in a folder.
     pub fn names(&self) -> Vec<OsString> {
-        let below = |file: &PackedFile| match self.name.is_empty() {
-            true => Some(file.name.clone()),
-            false => Some(file.name.strip_prefix(&self.name)?.strip_prefix('/')?.to_owned()),
+        names_in(&self.folder(), &self.pack.by_name).into_iter().map(OsString::from).collect()
+    }
+
+    /// Returns how the names of everything in it begin, if it is a folder.
+    fn folder(&self) -> String {
+        if self.name.is_empty() { String::new() } else { format!("{}/", self.name) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn folders_have_their_own_files_alone() {
+        let files = ["a", "a.obj", "a/b/c", "a/b/d", "a/b.png", "a/b0", "a0/e", "f/g"];
+        let files: BTreeMap<String, usize> = files.iter().map(|name| (name.to_string(), 0)).collect();
+        let names = |folder: &str| {
+            let mut names = names_in(folder, &files);
+            names.sort_unstable();
+            names
         };
-        let rests = self.pack.manifest.files.iter().filter_map(below);
-        let names: BTreeSet<OsString> =
-            rests.map(|rest| rest.split('/').next().unwrap_or_default().to_owned().into()).collect();
-        names.into_iter().collect()
+        assert_eq!(names(""), ["a", "a", "a.obj", "a0", "f"], "a file and a folder may have one name");
+        assert_eq!(names("a/"), ["b", "b.png", "b0"]);
+        assert_eq!(names("a/b/"), ["c", "d"]);
+        assert_eq!(names("none/"), [""; 0]);
+        assert_eq!(names_in("", &BTreeMap::new()), [""; 0]);
     }
 }

@@ -1,0 +1,98 @@
+//! The views that `kdray render` draws: the scene's own, or one for each frame of a camera path.
+
+use std::path::Path;
+
+use glam::DVec3;
+use kdray::scene::{Camera, CameraPath};
+
+use super::{
+    draw::FrameJob,
+    files::{Files, numbered, output_of},
+};
+use crate::cli::{
+    args::{FrameChoice, Frames, RenderArgs},
+    error::CliError,
+    file_roles::FileRoles,
+    progress::Progress,
+};
+
+/// Returns the scene's own view or, with a path, one view per frame. Leaves out views whose files exist, if the user
+/// wants that. Refuses views whose files cannot be written or have another role.
+pub fn views(
+    args: &RenderArgs,
+    path: Option<&NamedPath>,
+    mut roles: FileRoles,
+    progress: &Progress,
+) -> Result<Vec<FrameJob>, CliError> {
+    let output = output_of(args);
+    let mut views = match path {
+        None => vec![FrameJob { camera: None, frame: 0, files: Files::of(output, &args.aov) }],
+        Some(path) => {
+            let views = views_along(path, args, &output)?;
+            views.iter().try_for_each(|view| view.files.note(&mut roles))?;
+            views
+        }
+    };
+    if args.skip_existing {
+        let n_all = views.len();
+        views.retain(|view| !view.files.exist());
+        match n_all - views.len() {
+            0 => (),
+            1 => progress.note("1 picture exists already"),
+            n => progress.note(&format!("{n} pictures exist already")),
+        }
+    }
+    views.iter().try_for_each(|view| view.files.check())?;
+    Ok(views)
+}
+
+/// Returns one view per frame of the path. Their cameras are set when the scene's origin is known, but a path without a
+/// camera at one of these frames is refused here, before the scene is loaded.
+fn views_along(path: &NamedPath, args: &RenderArgs, output: &Path) -> Result<Vec<FrameJob>, CliError> {
+    let Frames { first, last, step } = match args.frames {
+        Some(FrameChoice::Some(frames)) => frames,
+        Some(FrameChoice::All) | None => path.frames(),
+    };
+    if first > last {
+        return Err(path.refused("no whole frame number lies between its first and last keyframe".to_owned()));
+    }
+    let view = |frame| {
+        path.camera_at(frame)?;
+        Ok(FrameJob { camera: None, frame, files: Files::of(numbered(output, frame)?, &args.aov) })
+    };
+    (first..=last).step_by(step as usize).map(view).collect()
+}
+
+/// A camera path and the file that it was read from.
+pub struct NamedPath<'a> {
+    file: &'a Path,
+    path: CameraPath,
+}
+
+impl<'a> NamedPath<'a> {
+    pub fn load(file: &'a Path) -> Result<Self, CliError> {
+        Ok(Self { file, path: CameraPath::load(file)? })
+    }
+
+    /// Returns the path for a scene that was moved to the origin, as [`CameraPath::from_origin`] does.
+    pub fn from_origin(self, origin: DVec3) -> Self {
+        Self { path: self.path.from_origin(origin), ..self }
+    }
+
+    /// Returns all whole frames of the path. The first is larger than the last if there are none.
+    fn frames(&self) -> Frames {
+        Frames { first: self.path.begin().ceil() as u32, last: self.path.end().floor() as u32, step: 1 }
+    }
+
+    /// # Errors
+    /// The curve leads through a camera that sees nothing at this frame.
+    pub fn camera_at(&self, frame: u32) -> Result<Camera, CliError> {
+        let refused =
+            || self.refused(format!("at frame {frame}, eye and target coincide, or up points along the view"));
+        self.path.camera_at(f64::from(frame)).ok_or_else(refused)
+    }
+
+    fn refused(&self, what: String) -> CliError {
+        CliError::Usage(format!("{}: {what}", self.file.display()))
+    }
+}
