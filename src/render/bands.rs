@@ -111,7 +111,7 @@ impl BandedRenderer {
             Goal::Time(time) => Goal::Time(time / self.n_bands()),
             samples => samples,
         };
-        for (band_ix, &band) in self.bands.clone().iter().enumerate() {
+        for band in self.bands.clone() {
             self.renderer.set_crop(band)?;
             let drawn = self.draw_band(goal, watcher)?;
             goal = Goal::Samples(drawn.n_samples);
@@ -123,11 +123,7 @@ impl BandedRenderer {
             }
             all.light.place(&whole, &band, &drawn.light);
             all.n_samples = drawn.n_samples;
-            if band_ix == 0 {
-                all.profile = drawn.profile;
-            } else {
-                all.profile.append(drawn.profile);
-            }
+            all.profile.append(drawn.profile);
         }
         self.joined = Some(joined);
         Ok(all)
@@ -213,13 +209,9 @@ impl BandedRenderer {
         let mut drawn = Drawn::default();
         while let Some(log2) = pacer.next(self.renderer.n_samples()) {
             let profile = self.draw_frame(log2, watcher)?;
-            if drawn.n_samples > 0 {
-                drawn.profile.add(&profile);
-            } else {
-                drawn.profile = profile;
-                if self.renderer.options().features {
-                    drawn.features = self.renderer.features()?;
-                }
+            drawn.profile.add(&profile);
+            if drawn.n_samples == 0 && self.renderer.options().features {
+                drawn.features = self.renderer.features()?;
             }
             drawn.n_samples = self.renderer.n_samples();
         }
