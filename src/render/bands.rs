@@ -142,14 +142,15 @@ impl BandedRenderer {
     }
 
     /// Replaces the mean of the samples, which [`BandedRenderer::window_mean`] returns, and returns the picture of it,
-    /// filtered and encoded. The next sample is the first of a new picture.
+    /// filtered and encoded. The next sample is the first of a new picture. If this fails, `mean` keeps its contents,
+    /// else they may have become the picture.
     ///
     /// # Panics
     /// There are several bands, or the mean has another number of pixels.
     ///
     /// # Errors
     /// A copy fails.
-    pub fn picture_of(&mut self, mean: Vec<[f32; 4]>) -> Result<Picture, GpuError> {
+    pub fn picture_of(&mut self, mean: &mut Vec<[f32; 4]>) -> Result<Picture, GpuError> {
         assert_eq!(self.bands.len(), 1, "one band");
         self.renderer.picture_of(mean)
     }

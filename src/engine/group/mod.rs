@@ -13,6 +13,7 @@ mod samples;
 mod work_queue;
 
 use std::{
+    cell::Cell,
     ops::Range,
     sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc},
     thread,
@@ -162,8 +163,16 @@ enum Message<T> {
     Sample(f64),
     /// A range is done, with this result.
     Done(Range<u32>, T),
-    /// The member with this index has failed.
-    Failed(usize, GpuError),
+    /// A member has failed within a range.
+    Failed(Failure),
+}
+
+struct Failure {
+    /// Index of the member.
+    ix: usize,
+    error: GpuError,
+    /// Sum of the shares of the samples that it had drawn of the unfinished range.
+    lost: f64,
 }
 
 /// Lets all members work until all units are done. `work` does a range of units. Each time that a sample of some pixels
@@ -182,7 +191,7 @@ fn share<T: Send>(
     let n_units = units.len();
     queue.begin(units);
     let job = Job { queue: Mutex::new(queue), work };
-    let (mut results, mut progress) = (Vec::new(), WholeSamples { n_done: 0.0 });
+    let (mut results, mut progress) = (Vec::new(), WholeSamples::default());
     // If a device fails when the threads of the others have ended, a further round does its range.
     while results.iter().map(|(range, _): &(Range<u32>, T)| range.len()).sum::<usize>() < n_units {
         let (send, receive) = mpsc::channel();
@@ -197,11 +206,14 @@ fn share<T: Send>(
                 match message {
                     Message::Sample(share) => progress.add(share, watcher),
                     Message::Done(range, result) => results.push((range, result)),
-                    Message::Failed(ix, error) => failed.push((ix, error)),
+                    Message::Failed(failure) => {
+                        progress.n_done -= failure.lost;
+                        failed.push(failure);
+                    }
                 }
             }
         });
-        for (ix, error) in failed {
+        for Failure { ix, error, .. } in failed {
             remove_failed(members, ix, error)?;
         }
     }
@@ -233,15 +245,19 @@ impl<W> Job<'_, W> {
         let tell = |message| send.send(message).expect("a receiver");
         loop {
             let Some(range) = lock(&self.queue).take(member.ix) else { return };
-            let begin = Instant::now();
-            match (self.work)(&mut member.renderer, range.clone(), &|share| tell(Message::Sample(share))) {
+            let (begin, drawn) = (Instant::now(), Cell::new(0.0));
+            let tell_sample = |share| {
+                drawn.set(drawn.get() + share);
+                tell(Message::Sample(share));
+            };
+            match (self.work)(&mut member.renderer, range.clone(), &tell_sample) {
                 Ok(result) => {
                     lock(&self.queue).record_time(member.ix, &range, begin.elapsed());
                     tell(Message::Done(range, result));
                 }
                 Err(error) => {
                     lock(&self.queue).mark_failed(member.ix, range);
-                    return tell(Message::Failed(member.ix, error));
+                    return tell(Message::Failed(Failure { ix: member.ix, error, lost: drawn.get() }));
                 }
             }
         }
@@ -253,18 +269,38 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 /// Counts samples of parts of the picture, and tells the watcher of samples of the whole picture.
+#[derive(Default)]
 struct WholeSamples {
-    /// Sum of the shares of all samples that have been drawn.
+    /// Sum of the shares of all samples that have been drawn. It becomes less if a device fails, since the samples of
+    /// its unfinished range are drawn again.
     n_done: f64,
+    /// Number of samples of which the watcher knows.
+    n_told: u32,
 }
 
 impl WholeSamples {
     fn add(&mut self, share: f64, watcher: &mut impl Watcher) {
-        // The shares of a sample add up to 1 but for rounding.
-        let whole = |n_done: f64| (n_done + 1e-6).floor() as u64;
-        let before = whole(self.n_done);
         self.n_done += share;
-        (before..whole(self.n_done)).for_each(|_| watcher.sample());
-        watcher.part((self.n_done - self.n_done.floor()) as f32);
+        // The shares of a sample add up to 1 but for rounding.
+        let n_whole = (self.n_done + 1e-6).floor() as u32;
+        (self.n_told..n_whole).for_each(|_| watcher.sample());
+        self.n_told = self.n_told.max(n_whole);
+        watcher.part((self.n_done - f64::from(self.n_told)).max(0.0) as f32);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_that_are_drawn_again_are_told_once() {
+        let (mut progress, mut n_told) = (WholeSamples::default(), 0);
+        let mut add = |progress: &mut WholeSamples, n: u32| (0..n).for_each(|_| progress.add(0.25, &mut || n_told += 1));
+        add(&mut progress, 10);
+        progress.n_done -= 1.5;
+        add(&mut progress, 6);
+        add(&mut progress, 6);
+        assert_eq!((n_told, progress.n_told, progress.n_done), (4, 4, 4.0));
     }
 }

@@ -45,8 +45,9 @@ impl RendererGroup {
             let crop = Crop { y0: rows.start, y1: rows.end, ..asked };
             renderer.set_first_sample(first)?;
             renderer.set_crop(crop)?;
-            let of_all = f64::from(crop.height()) / f64::from(asked.height());
-            let drawn = renderer.draw(Goal::Samples(n_samples), &mut || tell(of_all))?;
+            // The renderer tells of each sample of each band.
+            let share = f64::from(crop.height()) / f64::from(asked.height()) / f64::from(renderer.n_bands());
+            let drawn = renderer.draw(Goal::Samples(n_samples), &mut || tell(share))?;
             let pixel = |y: u32| (y - asked.y0) as usize * asked.width() as usize;
             let pixels = pixel(crop.y0)..pixel(crop.y1);
             let mut whole = lock(&picture);

@@ -2,9 +2,9 @@
 //! pixels. One device adds all samples as a binary tree, and the sum of an aligned block is a node of that tree. So the
 //! mean has the same bits as that of one device.
 
-use super::{RendererGroup, share};
+use super::{Member, RendererGroup, remove_failed, share};
 use crate::{
-    frame::{Drawn, Goal, Profile, SampleRange, SampleSums, Watcher},
+    frame::{Drawn, Goal, Picture, Profile, SampleRange, SampleSums, Watcher},
     gpu::GpuError,
     layout::MOST_SAMPLES_LOG2,
 };
@@ -36,10 +36,23 @@ impl RendererGroup {
             part.into_blocks().into_iter().for_each(|block| sums.push(block));
             profile.add(&part_profile);
         }
-        let display = &mut self.members[0].renderer;
-        // If it drew no samples, its crop is still that of the last picture.
-        display.set_crop(asked)?;
-        self.picture = display.picture_of(sums.into_mean())?;
+        self.picture = self.picture_of(sums.into_mean())?;
         Ok(Drawn { profile, n_samples, ..Drawn::default() })
+    }
+
+    /// Returns the picture of the mean of all samples, filtered and encoded by the first member that does not fail.
+    fn picture_of(&mut self, mut mean: Vec<[f32; 4]>) -> Result<Picture, GpuError> {
+        let asked = self.options.crop_or_whole();
+        loop {
+            let Member { ix, renderer, .. } = &mut self.members[0];
+            // If it drew no samples, its crop is still that of the last picture.
+            match renderer.set_crop(asked).and_then(|()| renderer.picture_of(&mut mean)) {
+                Ok(picture) => return Ok(picture),
+                Err(error) => {
+                    let ix = *ix;
+                    remove_failed(&mut self.members, ix, error)?;
+                }
+            }
+        }
     }
 }
