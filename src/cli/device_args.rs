@@ -2,14 +2,14 @@
 
 use std::{collections::BTreeSet, str::FromStr, sync::Arc};
 
-use kdray::gpu::{Context, ContextOptions, DeviceSelector, GpuError, chosen_device, devices};
+use kdray::gpu::{Context, ContextOptions, DeviceInfo, DeviceSelector, GpuError, chosen_device, devices};
 
 use super::progress::Progress;
 
 /// Value of `--device` of commands that can use several devices.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum DeviceList {
-    /// All devices of the best one's kind.
+    /// All devices that have the name and the driver of the best one.
     All,
     /// The named devices, at least one. A device may be named several times.
     Named(Vec<DeviceSelector>),
@@ -44,8 +44,8 @@ pub fn open_device(options: &ContextOptions, progress: &Progress) -> Result<Arc<
     Ok(context)
 }
 
-/// Opens the devices of the list, or the best device if there is no list. If they are of several kinds, a note says
-/// what follows from that.
+/// Opens the devices of the list, or the best device if there is no list. If the devices differ in name or driver, a
+/// note warns that they may round in different ways.
 pub fn open_devices(
     list: Option<&DeviceList>,
     validate: bool,
@@ -56,10 +56,10 @@ pub fn open_devices(
         Some(DeviceList::Named(named)) => named.iter().cloned().map(Some).collect(),
         Some(DeviceList::All) => {
             let best = chosen_device(None)?;
-            let is_equal = |(name, driver)| name == best.name && driver == best.driver;
-            let equal = devices()?.into_iter().filter(|it| it.missing.is_empty());
-            let equal = equal.filter(|it| is_equal((it.name.clone(), it.driver.clone())));
-            equal.map(|it| Some(DeviceSelector::Index(it.index))).collect()
+            let is_like_best =
+                |it: &DeviceInfo| it.missing.is_empty() && it.name == best.name && it.driver == best.driver;
+            let alike = devices()?.into_iter().filter(is_like_best);
+            alike.map(|it| Some(DeviceSelector::Index(it.index))).collect()
         }
     };
     let open = |selector| open_device(&ContextOptions::new(selector, validate), progress);

@@ -155,13 +155,9 @@ fn draw_on_cpu(renderer: &mut cpu::Renderer, goal: Goal, watcher: &mut impl Watc
         }
         let profile = info_span!("render").in_scope(|| renderer.draw_sample_with(|share| watcher.part(share)));
         (drawn.n_samples..renderer.n_samples()).for_each(|_| watcher.sample());
-        if drawn.n_samples > 0 {
-            drawn.profile.add(&profile);
-        } else {
-            drawn.profile = profile;
-            if renderer.options().features {
-                drawn.features = renderer.features();
-            }
+        drawn.profile.add(&profile);
+        if drawn.n_samples == 0 && renderer.options().features {
+            drawn.features = renderer.features();
         }
         drawn.n_samples = renderer.n_samples();
     }

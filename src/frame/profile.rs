@@ -85,8 +85,12 @@ impl BounceStats {
 
 impl Profile {
     /// Adds the times and counts of another frame with the same options. The `start_ms` of a pass remains the one
-    /// from the first frame that has the pass.
+    /// from the first frame that has the pass. If this profile is empty, the sum is the other one.
     pub fn add(&mut self, frame: &Profile) {
+        if *self == Self::default() {
+            self.clone_from(frame);
+            return;
+        }
         let mut next = 0;
         let place = |pass: &PassTime| (pass.name, pass.bounce, pass.batch);
         for pass in &frame.passes {
@@ -108,8 +112,13 @@ impl Profile {
     }
 
     /// Appends the profile of another band of the picture. Its batches are numbered on from those of this profile,
-    /// and its passes start later by the time between the beginnings of both bands.
+    /// and its passes start later by the time between the beginnings of both bands. If this profile is empty, the
+    /// other one replaces it.
     pub fn append(&mut self, part: Profile) {
+        if *self == Self::default() {
+            *self = part;
+            return;
+        }
         let delay = self.begun_at.zip(part.begun_at).map(|(first, later)| later.saturating_duration_since(first));
         let delay_ms = delay.unwrap_or_default().as_secs_f64() * 1e3;
         let n_batches = self.n_batches;
@@ -171,7 +180,10 @@ mod tests {
             frame_ms: Some(4.0),
             begun_at: None,
         };
-        let mut sum = frame(vec![pass("trace", Some(0), 1.0), pass("tonemap", None, 2.0)], 3);
+        let first = frame(vec![pass("trace", Some(0), 1.0), pass("tonemap", None, 2.0)], 3);
+        let mut sum = Profile::default();
+        sum.add(&first);
+        assert_eq!(sum, first, "an empty profile has no time of its own");
         let later =
             frame(vec![pass("trace", Some(0), 1.5), pass("accumulate", None, 0.5), pass("tonemap", None, 2.0)], 2);
         sum.add(&later);
@@ -215,7 +227,8 @@ mod tests {
             begun_at: Some(begin + Duration::from_millis(begun_ms)),
             ..Profile::default()
         };
-        let mut all = part(0, 3);
+        let mut all = Profile::default();
+        all.append(part(0, 3));
         all.append(part(20, 2));
         let places: Vec<_> = all.passes.iter().map(|pass| (pass.batch, pass.start_ms)).collect();
         assert_eq!(places, [(Some(0), Some(1.5)), (None, Some(1.5)), (Some(3), Some(21.5)), (None, Some(21.5))]);

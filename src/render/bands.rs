@@ -111,7 +111,7 @@ impl BandedRenderer {
             Goal::Time(time) => Goal::Time(time / self.n_bands()),
             samples => samples,
         };
-        for (band_ix, &band) in self.bands.clone().iter().enumerate() {
+        for band in self.bands.clone() {
             self.renderer.set_crop(band)?;
             let drawn = self.draw_band(goal, watcher)?;
             goal = Goal::Samples(drawn.n_samples);
@@ -123,11 +123,7 @@ impl BandedRenderer {
             }
             all.light.place(&whole, &band, &drawn.light);
             all.n_samples = drawn.n_samples;
-            if band_ix == 0 {
-                all.profile = drawn.profile;
-            } else {
-                all.profile.append(drawn.profile);
-            }
+            all.profile.append(drawn.profile);
         }
         self.joined = Some(joined);
         Ok(all)
@@ -146,14 +142,15 @@ impl BandedRenderer {
     }
 
     /// Replaces the mean of the samples, which [`BandedRenderer::window_mean`] returns, and returns the picture of it,
-    /// filtered and encoded. The next sample is the first of a new picture.
+    /// filtered and encoded. The next sample is the first of a new picture. If this fails, `mean` keeps its contents,
+    /// else they may have become the picture.
     ///
     /// # Panics
     /// There are several bands, or the mean has another number of pixels.
     ///
     /// # Errors
     /// A copy fails.
-    pub fn picture_of(&mut self, mean: Vec<[f32; 4]>) -> Result<Picture, GpuError> {
+    pub fn picture_of(&mut self, mean: &mut Vec<[f32; 4]>) -> Result<Picture, GpuError> {
         assert_eq!(self.bands.len(), 1, "one band");
         self.renderer.picture_of(mean)
     }
@@ -213,13 +210,9 @@ impl BandedRenderer {
         let mut drawn = Drawn::default();
         while let Some(log2) = pacer.next(self.renderer.n_samples()) {
             let profile = self.draw_frame(log2, watcher)?;
-            if drawn.n_samples > 0 {
-                drawn.profile.add(&profile);
-            } else {
-                drawn.profile = profile;
-                if self.renderer.options().features {
-                    drawn.features = self.renderer.features()?;
-                }
+            drawn.profile.add(&profile);
+            if drawn.n_samples == 0 && self.renderer.options().features {
+                drawn.features = self.renderer.features()?;
             }
             drawn.n_samples = self.renderer.n_samples();
         }

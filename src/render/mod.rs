@@ -226,14 +226,17 @@ impl Renderer {
     ///
     /// # Errors
     /// A copy fails, or a Vulkan call.
-    fn picture_of(&mut self, mean: Vec<[f32; 4]>) -> Result<Picture, GpuError> {
+    fn picture_of(&mut self, mean: &mut Vec<[f32; 4]>) -> Result<Picture, GpuError> {
         assert_eq!(mean.len(), self.resources.n_pixels(), "pixels of the window");
-        self.resources.pixels.pixel_radiance.upload(&mean)?;
+        self.resources.pixels.pixel_radiance.upload(mean)?;
         self.show()?;
         self.reset_samples();
         match self.in_use.noise_filter() {
             // What is displayed is the mean itself.
-            Denoise::Off => self.picture_with(mean),
+            Denoise::Off => {
+                let display = self.display()?;
+                Ok(self.picture_from(std::mem::take(mean), display))
+            }
             _ => self.picture(),
         }
     }
@@ -245,7 +248,8 @@ impl Renderer {
     /// A copy fails.
     pub fn picture(&self) -> Result<Picture, GpuError> {
         let _fetching = info_span!("fetch picture").entered();
-        self.picture_with(self.resources.pixels.filtered().download_first(self.resources.n_pixels())?)
+        let radiance = self.resources.pixels.filtered().download_first(self.resources.n_pixels())?;
+        Ok(self.picture_from(radiance, self.display()?))
     }
 
     /// Does what [`Renderer::picture`] does, into slices of the pixels of a window without border.
@@ -258,17 +262,20 @@ impl Renderer {
         pixels.pixel_display.download_bytes(0, display.as_flattened_mut())
     }
 
-    /// Downloads what a display shows of the picture. `radiance`: the radiance of the window's pixels.
-    fn picture_with(&self, radiance: Vec<[f32; 4]>) -> Result<Picture, GpuError> {
-        let (pixels, n_pixels) = (&self.resources.pixels, self.resources.n_pixels());
+    /// Downloads what a display shows of the window's pixels.
+    fn display(&self) -> Result<Vec<u32>, GpuError> {
+        self.resources.pixels.pixel_display.download_first(self.resources.n_pixels())
+    }
+
+    /// Returns the picture of the crop, from the radiance and the display of the window's pixels.
+    fn picture_from(&self, radiance: Vec<[f32; 4]>, display: Vec<u32>) -> Picture {
         let (window, crop) = (self.in_use.window(), self.in_use.crop_or_whole());
-        let display = pixels.pixel_display.download_first(n_pixels)?;
-        Ok(Picture {
+        Picture {
             width: crop.width(),
             height: crop.height(),
             radiance: opaque(window.part(radiance, &crop)),
             display: window.part(display, &crop).into_iter().map(u32::to_le_bytes).collect(),
-        })
+        }
     }
 
     /// Downloads what the primary ray of each pixel hits in the last sample, and what all rays of that sample cost.

@@ -2,23 +2,25 @@
 //! same bits as on one of them.
 //!
 //! ```text
-//! handout   ranges of units of work for each device, by its measured speed
-//! samples   units are blocks of samples of all pixels, which cost the same everywhere: paths without `edge` or layers
-//! rows      units are rows of pixels, of which tiles are made: everything else
+//! work_queue   ranges of units of work for each device, according to its measured speed
+//! samples      a unit is a block of samples of all pixels, which costs the same everywhere: paths without `edge` or
+//!              layers
+//! rows         a unit is a row of pixels, and a range of rows is a tile: all other pictures
 //! ```
 
-mod handout;
 mod rows;
 mod samples;
+mod work_queue;
 
 use std::{
+    cell::Cell,
     ops::Range,
     sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc},
     thread,
     time::Instant,
 };
 
-use self::handout::{Handout, Portions};
+use self::work_queue::{Chunking, WorkQueue};
 use crate::{
     frame::{Crop, Denoise, Drawn, Goal, Integrator, Picture, RenderOptions, Watcher},
     gpu::{Context, GpuError},
@@ -31,19 +33,20 @@ use crate::{
 pub struct RendererGroup {
     members: Vec<Member>,
     options: RenderOptions,
-    /// Whether samples of all pixels can be drawn apart.
+    /// Whether the devices can share the samples of a picture.
     shares_samples: bool,
     /// Index of the next picture's first sample.
     first_sample: u32,
-    rows: Handout,
-    samples: Handout,
+    rows: WorkQueue,
+    samples: WorkQueue,
     /// The picture that was drawn last.
     picture: Picture,
 }
 
 struct Member {
-    /// Its place in the caller's list, and its name, for messages.
+    /// Index of the device in the caller's list.
     ix: usize,
+    /// Name of the device.
     name: String,
     renderer: BandedRenderer,
 }
@@ -55,37 +58,34 @@ impl RendererGroup {
     /// Fails as [`BandedRenderer::new`] does on any device.
     pub fn new(contexts: &[Arc<Context>], world: &World, options: &RenderOptions) -> Result<Self, GpuError> {
         let n_devices = contexts.len();
+        let may_share_samples = can_share_samples(options);
         let asked = options.crop_or_whole();
-        let first = match can_share_samples(options) {
-            true => options.clone(),
-            // A first tile that is larger gets larger buffers.
-            false => {
-                let y1 = asked.y0 + asked.height().div_ceil(n_devices as u32);
-                RenderOptions { crop: Some(Crop { y1, ..asked }), ..options.clone() }
-            }
+        let first = if may_share_samples {
+            options.clone()
+        } else {
+            // Buffers have room for the first device's first tile. Larger tiles get new buffers.
+            let y1 = asked.y0 + asked.height().div_ceil(n_devices as u32);
+            RenderOptions { crop: Some(Crop { y1, ..asked }), ..options.clone() }
         };
         let open = |context: &Arc<Context>| BandedRenderer::new(Arc::clone(context), world, &first);
         let renderers: Vec<_> = thread::scope(|scope| {
             let threads: Vec<_> = contexts.iter().map(|context| scope.spawn(|| open(context))).collect();
             threads.into_iter().map(|thread| thread.join().expect("no panic")).collect()
         });
-        // Bands of a picture cannot be replaced by their mean.
-        let has_one_band = |renderer: &Result<BandedRenderer, GpuError>| {
-            renderer.as_ref().is_ok_and(|renderer| renderer.n_bands() == 1)
-        };
-        let shares_samples = can_share_samples(options) && renderers.iter().all(has_one_band);
-        let members = (contexts.iter().zip(renderers).enumerate())
+        let members: Vec<_> = (contexts.iter().zip(renderers).enumerate())
             .map(|(ix, (context, renderer))| Ok(Member { ix, name: context.info().name.clone(), renderer: renderer? }))
             .collect::<Result<_, GpuError>>()?;
-        let are_equal = contexts.iter().all(|context| context.info().name == contexts[0].info().name);
-        let of_samples = if are_equal { Portions::OneEach } else { Portions::Many { least: 1 } };
+        // `window_mean`, from which samples are shared, needs a picture of one band.
+        let shares_samples = may_share_samples && members.iter().all(|member| member.renderer.n_bands() == 1);
+        let are_alike = contexts.iter().all(|context| context.info().name == contexts[0].info().name);
+        let of_samples = if are_alike { Chunking::OneEach } else { Chunking::Guided { least: 1 } };
         Ok(Self {
             members,
             options: options.clone(),
             shares_samples,
             first_sample: 0,
-            rows: Handout::new(n_devices, rows::portions(contexts, options)),
-            samples: Handout::new(n_devices, of_samples),
+            rows: WorkQueue::new(n_devices, rows::chunking(contexts, options)),
+            samples: WorkQueue::new(n_devices, of_samples),
             picture: Picture::default(),
         })
     }
@@ -100,12 +100,12 @@ impl RendererGroup {
         self.first_sample = first_sample;
     }
 
-    /// Draws a new picture. The watcher is told of the samples of the whole picture. If a device fails, the others do
-    /// its work and it draws no more; a warning says so. Times of passes are sums over all devices, and the time of the
-    /// frame is what the clock shows.
+    /// Draws a new picture. The watcher is told of the samples of the whole picture. If a device fails, a warning says
+    /// so, the others do its work, and it draws nothing more. Times of passes are sums over all devices. The time of the
+    /// frame is the elapsed time.
     ///
     /// # Errors
-    /// All devices have failed, or the goal is a time. The last one that has failed is asked again next time.
+    /// All devices have failed, or the goal is a time. The next picture is tried on the device that failed last.
     pub fn draw(&mut self, goal: Goal, watcher: &mut impl Watcher) -> Result<Drawn, GpuError> {
         let Goal::Samples(n_samples) = goal else {
             let device = "several devices".to_owned();
@@ -124,7 +124,7 @@ impl RendererGroup {
         Ok(drawn)
     }
 
-    /// Returns the names of the devices, those of several equal devices with their number.
+    /// Returns the names of the devices. A name that several devices have is preceded by their number, as in `2 x name`.
     fn device_names(&self) -> String {
         let mut counted: Vec<(&str, usize)> = Vec::new();
         for Member { name, .. } in &self.members {
@@ -143,8 +143,8 @@ impl RendererGroup {
     }
 }
 
-/// Whether samples of all pixels can be drawn apart. The noise filter `edge` and layers need all samples of a pixel on
-/// one device.
+/// Whether devices can share the samples of a picture: each draws some samples of all pixels. The noise filter `edge`
+/// and layers need all samples of a pixel on one device.
 fn can_share_samples(options: &RenderOptions) -> bool {
     let has_layers = options.features || options.has_light_layers();
     options.integrator == Integrator::Path && !has_layers && options.noise_filter() != Denoise::Edge
@@ -152,38 +152,47 @@ fn can_share_samples(options: &RenderOptions) -> bool {
 
 /// Work that all members share.
 struct Job<'a, W> {
-    handout: Mutex<&'a mut Handout>,
-    /// Ranges of devices that have failed.
-    freed: Mutex<Vec<Range<u32>>>,
+    queue: Mutex<&'a mut WorkQueue>,
+    /// Does a range of units.
     work: W,
 }
 
-/// What a thread tells of its device.
+/// What the thread of a member tells the main thread.
 enum Message<T> {
-    /// Samples of this many pixels, as a share of all pixels, have been drawn.
-    Samples(f64),
+    /// One sample has been drawn of some pixels. The value is their share of all pixels.
+    Sample(f64),
+    /// A range is done, with this result.
     Done(Range<u32>, T),
-    /// The member has failed.
-    Failed(usize, GpuError),
+    /// A member has failed within a range.
+    Failed(Failure),
 }
 
-/// Lets all members work until no units are left. `work` does a range of units and calls its last argument with the
-/// share of the picture of which a sample has been drawn. Returns the results in the order of their ranges.
+struct Failure {
+    /// Index of the member.
+    ix: usize,
+    error: GpuError,
+    /// Sum of the shares of the samples that it had drawn of the unfinished range.
+    lost: f64,
+}
+
+/// Lets all members work until all units are done. `work` does a range of units. Each time that a sample of some pixels
+/// has been drawn, it calls its last argument with their share of all pixels. Returns the results in the order of their
+/// ranges. Members that fail are removed.
 ///
 /// # Errors
-/// All members have failed.
+/// All members have failed. The last one that has failed is kept.
 fn share<T: Send>(
     members: &mut Vec<Member>,
-    handout: &mut Handout,
+    queue: &mut WorkQueue,
     units: Range<u32>,
     watcher: &mut impl Watcher,
     work: impl Fn(&mut BandedRenderer, Range<u32>, &dyn Fn(f64)) -> Result<T, GpuError> + Sync,
 ) -> Result<Vec<(Range<u32>, T)>, GpuError> {
     let n_units = units.len();
-    handout.begin(units);
-    let job = Job { handout: Mutex::new(handout), freed: Mutex::default(), work };
-    let (mut results, mut progress) = (Vec::new(), WholeSamples { n_done: 0.0 });
-    // A device may fail when the others have nothing left to do, and then they begin again.
+    queue.begin(units);
+    let job = Job { queue: Mutex::new(queue), work };
+    let (mut results, mut progress) = (Vec::new(), WholeSamples::default());
+    // If a device fails when the threads of the others have ended, a further round does its range.
     while results.iter().map(|(range, _): &(Range<u32>, T)| range.len()).sum::<usize>() < n_units {
         let (send, receive) = mpsc::channel();
         let mut failed = Vec::new();
@@ -195,55 +204,63 @@ fn share<T: Send>(
             drop(send);
             for message in receive {
                 match message {
-                    Message::Samples(share) => progress.add(share, watcher),
+                    Message::Sample(share) => progress.add(share, watcher),
                     Message::Done(range, result) => results.push((range, result)),
-                    Message::Failed(ix, error) => failed.push((ix, error)),
+                    Message::Failed(failure) => {
+                        progress.n_done -= failure.lost;
+                        failed.push(failure);
+                    }
                 }
             }
         });
-        for (ix, error) in failed {
-            if let [only] = &members[..]
-                && only.ix == ix
-            {
-                return Err(error);
-            }
-            let name = members.iter().find(|member| member.ix == ix).map_or("", |member| &member.name);
-            tracing::warn!("device {ix} of the list, {name}, has failed, and the others do its work: {error}");
-            members.retain(|member| member.ix != ix);
+        for Failure { ix, error, .. } in failed {
+            remove_failed(members, ix, error)?;
         }
     }
     results.sort_by_key(|(range, _)| range.start);
     Ok(results)
 }
 
+/// Removes a member that has failed, and warns of it.
+///
+/// # Errors
+/// Returns the member's error if no other member is left. The member is kept then.
+fn remove_failed(members: &mut Vec<Member>, ix: usize, error: GpuError) -> Result<(), GpuError> {
+    if members.len() == 1 {
+        return Err(error);
+    }
+    let name = members.iter().find(|member| member.ix == ix).map_or("", |member| &member.name);
+    tracing::warn!("device {ix} of the list, {name}, has failed, and the others do its work: {error}");
+    members.retain(|member| member.ix != ix);
+    Ok(())
+}
+
 impl<W> Job<'_, W> {
-    /// Does the work of a device until no units are left.
+    /// Does the work of a member until the queue is empty.
     fn run<T>(&self, member: &mut Member, send: &mpsc::Sender<Message<T>>)
     where
         W: Fn(&mut BandedRenderer, Range<u32>, &dyn Fn(f64)) -> Result<T, GpuError>,
     {
-        // The receiver lives as long as all threads.
+        // The receiver outlives all threads.
         let tell = |message| send.send(message).expect("a receiver");
-        while let Some(range) = self.next(member.ix) {
-            let begin = Instant::now();
-            match (self.work)(&mut member.renderer, range.clone(), &|share| tell(Message::Samples(share))) {
+        loop {
+            let Some(range) = lock(&self.queue).take(member.ix) else { return };
+            let (begin, drawn) = (Instant::now(), Cell::new(0.0));
+            let tell_sample = |share| {
+                drawn.set(drawn.get() + share);
+                tell(Message::Sample(share));
+            };
+            match (self.work)(&mut member.renderer, range.clone(), &tell_sample) {
                 Ok(result) => {
-                    lock(&self.handout).note(member.ix, &range, begin.elapsed());
+                    lock(&self.queue).record_time(member.ix, &range, begin.elapsed());
                     tell(Message::Done(range, result));
                 }
                 Err(error) => {
-                    lock(&self.handout).lose(member.ix);
-                    lock(&self.freed).push(range);
-                    return tell(Message::Failed(member.ix, error));
+                    lock(&self.queue).mark_failed(member.ix, range);
+                    return tell(Message::Failed(Failure { ix: member.ix, error, lost: drawn.get() }));
                 }
             }
         }
-    }
-
-    /// Returns the next range of a device.
-    fn next(&self, member_ix: usize) -> Option<Range<u32>> {
-        let freed = lock(&self.freed).pop();
-        freed.or_else(|| lock(&self.handout).take(member_ix))
     }
 }
 
@@ -251,19 +268,39 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Turns samples of parts of the picture into samples of the whole picture.
+/// Counts samples of parts of the picture, and tells the watcher of samples of the whole picture.
+#[derive(Default)]
 struct WholeSamples {
-    /// Number of samples of all pixels that have been drawn.
+    /// Sum of the shares of all samples that have been drawn. It becomes less if a device fails, since the samples of
+    /// its unfinished range are drawn again.
     n_done: f64,
+    /// Number of samples of which the watcher knows.
+    n_told: u32,
 }
 
 impl WholeSamples {
     fn add(&mut self, share: f64, watcher: &mut impl Watcher) {
-        // The shares of a sample add up to 1, but for rounding.
-        let whole = |n_done: f64| (n_done + 1e-6).floor() as u64;
-        let before = whole(self.n_done);
         self.n_done += share;
-        (before..whole(self.n_done)).for_each(|_| watcher.sample());
-        watcher.part((self.n_done - self.n_done.floor()) as f32);
+        // The shares of a sample add up to 1 but for rounding.
+        let n_whole = (self.n_done + 1e-6).floor() as u32;
+        (self.n_told..n_whole).for_each(|_| watcher.sample());
+        self.n_told = self.n_told.max(n_whole);
+        watcher.part((self.n_done - f64::from(self.n_told)).max(0.0) as f32);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_that_are_drawn_again_are_told_once() {
+        let (mut progress, mut n_told) = (WholeSamples::default(), 0);
+        let mut add = |progress: &mut WholeSamples, n: u32| (0..n).for_each(|_| progress.add(0.25, &mut || n_told += 1));
+        add(&mut progress, 10);
+        progress.n_done -= 1.5;
+        add(&mut progress, 6);
+        add(&mut progress, 6);
+        assert_eq!((n_told, progress.n_told, progress.n_done), (4, 4, 4.0));
     }
 }

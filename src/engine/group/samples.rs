@@ -1,14 +1,15 @@
-//! Pictures whose samples several devices share. Each device draws aligned blocks of samples of all pixels, whose sums
-//! are nodes of the tree in which all samples are added. So the mean has the same bits as that of one device.
+//! Draws a picture whose samples are shared among several devices. Each device draws aligned blocks of samples of all
+//! pixels. One device adds all samples as a binary tree, and the sum of an aligned block is a node of that tree. So the
+//! mean has the same bits as that of one device.
 
-use super::{RendererGroup, share};
+use super::{Member, RendererGroup, remove_failed, share};
 use crate::{
-    frame::{Drawn, Goal, Profile, SampleRange, SampleSums, Watcher},
+    frame::{Drawn, Goal, Picture, Profile, SampleRange, SampleSums, Watcher},
     gpu::GpuError,
     layout::MOST_SAMPLES_LOG2,
 };
 
-/// Number of samples that are handed out together: those of a frame of paths.
+/// Number of samples of a unit of work: those that a frame of paths draws at most.
 pub const UNIT: u32 = 1 << MOST_SAMPLES_LOG2;
 
 impl RendererGroup {
@@ -21,30 +22,37 @@ impl RendererGroup {
         let parts = share(&mut self.members, &mut self.samples, units, watcher, |renderer, units, tell| {
             renderer.set_crop(asked)?;
             let range = SampleRange { first: first + units.start * UNIT, end: (first + units.end * UNIT).min(all) };
-            let (mut sums, mut profile) = (SampleSums::default(), None::<Profile>);
+            let (mut sums, mut profile) = (SampleSums::default(), Profile::default());
             for block in range.blocks() {
                 renderer.set_first_sample(block.first)?;
                 let drawn = renderer.draw(Goal::Samples(block.len()), &mut || tell(1.0))?;
                 sums.push_mean(block, &renderer.window_mean()?);
-                match &mut profile {
-                    None => profile = Some(drawn.profile),
-                    Some(profile) => profile.add(&drawn.profile),
-                }
+                profile.add(&drawn.profile);
             }
-            Ok((sums, profile.unwrap_or_default()))
+            Ok((sums, profile))
         })?;
-        let (mut sums, mut profile) = (SampleSums::default(), None::<Profile>);
+        let (mut sums, mut profile) = (SampleSums::default(), Profile::default());
         for (_, (part, part_profile)) in parts {
             part.into_blocks().into_iter().for_each(|block| sums.push(block));
-            match &mut profile {
-                None => profile = Some(part_profile),
-                Some(profile) => profile.add(&part_profile),
+            profile.add(&part_profile);
+        }
+        self.picture = self.picture_of(sums.into_mean())?;
+        Ok(Drawn { profile, n_samples, ..Drawn::default() })
+    }
+
+    /// Returns the picture of the mean of all samples, filtered and encoded by the first member that does not fail.
+    fn picture_of(&mut self, mut mean: Vec<[f32; 4]>) -> Result<Picture, GpuError> {
+        let asked = self.options.crop_or_whole();
+        loop {
+            let Member { ix, renderer, .. } = &mut self.members[0];
+            // If it drew no samples, its crop is still that of the last picture.
+            match renderer.set_crop(asked).and_then(|()| renderer.picture_of(&mut mean)) {
+                Ok(picture) => return Ok(picture),
+                Err(error) => {
+                    let ix = *ix;
+                    remove_failed(&mut self.members, ix, error)?;
+                }
             }
         }
-        let display = &mut self.members[0].renderer;
-        // It may have had no samples to draw.
-        display.set_crop(asked)?;
-        self.picture = display.picture_of(sums.into_mean())?;
-        Ok(Drawn { profile: profile.unwrap_or_default(), n_samples, ..Drawn::default() })
     }
 }
