@@ -2,18 +2,26 @@
 
 mod support;
 
-use std::{fs, path::Path, sync::Arc};
+use std::{
+    fs,
+    path::Path,
+    sync::{
+        Arc,
+        atomic::{AtomicU32, Ordering},
+    },
+};
 
+use glam::Vec3;
 use kdray::{
-    engine::{Engine, Renderer, choices::Workload},
+    engine::{Engine, FilmRenderer, Renderer, choices::Workload},
     frame::{Denoise, Drawn, Goal, Integrator, Picture, RenderOptions, Watcher},
-    gpu::{Context, DeviceOverrides},
-    scene::Scene,
+    gpu::{Context, DeviceOverrides, GpuError},
+    scene::{Camera, Scene},
     world::World,
 };
 use support::{
     assert_silent,
-    command::{cornell, fail, stderr, stdout, succeed},
+    command::{cornell, fail, names, stderr, stdout, succeed},
     device, pretended,
 };
 use tempfile::TempDir;
@@ -25,12 +33,7 @@ fn world(options: &RenderOptions) -> World {
 }
 
 /// Draws two pictures one after the other, the second by speeds that the first has shown.
-fn draw(
-    contexts: Vec<Arc<Context>>,
-    world: &World,
-    options: &RenderOptions,
-    n_samples: u32,
-) -> [(Picture, Drawn); 2] {
+fn draw(contexts: Vec<Arc<Context>>, world: &World, options: &RenderOptions, n_samples: u32) -> [(Picture, Drawn); 2] {
     let mut renderer = Engine::on_devices(contexts).renderer(world, options).unwrap();
     [(), ()].map(|()| draw_next(&mut renderer, world, n_samples))
 }
@@ -204,6 +207,110 @@ fn a_device_may_fail_at_any_time() {
             assert!(n_failures > 3, "{n_samples} samples: {n_failures}");
         }
     }
+}
+
+/// Returns the cameras of a film's frames.
+fn cameras(world: &World, n_frames: u32) -> Vec<Camera> {
+    let camera = world.scene().camera;
+    (0..n_frames).map(|ix| Camera { eye: camera.eye + 0.05 * ix as f32 * Vec3::X, ..camera }).collect()
+}
+
+/// Draws a film of one sample a frame. Returns the result and the number of samples that the watcher was told of.
+fn draw_film<E: From<GpuError> + Send>(
+    film: &mut FilmRenderer,
+    cameras: &[Camera],
+    finish: impl Fn(u32, Picture) -> Result<Picture, E> + Sync,
+) -> (Result<Vec<Picture>, E>, u32) {
+    let mut samples = Samples::default();
+    let draw = |renderer: &mut Renderer, frame_ix: u32, tell_sample: &dyn Fn()| {
+        renderer.draw(&cameras[frame_ix as usize], Goal::Samples(2), tell_sample)?;
+        Ok(renderer.picture()?.into_owned())
+    };
+    let result = film.draw(cameras.len() as u32, &mut &mut samples, draw, finish);
+    (result, samples.n_samples)
+}
+
+/// The frames of a film have the bits of one device's, in their order, also if a device fails at any time.
+#[test]
+fn a_film_outlives_a_device() {
+    let options = RenderOptions { width: 32, height: 24, ..RenderOptions::default() };
+    let world = world(&options);
+    let cameras = cameras(&world, 4);
+    let mut alone = Engine::on_device(device()).renderer(&world, &options).unwrap();
+    let expected: Vec<_> = (cameras.iter())
+        .map(|camera| {
+            alone.draw(camera, Goal::Samples(2), || ()).unwrap();
+            alone.picture().unwrap().into_owned()
+        })
+        .collect();
+    assert!(expected[0] != expected[1]);
+    let contexts = [device(), device()];
+    let engine = Engine::on_devices(contexts.to_vec());
+    let whole = |_: u32, picture: Picture| Ok::<_, GpuError>(picture);
+    for n_creations in [None, Some(0), Some(2), Some(5), Some(8)] {
+        let mut film = engine.film_renderer(&world, &options).unwrap();
+        contexts[1].fail_creations_after(n_creations);
+        for _ in 0..2 {
+            let (frames, n_samples) = draw_film(&mut film, &cameras, whole);
+            assert!(frames.unwrap() == expected, "{n_creations:?}");
+            assert_eq!(n_samples, 8, "{n_creations:?}: samples that the watcher is told of");
+        }
+        contexts[1].fail_creations_after(None);
+    }
+    let mut film = engine.film_renderer(&world, &options).unwrap();
+    contexts.iter().for_each(|context| context.fail_creations_after(Some(0)));
+    assert!(draw_film(&mut film, &cameras, whole).0.is_err(), "no device is left");
+    contexts.iter().for_each(|context| context.fail_creations_after(None));
+}
+
+/// A frame that cannot be written ends the film: no device begins a further frame.
+#[test]
+fn an_error_of_writing_ends_a_film() {
+    let options = RenderOptions { width: 8, height: 6, ..RenderOptions::default() };
+    let world = world(&options);
+    let cameras = cameras(&world, 16);
+    let mut film = Engine::on_devices(vec![device(), device()]).film_renderer(&world, &options).unwrap();
+    let n_written = AtomicU32::new(0);
+    let refuse_third = |frame_ix: u32, picture: Picture| {
+        n_written.fetch_add(1, Ordering::Relaxed);
+        if frame_ix == 2 { Err(GpuError::NoDriver) } else { Ok(picture) }
+    };
+    let (frames, _) = draw_film(&mut film, &cameras, refuse_third);
+    assert!(matches!(frames, Err(GpuError::NoDriver)), "{frames:?}");
+    let n_written = n_written.into_inner();
+    assert!((3..=5).contains(&n_written), "{n_written} frames");
+}
+
+/// The command writes the same files of a film with several devices as with one.
+#[test]
+fn the_command_draws_the_frames_of_a_film_apart() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    let keyframe =
+        |frame: u32, x: f32| format!("[[keyframe]]\nframe = {frame}\neye = [{x}, 1, 3]\ntarget = [0, 1, 0]\n");
+    fs::write(path.join("path.toml"), keyframe(0, 0.0) + &keyframe(4, 0.5)).unwrap();
+    let scene = cornell();
+    let render = |folder: &str, device: &str, more: &[&str]| {
+        fs::create_dir_all(path.join(folder)).unwrap();
+        let output = format!("{folder}/f.####.png");
+        let common = ["render", &scene, "--size", "40x30", "--path", "path.toml", "-o", &output, "--device", device];
+        succeed(path, &[&common, more].concat())
+    };
+    for more in [&["--spp", "2", "--aov", "depth"][..], &["--integrator", "path", "--spp", "16", "--denoise", "edge"]] {
+        render("one", "0", more);
+        let output = render("two", "0,0", more);
+        assert!(stdout(&output).contains("2 devices: each drew whole frames"), "{}", stdout(&output));
+        assert!(stdout(&output).contains("the median of 5 frames"), "{}", stdout(&output));
+        let names = names(&path.join("one"));
+        assert_eq!(names.iter().filter(|name| name.ends_with(".png")).count(), 5);
+        for name in &names {
+            assert!(bytes(&path.join("one"), name) == bytes(&path.join("two"), name), "{name}");
+        }
+    }
+    // Three frames are too few for two devices to draw them apart.
+    let output = render("few", "0,0", &["--frames", "0-2"]);
+    assert!(stdout(&output).contains("2 devices: the times of passes are sums over all"), "{}", stdout(&output));
+    assert!(bytes(&path.join("few"), "f.0002.png") != bytes(&path.join("few"), "f.0000.png"));
 }
 
 #[test]

@@ -33,9 +33,12 @@ pub struct Report {
     pub choices: Choices,
     /// Samples per pixel.
     pub samples: u32,
-    /// Number of devices that have drawn the pictures, or 1 for the CPU. The times of passes are sums over all of them,
-    /// and the time of the frame is what the clock shows.
+    /// Number of devices that have drawn the pictures, or 1 for the CPU.
     pub devices: usize,
+    /// Whether each of several devices drew whole frames. If so, the times of a frame are those of its device. If
+    /// several devices drew each picture together, the times of passes are sums over all of them, and the time of the
+    /// frame is the elapsed time.
+    pub whole_frames: bool,
     pub triangles: usize,
     /// Statistics of the acceleration structure, serialized under the key `tree` or `grid`.
     #[serde(flatten)]
@@ -229,9 +232,11 @@ impl Report {
             text += "This device has no timestamps: where the time went is unknown.\n\n";
         }
         if self.devices > 1 {
-            let n = self.devices;
-            text +=
-                &format!("{n} devices: the times of passes are sums over all, the frame's is that of the clock\n\n");
+            text += &format!("{} devices: ", self.devices);
+            text += match self.whole_frames {
+                true => "each drew whole frames, and the times are those of one frame on its device\n\n",
+                false => "the times of passes are sums over all, the frame's is that of the clock\n\n",
+            };
         }
         if let Some(FrameTimeRange { n_frames, min_ms, max_ms }) = &self.repeated {
             text += &format!("the median of {n_frames} frames, which took {min_ms:.3} to {max_ms:.3} ms:\n\n");

@@ -16,6 +16,7 @@ use std::sync::Arc;
 use self::choices::{Cache, ChosenAccel, Methods, Processor, Request, Workload};
 pub use self::{
     caster::Caster,
+    group::FilmRenderer,
     renderer::{Rendered, Renderer},
 };
 use crate::{
@@ -34,7 +35,7 @@ use crate::{
 pub struct Engine {
     /// The Vulkan device; none on the CPU.
     context: Option<Arc<Context>>,
-    /// Further devices, which draw parts of pictures.
+    /// Further devices, which help to draw pictures.
     others: Vec<Arc<Context>>,
     request: Request,
     cache: Cache,
@@ -64,8 +65,8 @@ impl Engine {
         Self { context: Some(context), ..Self::on_cpu() }
     }
 
-    /// Uses several Vulkan devices that are already open. They share the drawing of each picture; everything else is
-    /// done by the first one.
+    /// Uses several Vulkan devices that are already open. They share the drawing of a picture or of the frames of a
+    /// film. Everything else is done by the first one.
     ///
     /// # Panics
     /// There are no devices.
@@ -165,6 +166,19 @@ impl Engine {
     pub fn renderer(&self, world: &World, options: &RenderOptions) -> Result<Renderer, GpuError> {
         let contexts: Vec<_> = self.contexts().cloned().collect();
         Renderer::new(&contexts, world, options)
+    }
+
+    /// Creates renderers that draw the frames of a film, one on each device.
+    ///
+    /// # Errors
+    /// The scene or a row of the picture is beyond the limits or the memory of a device.
+    ///
+    /// # Panics
+    /// The engine runs on the CPU.
+    pub fn film_renderer(&self, world: &World, options: &RenderOptions) -> Result<FilmRenderer, GpuError> {
+        let contexts: Vec<_> = self.contexts().cloned().collect();
+        assert!(!contexts.is_empty(), "at least one device");
+        FilmRenderer::new(&contexts, world, options)
     }
 
     /// Creates a caster, which can cast many sets of rays through the same triangles.

@@ -1,13 +1,18 @@
-//! Draws the pictures of `kdray render`, and writes each before the next one is drawn.
+//! Draws the pictures of `kdray render`, and writes each before the next one is drawn on the same device.
 
-use std::time::{Duration, Instant};
+use std::{
+    mem::take,
+    time::{Duration, Instant},
+};
 
 use kdray::{
     cpu,
-    engine::Renderer,
+    engine::{Engine, Renderer},
     frame::{Drawn, Goal, Picture, Profile, RangeSums, RenderOptions, SampleRange, SampleSums, Watcher},
+    gpu::GpuError,
     output::{Layers, Record, WholeRecord},
     scene::Camera,
+    world::World,
 };
 
 use super::files::Files;
@@ -48,60 +53,143 @@ pub struct DrawnPictures {
     pub profiles: Vec<Profile>,
     /// Number of samples of each pixel.
     pub n_samples: u32,
-    /// Time from the beginning until the pictures were in memory, without the time of writing files.
+    /// Time from the beginning until the pictures were in memory, without the time of writing files. If each of several
+    /// devices drew whole frames, it is the time of the device that drew longest.
     pub render_ms: f64,
 }
 
-/// Draws each view `--repeat` times and writes its picture. `begin`: when the preparation of the renderer began.
+/// A picture that is not written yet.
+struct DrawnView {
+    picture: Picture,
+    drawn: Drawn,
+    sums: RangeSums,
+    written: WrittenView,
+}
+
+/// What remains of a picture after it is written.
+struct WrittenView {
+    /// The profile of each repetition.
+    profiles: Vec<Profile>,
+    n_samples: u32,
+}
+
+/// Draws each view `--repeat` times and writes its picture. Of several devices, each draws whole frames if there are
+/// enough of them, else all draw each picture together.
 pub fn draw_and_write(
     common: &Common,
-    mut renderer: Renderer,
+    (engine, world): (&Engine, &World),
     views: &[FrameJob],
-    (progress, message): (&Progress, &str),
-    begin: Instant,
+    stage: (&Progress, &str),
 ) -> Result<DrawnPictures, CliError> {
-    let args = common.args;
-    let factors = [views.len() as u32, common.n_drawn, args.repeat.into(), renderer.n_bands()];
-    let n_steps = factors.into_iter().fold(1, u32::saturating_mul);
-    let mut steps = match common.goal {
-        Goal::Samples(_) => progress.steps(message, n_steps),
-        Goal::Time(time) => progress.steps_until(message, time),
-    };
-    // Progress within a sample takes time, because the CPU waits for the device. Measured frames are drawn without
-    // it.
-    steps.shows_parts &= args.profile.is_none() && args.trace.is_none() && args.repeat == 1;
-    let (mut profiles, mut drawing, mut last) = (Vec::new(), Duration::ZERO, begin);
-    let mut n_samples = common.n_drawn;
-    for view in views {
-        let camera = view.camera.unwrap_or(common.camera);
-        let (picture, sums, drawn);
-        match common.some_samples {
-            Some(range) => {
-                (drawn, sums) = renderer.draw_range(&camera, range, Bar(&mut steps))?;
-                picture = part(common, &sums.picture);
-                profiles.push(drawn.profile);
-            }
-            None => {
-                let mut last = Drawn::default();
-                for _ in 0..args.repeat {
-                    last = renderer.draw(&camera, common.goal, Bar(&mut steps))?;
-                    profiles.push(std::mem::take(&mut last.profile));
-                }
-                n_samples = last.n_samples;
-                picture = renderer.picture()?.into_owned();
-                (drawn, sums) = (last, RangeSums::default());
-            }
-        }
-        drawing += last.elapsed();
-        let record = record_of(common, &camera, n_samples);
-        let (sums, light_sums) = sums.untold();
-        let light = drawn.light.0.each_ref().map(Vec::as_slice);
-        let (aovs, features) = (&args.aov[..], &drawn.features[..]);
-        let layers = Layers { aovs, features, light, sums, light_sums, record: Some(&record) };
-        view.files.write(&picture, &layers)?;
-        last = Instant::now();
-    }
+    let draw = if draws_whole_frames(engine, views) { draw_frames_apart } else { draw_in_turn };
+    let (written, drawing) = draw(common, (engine, world), views, stage)?;
+    let n_samples = written.last().map_or(common.n_drawn, |view| view.n_samples);
+    let profiles = written.into_iter().flat_map(|view| view.profiles).collect();
     Ok(DrawnPictures { profiles, n_samples, render_ms: drawing.as_secs_f64() * 1e3 })
+}
+
+/// Whether each of several devices draws whole frames. Each has to get at least two on average: with fewer frames, some
+/// devices would have nothing to do for a large part of the time.
+pub fn draws_whole_frames(engine: &Engine, views: &[FrameJob]) -> bool {
+    let n_devices = engine.contexts().count();
+    n_devices > 1 && views.len() >= 2 * n_devices
+}
+
+/// Draws and writes one view after the other. Returns them, and the time without the writing of files.
+fn draw_in_turn(
+    common: &Common,
+    (engine, world): (&Engine, &World),
+    views: &[FrameJob],
+    stage: (&Progress, &str),
+) -> Result<(Vec<WrittenView>, Duration), CliError> {
+    let mut begin = Instant::now();
+    let mut renderer = engine.renderer(world, common.options)?;
+    let mut steps = common.steps(stage, views.len() as u32, renderer.n_bands());
+    let (mut written, mut drawing) = (Vec::new(), Duration::ZERO);
+    for view in views {
+        let drawn = draw_view(common, &mut renderer, view, &mut Bar(&mut steps))?;
+        drawing += begin.elapsed();
+        written.push(write_view(common, view, drawn)?);
+        begin = Instant::now();
+    }
+    Ok((written, drawing))
+}
+
+/// Lets each device draw and write whole frames. Returns the views, and the time of the device that has drawn longest,
+/// without the writing of files.
+fn draw_frames_apart(
+    common: &Common,
+    (engine, world): (&Engine, &World),
+    views: &[FrameJob],
+    stage: (&Progress, &str),
+) -> Result<(Vec<WrittenView>, Duration), CliError> {
+    let begin = Instant::now();
+    let mut film = engine.film_renderer(world, common.options)?;
+    let opening = begin.elapsed();
+    // The film tells of each sample of a frame once, also if a device draws several bands.
+    let mut steps = common.steps(stage, views.len() as u32, 1);
+    let view = |frame_ix: u32| &views[frame_ix as usize];
+    let written = film.draw(
+        views.len() as u32,
+        &mut Bar(&mut steps),
+        |renderer, frame_ix, tell_sample| draw_view(common, renderer, view(frame_ix), &mut || tell_sample()),
+        |frame_ix, drawn| write_view(common, view(frame_ix), drawn),
+    )?;
+    Ok((written, opening + film.longest_drawing()))
+}
+
+impl Common<'_> {
+    /// Returns the camera of a view.
+    fn camera_of(&self, view: &FrameJob) -> Camera {
+        view.camera.unwrap_or(self.camera)
+    }
+
+    /// Returns the counter of the samples of all bands of all views.
+    fn steps<'a>(&self, (progress, message): (&'a Progress, &str), n_views: u32, n_bands: u32) -> StepProgress<'a> {
+        let args = self.args;
+        let factors = [n_views, self.n_drawn, args.repeat.into(), n_bands];
+        let mut steps = match self.goal {
+            Goal::Samples(_) => progress.steps(message, factors.into_iter().fold(1, u32::saturating_mul)),
+            Goal::Time(time) => progress.steps_until(message, time),
+        };
+        // Progress within a sample takes time, because the CPU waits for the device. Measured frames are drawn without
+        // it.
+        steps.shows_parts &= args.profile.is_none() && args.trace.is_none() && args.repeat == 1;
+        steps
+    }
+}
+
+/// Draws a view `--repeat` times.
+fn draw_view(
+    common: &Common,
+    renderer: &mut Renderer,
+    view: &FrameJob,
+    watcher: &mut dyn Watcher,
+) -> Result<DrawnView, GpuError> {
+    let camera = common.camera_of(view);
+    if let Some(range) = common.some_samples {
+        let (mut drawn, sums) = renderer.draw_range(&camera, range, Relay(watcher))?;
+        let written = WrittenView { profiles: vec![take(&mut drawn.profile)], n_samples: common.n_drawn };
+        return Ok(DrawnView { picture: part(common, &sums.picture), drawn, sums, written });
+    }
+    let (mut drawn, mut profiles) = (Drawn::default(), Vec::new());
+    for _ in 0..common.args.repeat {
+        drawn = renderer.draw(&camera, common.goal, Relay(watcher))?;
+        profiles.push(take(&mut drawn.profile));
+    }
+    let written = WrittenView { profiles, n_samples: drawn.n_samples };
+    Ok(DrawnView { picture: renderer.picture()?.into_owned(), drawn, sums: RangeSums::default(), written })
+}
+
+/// Writes the files of a view.
+fn write_view(common: &Common, view: &FrameJob, of_view: DrawnView) -> Result<WrittenView, CliError> {
+    let DrawnView { picture, drawn, sums, written } = of_view;
+    let record = record_of(common, &common.camera_of(view), written.n_samples);
+    let (sums, light_sums) = sums.untold();
+    let light = drawn.light.0.each_ref().map(Vec::as_slice);
+    let (aovs, features) = (&common.args.aov[..], &drawn.features[..]);
+    view.files.write(&picture, &Layers { aovs, features, light, sums, light_sums, record: Some(&record) })?;
+    Ok(written)
 }
 
 /// Returns the record of a picture. `n_samples`: the number that was drawn, if the picture has all samples.
@@ -137,5 +225,22 @@ impl Watcher for Bar<'_, '_> {
 
     fn sample(&mut self) {
         self.0.step();
+    }
+}
+
+/// Passes on what it is told.
+struct Relay<'a>(&'a mut dyn Watcher);
+
+impl Watcher for Relay<'_> {
+    fn sees_parts(&self) -> bool {
+        self.0.sees_parts()
+    }
+
+    fn part(&mut self, share: f32) {
+        self.0.part(share);
+    }
+
+    fn sample(&mut self) {
+        self.0.sample();
     }
 }

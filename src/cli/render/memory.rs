@@ -15,15 +15,17 @@ const DISPLAY: u64 = size_of::<[u8; 4]>() as u64;
 /// Bytes of a pixel while a PNG is written: its RGB colour and its encoded form.
 const ENCODED: u64 = 6;
 
-/// Refuses a picture that does not fit in memory. With `--cpu`, the renderer's buffers are counted, too.
-pub fn check_memory(options: &RenderOptions, n_samples: u32, on_cpu: bool) -> Result<(), CliError> {
+/// Refuses pictures that do not fit in memory. With `--cpu`, the renderer's buffers are counted, too. `n_at_once`:
+/// number of pictures that are drawn at the same time.
+pub fn check_memory(options: &RenderOptions, n_samples: u32, on_cpu: bool, n_at_once: u64) -> Result<(), CliError> {
     let (window, crop) = (options.window(), options.crop_or_whole());
     let n_pixels = |width: u32, height: u32| u64::from(width) * u64::from(height);
     let n_rendered = if on_cpu { n_pixels(window.width(), window.height()) } else { 0 };
     let needed = n_rendered * rendered_bytes(options, n_samples)
         + n_pixels(crop.width(), crop.height())
             * (RADIANCE + DISPLAY + ENCODED + feature_bytes(options) + layer_bytes(options));
-    require(&format!("a picture of {}x{} pixels", crop.width(), crop.height()), needed)?;
+    let pictures = if n_at_once == 1 { "a picture".to_owned() } else { format!("{n_at_once} pictures") };
+    require(&format!("{pictures} of {}x{} pixels", crop.width(), crop.height()), n_at_once * needed)?;
     Ok(())
 }
 
@@ -53,7 +55,7 @@ mod tests {
     #[test]
     fn a_pixel_s_buffers_are_counted_and_a_usual_picture_is_not_refused() {
         let usual = RenderOptions::default();
-        check_memory(&usual, 1, true).unwrap();
+        check_memory(&usual, 1, true, 1).unwrap();
         assert_eq!(rendered_bytes(&usual, 1), 40);
         assert_eq!(rendered_bytes(&usual, 2), 56);
         let with_features = RenderOptions { features: true, ..usual };

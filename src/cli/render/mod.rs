@@ -22,7 +22,7 @@ use kdray::{
 use tracing::info_span;
 
 use self::{
-    draw::{Common, DrawnPictures, draw_and_write},
+    draw::{Common, DrawnPictures, draw_and_write, draws_whole_frames},
     files::{check_outputs, roles},
     memory::check_memory,
     views::{NamedPath, views},
@@ -66,13 +66,17 @@ pub fn run(args: RenderArgs) -> Result<(), CliError> {
     let n_samples = args.samples(&scene);
     let some_samples = args.some_samples(&scene, &options)?;
     let n_drawn = some_samples.map_or(n_samples, |range| range.len());
-    check_memory(&options, n_drawn, args.cpu)?;
+    check_memory(&options, n_drawn, args.cpu, 1)?;
     let open = || open_devices(args.device.as_ref(), args.validate, &progress);
     let contexts = if args.cpu { Vec::new() } else { info_span!("create device").in_scope(open)? };
     args.check_devices(contexts.len())?;
 
     let engine = if args.cpu { Engine::on_cpu() } else { Engine::on_devices(contexts.clone()) };
     let engine = engine.with_request(args.picture.request());
+    let whole_frames = draws_whole_frames(&engine, &views);
+    if whole_frames {
+        check_memory(&options, n_drawn, args.cpu, contexts.len() as u64)?;
+    }
     let n_triangles = scene.n_triangles();
     // A part of a picture gets the structure that the whole picture gets.
     let n_pictures = u64::from(n_samples) * views.len() as u64;
@@ -94,11 +98,8 @@ pub fn run(args: RenderArgs) -> Result<(), CliError> {
     let goal = args.time.map_or(Goal::Samples(n_drawn), Goal::Time);
     let common = Common { args, options: &options, camera, goal, n_drawn, some_samples, record };
     let rendering = format!("rendering {}x{}", crop.width(), crop.height());
-    let (drawn, _) = progress.stage(&rendering, || {
-        let begin = Instant::now();
-        let renderer = engine.renderer(&world, &options)?;
-        draw_and_write(&common, renderer, &views, (&progress, &rendering), begin)
-    });
+    let (drawn, _) =
+        progress.stage(&rendering, || draw_and_write(&common, (&engine, &world), &views, (&progress, &rendering)));
     let DrawnPictures { profiles, n_samples, render_ms } = drawn.map_err(CliError::of_drawing)?;
     drop(progress);
 
@@ -115,6 +116,7 @@ pub fn run(args: RenderArgs) -> Result<(), CliError> {
         choices: Choices::of_pictures(accel, methods),
         samples: n_samples,
         devices: contexts.len().max(1),
+        whole_frames,
         triangles: n_triangles,
         accel: world.statistics(),
         grid_build: world.grid_build().cloned(),

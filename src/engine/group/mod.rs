@@ -1,13 +1,15 @@
-//! Draws one picture on several devices, each of which has the whole scene. On devices of one kind, the picture has the
+//! Draws pictures on several devices, each of which has the whole scene. On devices of one kind, the pictures have the
 //! same bits as on one of them.
 //!
 //! ```text
 //! work_queue   ranges of units of work for each device, according to its measured speed
-//! samples      a unit is a block of samples of all pixels, which costs the same everywhere: paths without `edge` or
-//!              layers
-//! rows         a unit is a row of pixels, and a range of rows is a tile: all other pictures
+//! samples      one picture: a unit is a block of samples of all pixels, which costs the same everywhere; for paths
+//!              without `edge` or layers
+//! rows         one picture: a unit is a row of pixels, and a range of rows is a tile; for all other pictures
+//! film         many pictures: a unit is a picture
 //! ```
 
+mod film;
 mod rows;
 mod samples;
 mod work_queue;
@@ -20,6 +22,7 @@ use std::{
     time::Instant,
 };
 
+pub use self::film::FilmRenderer;
 use self::work_queue::{Chunking, WorkQueue};
 use crate::{
     frame::{Crop, Denoise, Drawn, Goal, Integrator, Picture, RenderOptions, Watcher},
@@ -31,7 +34,7 @@ use crate::{
 
 /// Renderers of one world on several devices.
 pub struct RendererGroup {
-    members: Vec<Member>,
+    members: Vec<Member<BandedRenderer>>,
     options: RenderOptions,
     /// Whether the devices can share the samples of a picture.
     shares_samples: bool,
@@ -43,12 +46,12 @@ pub struct RendererGroup {
     picture: Picture,
 }
 
-struct Member {
+struct Member<R> {
     /// Index of the device in the caller's list.
     ix: usize,
     /// Name of the device.
     name: String,
-    renderer: BandedRenderer,
+    renderer: R,
 }
 
 impl RendererGroup {
@@ -68,13 +71,7 @@ impl RendererGroup {
             RenderOptions { crop: Some(Crop { y1, ..asked }), ..options.clone() }
         };
         let open = |context: &Arc<Context>| BandedRenderer::new(Arc::clone(context), world, &first);
-        let renderers: Vec<_> = thread::scope(|scope| {
-            let threads: Vec<_> = contexts.iter().map(|context| scope.spawn(|| open(context))).collect();
-            threads.into_iter().map(|thread| thread.join().expect("no panic")).collect()
-        });
-        let members: Vec<_> = (contexts.iter().zip(renderers).enumerate())
-            .map(|(ix, (context, renderer))| Ok(Member { ix, name: context.info().name.clone(), renderer: renderer? }))
-            .collect::<Result<_, GpuError>>()?;
+        let members = open_members(contexts, open)?;
         // `window_mean`, from which samples are shared, needs a picture of one band.
         let shares_samples = may_share_samples && members.iter().all(|member| member.renderer.n_bands() == 1);
         let are_alike = contexts.iter().all(|context| context.info().name == contexts[0].info().name);
@@ -143,6 +140,21 @@ impl RendererGroup {
     }
 }
 
+/// Opens a renderer on each device, all at the same time.
+fn open_members<R: Send>(
+    contexts: &[Arc<Context>],
+    open: impl Fn(&Arc<Context>) -> Result<R, GpuError> + Sync,
+) -> Result<Vec<Member<R>>, GpuError> {
+    let renderers: Vec<_> = thread::scope(|scope| {
+        let threads: Vec<_> = contexts.iter().map(|context| scope.spawn(|| open(context))).collect();
+        threads.into_iter().map(|thread| thread.join().expect("no panic")).collect()
+    });
+    let member = |(ix, renderer): (usize, Result<R, GpuError>)| {
+        Ok(Member { ix, name: contexts[ix].info().name.clone(), renderer: renderer? })
+    };
+    renderers.into_iter().enumerate().map(member).collect()
+}
+
 /// Whether devices can share the samples of a picture: each draws some samples of all pixels. The noise filter `edge`
 /// and layers need all samples of a pixel on one device.
 fn can_share_samples(options: &RenderOptions) -> bool {
@@ -181,12 +193,12 @@ struct Failure {
 ///
 /// # Errors
 /// All members have failed. The last one that has failed is kept.
-fn share<T: Send>(
-    members: &mut Vec<Member>,
+fn share<R: Send, T: Send>(
+    members: &mut Vec<Member<R>>,
     queue: &mut WorkQueue,
     units: Range<u32>,
     watcher: &mut impl Watcher,
-    work: impl Fn(&mut BandedRenderer, Range<u32>, &dyn Fn(f64)) -> Result<T, GpuError> + Sync,
+    work: impl Fn(&mut R, Range<u32>, &dyn Fn(f64)) -> Result<T, GpuError> + Sync,
 ) -> Result<Vec<(Range<u32>, T)>, GpuError> {
     let n_units = units.len();
     queue.begin(units);
@@ -225,7 +237,7 @@ fn share<T: Send>(
 ///
 /// # Errors
 /// Returns the member's error if no other member is left. The member is kept then.
-fn remove_failed(members: &mut Vec<Member>, ix: usize, error: GpuError) -> Result<(), GpuError> {
+fn remove_failed<R>(members: &mut Vec<Member<R>>, ix: usize, error: GpuError) -> Result<(), GpuError> {
     if members.len() == 1 {
         return Err(error);
     }
@@ -237,9 +249,9 @@ fn remove_failed(members: &mut Vec<Member>, ix: usize, error: GpuError) -> Resul
 
 impl<W> Job<'_, W> {
     /// Does the work of a member until the queue is empty.
-    fn run<T>(&self, member: &mut Member, send: &mpsc::Sender<Message<T>>)
+    fn run<R, T>(&self, member: &mut Member<R>, send: &mpsc::Sender<Message<T>>)
     where
-        W: Fn(&mut BandedRenderer, Range<u32>, &dyn Fn(f64)) -> Result<T, GpuError>,
+        W: Fn(&mut R, Range<u32>, &dyn Fn(f64)) -> Result<T, GpuError>,
     {
         // The receiver outlives all threads.
         let tell = |message| send.send(message).expect("a receiver");
@@ -268,7 +280,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Counts samples of parts of the picture, and tells the watcher of samples of the whole picture.
+/// Counts samples of parts of a picture or film, and tells the watcher of samples of whole pictures.
 #[derive(Default)]
 struct WholeSamples {
     /// Sum of the shares of all samples that have been drawn. It becomes less if a device fails, since the samples of
@@ -296,7 +308,8 @@ mod tests {
     #[test]
     fn samples_that_are_drawn_again_are_told_once() {
         let (mut progress, mut n_told) = (WholeSamples::default(), 0);
-        let mut add = |progress: &mut WholeSamples, n: u32| (0..n).for_each(|_| progress.add(0.25, &mut || n_told += 1));
+        let mut add =
+            |progress: &mut WholeSamples, n: u32| (0..n).for_each(|_| progress.add(0.25, &mut || n_told += 1));
         add(&mut progress, 10);
         progress.n_done -= 1.5;
         add(&mut progress, 6);

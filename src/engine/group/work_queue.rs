@@ -15,6 +15,8 @@ pub struct WorkQueue {
 /// The rule by which the queue is cut into ranges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Chunking {
+    /// Each range is one unit.
+    Single,
     /// Each device gets one range, whose size is proportional to the device's speed.
     OneEach,
     /// Guided self-scheduling (Polychronopoulos and Kuck 1987): a device gets half of the units that are left, times
@@ -64,19 +66,25 @@ impl WorkQueue {
         if self.left.is_empty() {
             return None;
         }
+        let n_units = self.next_len(device_ix);
+        self.devices[device_ix].has_range = true;
+        let units = self.left.start..self.left.start + n_units;
+        self.left.start = units.end;
+        Some(units)
+    }
+
+    /// Returns the number of units of the device's next range.
+    fn next_len(&self, device_ix: usize) -> u32 {
         let n_left = self.left.len() as u32;
         let (part, least) = match self.chunking {
+            Chunking::Single => return 1,
             Chunking::OneEach => (1.0, 1),
             Chunking::Guided { least } => (0.5, least.max(1)),
         };
         let n_wanted = (f64::from(n_left) * part * self.share_of(device_ix)).round() as u32;
         let n_units = n_wanted.clamp(least.min(n_left), n_left);
         // A remainder of less than `least` units is added to this range.
-        let n_units = if n_left - n_units < least { n_left } else { n_units };
-        self.devices[device_ix].has_range = true;
-        let units = self.left.start..self.left.start + n_units;
-        self.left.start = units.end;
-        Some(units)
+        if n_left - n_units < least { n_left } else { n_units }
     }
 
     /// Adds a finished range to the measurement of the device's speed.
@@ -172,6 +180,13 @@ mod tests {
         assert_eq!([queue.take(1), queue.take(0), queue.take(2)], [Some(0..16), Some(16..40), None]);
         queue.begin(5..5);
         assert_eq!(queue.take(0), None);
+    }
+
+    #[test]
+    fn single_units_are_taken_in_their_order() {
+        let mut queue = WorkQueue::new(2, Chunking::Single);
+        queue.begin(0..3);
+        assert_eq!([0, 1, 1, 0].map(|device_ix| queue.take(device_ix)), [Some(0..1), Some(1..2), Some(2..3), None]);
     }
 
     #[test]
