@@ -607,6 +607,12 @@ struct Segment {
 #define FILTER_GAUSSIAN 2u
 // Base-2 logarithm of the most samples that a frame of paths draws.
 #define MOST_SAMPLES_LOG2 4u
+// Side of a noise tile, which gets samples until its noise is low (pixels). A multiple of `TILE_SIZE`.
+#define NOISE_TILE_SIZE 16u
+// The most noise tiles that are drawn together. Their places fill the smallest uniform buffer that a device may have.
+#define MOST_NOISE_TILES 4096u
+// `Frame.window_x` if the window is a column of noise tiles (noise_tiles.glsl).
+#define WINDOW_OF_TILES 0xffffffffu
 // Number of the layers of light (path_layers.comp).
 #define LIGHT_LAYERS 3u
 // The bounce of a path, counted from 0, from which on it may end by Russian roulette.
@@ -654,7 +660,8 @@ struct Hit {
 // - `max_depth`: levels of rays, of which the camera's are the first.
 // - `queue_capacity`: rays that the ray queue has room for.
 // - `picture_width`, `picture_height`: of the whole picture (pixels).
-// - `window_x`, `window_y`: the picture's pixel at which the window begins.
+// - `window_x`, `window_y`: the picture's pixel at which the window begins. Of paths, `window_x` can also be
+//   `WINDOW_OF_TILES`.
 // - `sample_x`, `sample_y`: position of the frame's sample in each pixel (pixels from its upper left corner).
 // - `n_samples`: samples of each pixel so far, including this frame's.
 // - `n_lanes`: lanes of the device, which are shared out if there are fewer rays. 0: each ray gets one lane.
@@ -1220,6 +1227,8 @@ struct GridSort {
 // A vec4 for each path: its radiance when the last layer of light was complete. Empty unless the picture has layers of
 // light.
 #define BIND_PATH_SNAPSHOTS 37u
+// The places of `MOST_NOISE_TILES` noise tiles, a word each (noise_tiles.glsl).
+#define BIND_NOISE_TILES 38u
 
 // The scene's arrays as texels: the binding of each is this plus its own. All other bindings are below it.
 #define BIND_TEXELS 64u

@@ -5,6 +5,7 @@
 
 #include "layout.glsl"
 #include "camera.glsl"
+#include "noise_tiles.glsl"
 #include "sampler.glsl"
 
 // The offset on one axis with the share `u` of a tent of radius 1 to its left.
@@ -42,7 +43,7 @@ vec2 lens_point(vec2 u) {
 
 // The camera ray of a sample of the window's pixel. in_pixel, in_lens: random numbers in [0, 1).
 PathRay path_camera_ray(uvec2 pixel, vec2 in_pixel, vec2 in_lens) {
-    vec2 at_px = vec2(in_picture(pixel)) + 0.5 + filter_offset(in_pixel);
+    vec2 at_px = vec2(picture_pixel_of(pixel)) + 0.5 + filter_offset(in_pixel);
     vec2 at = at_px / vec2(frame.picture_width, frame.picture_height) * 2.0 - 1.0;
     vec3 in_image = at.x * frame.right - at.y * frame.up;
     vec3 origin = frame.eye;

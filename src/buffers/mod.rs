@@ -42,14 +42,14 @@ pub use self::{
 pub(crate) use self::{accel::hidden_words, pixels::uses_graphics_pipeline};
 use crate::{
     gpu::BindingKind,
-    layout::{BIND_ACCEL, BIND_FRAME, BIND_TEXELS, BIND_TRIANGLE_IDS},
+    layout::{BIND_ACCEL, BIND_FRAME, BIND_NOISE_TILES, BIND_TEXELS, BIND_TRIANGLE_IDS},
 };
 
 /// Returns a binding number of layout.glsl with the kind of object that it is bound to.
 fn binding(number: u32) -> (u32, BindingKind) {
     let kind = match number {
         BIND_TEXELS.. => BindingKind::Texels,
-        BIND_FRAME | BIND_ACCEL => BindingKind::Uniform,
+        BIND_FRAME | BIND_ACCEL | BIND_NOISE_TILES => BindingKind::Uniform,
         BIND_TRIANGLE_IDS => BindingKind::Image,
         _ => BindingKind::Storage,
     };

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::{
+    frame::NoiseTiles,
     gpu::{Buffer, BufferUse, Context, GpuError},
     layout::{Hit, PathRay, PathState, SCAN_GROUP_SIZE, Segment},
 };
@@ -18,6 +19,8 @@ pub struct PathQueue {
     pub live_paths: Buffer<u32>,
     /// The radiance of each path when the last layer of light was complete. Empty if the picture has no such layers.
     pub path_snapshots: Buffer<[f32; 4]>,
+    /// The places of the noise tiles of which the window consists ([`NoiseTiles`]). Not read if it is a rectangle.
+    pub noise_tiles: Buffer<u32>,
 }
 
 impl PathQueue {
@@ -38,6 +41,7 @@ impl PathQueue {
             segments: Buffer::new(context, "segments", capacity, storage)?,
             live_paths: Buffer::new(context, "live_paths", 2 * capacity, storage)?,
             path_snapshots: Buffer::new(context, "path_snapshots", if has_layers { capacity } else { 0 }, storage)?,
+            noise_tiles: Buffer::new(context, "noise_tiles", NoiseTiles::MOST, BufferUse::Uniform)?,
         })
     }
 }

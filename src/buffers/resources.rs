@@ -48,12 +48,13 @@ const BINDINGS_OF_WHITTED: [u32; 5] = [
     layout::BIND_RASTER_GROUPS,
 ];
 /// Further bindings, for paths.
-const BINDINGS_OF_PATHS: [u32; 5] = [
+const BINDINGS_OF_PATHS: [u32; 6] = [
     layout::BIND_PATH_STATES,
     layout::BIND_SEGMENTS,
     layout::BIND_LIVE_PATHS,
     layout::BIND_PIXEL_GUIDES,
     layout::BIND_PATH_SNAPSHOTS,
+    layout::BIND_NOISE_TILES,
 ];
 
 /// The number of elements of `counters` for each bounce of each batch, including the unused elements between the
@@ -206,6 +207,7 @@ impl Resources {
                 (layout::BIND_LIVE_PATHS, Binding::Buffer(paths.live_paths.any())),
                 (layout::BIND_PIXEL_GUIDES, Binding::Buffer(pixels.pixel_guides.any())),
                 (layout::BIND_PATH_SNAPSHOTS, Binding::Buffer(paths.path_snapshots.any())),
+                (layout::BIND_NOISE_TILES, Binding::Buffer(paths.noise_tiles.any())),
             ],
         };
         BindingSet::new(&self.bindings, "frame", &[&self.accel.objects(), &own[..], &more].concat())

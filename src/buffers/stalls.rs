@@ -94,7 +94,7 @@ impl Stalls {
 
     fn set_counts(&self, commands: &Commands, counts: &Counts) {
         commands.barrier(Access::ComputeUpdate, Access::TransferWrite); // stalls of the previous dispatch
-        commands.update_buffer(self.rows.any(), counts);
+        commands.update_buffer(self.rows.any(), std::slice::from_ref(counts));
         commands.barrier(Access::TransferWrite, Access::ComputeUpdate); // stalls
     }
 

@@ -5,7 +5,10 @@ use std::{path::PathBuf, str::FromStr, time::Duration};
 use clap::{Parser, Subcommand, value_parser};
 use kdray::{
     accel::{AccelKind, Query, kdtree::Traversal},
-    engine::choices::{BuildPolicy, Request},
+    engine::{
+        NoiseGoal,
+        choices::{BuildPolicy, Request},
+    },
     frame::{Aov, Crop, Denoise, Integrator, RenderOptions, SampleRange},
     gpu::DeviceSelector,
     scene::{Scene, packed_path},
@@ -99,6 +102,12 @@ pub struct RenderArgs {
     #[arg(long, value_name = "TIME", value_parser = time)]
     #[arg(conflicts_with_all = ["spp", "samples", "repeat", "trace", "path", "frames", "tile"])]
     pub time: Option<Duration>,
+    /// Draw each tile of 16x16 pixels until its noise is at most this, 0.0001 to 1: 0.01 is an error of a hundredth of
+    /// white; --spp is the most samples of a pixel, 32, 64, 128 or a higher power of two [default with --noise: 4096];
+    /// for --integrator path, without a noise filter
+    #[arg(long, value_name = "NOISE", value_parser = noise)]
+    #[arg(conflicts_with_all = ["time", "samples", "repeat", "trace"])]
+    pub noise: Option<f32>,
     /// Render only some of the samples of each pixel to an .exr file, from A on up to but without B, for example 0-32;
     /// both are multiples of 16, or B is the number of all samples; `kdray merge` joins such files; for --integrator
     /// path, without a noise filter
@@ -295,7 +304,32 @@ impl RenderArgs {
     /// Returns the number of samples per pixel of the whole picture: the user's, else the scene's.
     pub fn samples(&self, scene: &Scene) -> u32 {
         let defaults = scene.defaults.for_integrator(self.picture.integrator);
-        self.spp.unwrap_or(if self.trace.is_some() { 1 } else { defaults.samples })
+        self.spp.unwrap_or(match (&self.trace, self.noise) {
+            (Some(_), _) => 1,
+            (None, Some(_)) => NoiseGoal::MOST,
+            (None, None) => defaults.samples,
+        })
+    }
+
+    /// Returns the goal of `--noise`. Refuses it for pictures whose noise is not known, and a number of samples at which
+    /// nothing is decided.
+    pub fn noise_goal(&self, scene: &Scene, options: &RenderOptions) -> Result<Option<NoiseGoal>, CliError> {
+        let Some(noise) = self.noise else { return Ok(None) };
+        let refused = |what: &str| Err(CliError::Usage(what.to_owned()));
+        if options.integrator != Integrator::Path {
+            return refused("--noise needs --integrator path: other pictures have no noise");
+        }
+        if options.denoise != Denoise::Off {
+            return refused("--noise needs --denoise off: tiles that are drawn apart cannot be filtered");
+        }
+        let most_samples = self.samples(scene);
+        if !most_samples.is_power_of_two() || most_samples < NoiseGoal::FEWEST {
+            let fewest = NoiseGoal::FEWEST;
+            return refused(&format!(
+                "--noise decides at powers of two from {fewest} on, and --spp {most_samples} is none of them"
+            ));
+        }
+        Ok(Some(NoiseGoal { noise, most_samples }))
     }
 
     /// Returns the samples to render if they are not all samples of the picture. Refuses samples that the picture does
@@ -472,6 +506,14 @@ impl FromStr for Tile {
             Some((ix, n)) if (1..=n).contains(&ix) => Ok(Self { ix: ix - 1, n }),
             _ => Err("expected I/N, where I is 1 to N"),
         }
+    }
+}
+
+/// Parses `--noise`.
+fn noise(word: &str) -> Result<f32, String> {
+    match word.parse() {
+        Ok(noise) if (0.0001..=1.0).contains(&noise) => Ok(noise),
+        _ => Err("expected a number from 0.0001 to 1".to_owned()),
     }
 }
 

@@ -33,6 +33,9 @@ pub struct Report {
     pub choices: Choices,
     /// Samples per pixel.
     pub samples: u32,
+    /// What `--noise` has led to; none without it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise: Option<NoiseReport>,
     /// Number of devices that have drawn the pictures, or 1 for the CPU.
     pub devices: usize,
     /// Whether each of several devices drew whole frames. If so, the times of a frame are those of its device. If
@@ -56,6 +59,30 @@ pub struct Report {
     /// The frame of median time.
     #[serde(flatten)]
     pub frame: Frame,
+}
+
+/// How many samples the tiles of pictures needed until their noise was low.
+#[derive(Serialize)]
+pub struct NoiseReport {
+    /// The most noise that tiles should have.
+    pub goal: f32,
+    /// Samples of a pixel, on average.
+    pub mean_samples: f64,
+    /// Number of tiles of all pictures.
+    pub n_tiles: usize,
+    /// Number of tiles that have the most samples, but more noise than the goal.
+    pub n_noisy_tiles: usize,
+}
+
+impl NoiseReport {
+    fn text(&self) -> String {
+        let Self { goal, mean_samples, n_tiles, n_noisy_tiles } = self;
+        let reached = match n_noisy_tiles {
+            0 => "all tiles have no more".to_owned(),
+            n => format!("{n} of {n_tiles} tiles have more, but the most samples"),
+        };
+        format!("noise {goal}: {mean_samples:.1} samples a pixel on average, {reached}\n\n")
+    }
 }
 
 /// Range of the times of several frames: one frame drawn repeatedly, or the frames of a path.
@@ -221,13 +248,17 @@ impl Report {
     pub fn text(&self) -> String {
         let Options { width, height, crop, .. } = &self.options;
         let crop = crop.as_ref().map(|crop| format!(" ({crop} of it)")).unwrap_or_default();
-        let samples = if self.samples > 1 { format!(", {} samples a pixel,", self.samples) } else { String::new() };
+        let samples = match (&self.noise, self.samples) {
+            (None, 2..) => format!(", {} samples a pixel,", self.samples),
+            _ => String::new(),
+        };
         let mut text = format!("{}: {} triangles, loaded in {:.0} ms\n", self.scene, self.triangles, self.load_ms);
         text += &format!("{}, {}\n", self.accel, built_in(self.build_ms, self.grid_build.as_ref()));
         text += &format!(
             "{width}x{height}{crop}{samples} on {}: picture after {:.0} ms\n{}\n\n",
             self.frame.device, self.render_ms, self.choices
         );
+        text += &self.noise.as_ref().map(NoiseReport::text).unwrap_or_default();
         if self.frame.frame_ms.is_none() {
             text += "This device has no timestamps: where the time went is unknown.\n\n";
         }

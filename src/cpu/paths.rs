@@ -30,9 +30,9 @@ pub struct Paths {
 
 impl Paths {
     /// Makes the camera rays of `n_paths` paths.
-    pub fn begin(&mut self, frame: &Frame, batch: &Batch, n_paths: u32, queue: &mut Queue) {
+    pub fn begin(&mut self, inputs: &KernelInputs, batch: &Batch, n_paths: u32, queue: &mut Queue) {
         let n = n_paths as usize;
-        queue.bounces = vec![Bounce::of_paths(n_paths, frame)];
+        queue.bounces = vec![Bounce::of_paths(n_paths, inputs.frame())];
         queue.rays.resize(n, PathRay::zeroed());
         queue.hits.resize(n, Hit::zeroed());
         self.states.clear();
@@ -40,7 +40,7 @@ impl Paths {
         self.segments.clear();
         self.segments.resize(n, Segment::zeroed());
         self.live[0] = (0..n_paths).collect();
-        path_begin(frame, batch, &mut queue.rays);
+        path_begin(inputs, batch, &mut queue.rays);
     }
 
     /// Finds the hits of the paths that are alive, and tests the segments of the bounce before. Returns the numbers of

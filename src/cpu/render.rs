@@ -6,8 +6,8 @@ use super::{paths::Paths, queue::Queue, timing::Clock};
 use crate::{
     accel::kdtree::TraversalLinks,
     frame::{
-        BounceStats, Denoise, FrameKind, Integrator, LightLayers, Pass, Picture, Plan, Primary, Profile, RenderOptions,
-        opaque, plan::passes,
+        BounceStats, Denoise, FrameKind, Integrator, LightLayers, NoiseTiles, Pass, Picture, Plan, Primary, Profile,
+        RenderOptions, opaque, plan::passes,
     },
     layout::{
         Batch, Bounce, EdgeStep, Feature, Frame, Guide, Hit, LIGHT_LAYERS, MOST_SAMPLES_LOG2, Material, PathRay,
@@ -194,6 +194,24 @@ impl Renderer {
         self.reset_samples();
     }
 
+    /// Sets the part of the picture that is drawn next: noise tiles or, without them, the crop of the options. The next
+    /// sample is the first of a new picture, and has the index `first_sample`.
+    pub(crate) fn set_window(&mut self, noise_tiles: Option<NoiseTiles>, first_sample: u32) {
+        self.options.noise_tiles = noise_tiles;
+        self.set_first_sample(first_sample);
+        let n_pixels = self.frame.width as usize * self.frame.height as usize;
+        let n_layers = if self.options.has_light_layers() { LIGHT_LAYERS as usize } else { 0 };
+        self.pixel_radiance.resize(n_pixels, [0.0; 4]);
+        self.pixel_layers.resize(n_layers * n_pixels, [0.0; 4]);
+        self.pixel_display.resize(n_pixels, [0; 4]);
+        self.pixel_features.resize(if self.options.features { n_pixels } else { 0 }, Feature::default());
+    }
+
+    /// Returns the means of the samples, and in the fourth component of their squared luminance, of the whole window.
+    pub(crate) fn window_mean(&self) -> &[[f32; 4]] {
+        &self.pixel_radiance
+    }
+
     /// Moves the camera. The next sample is the first of a new picture.
     pub fn set_camera(&mut self, camera: &Camera) {
         self.camera = *camera;
@@ -331,9 +349,10 @@ impl Renderer {
     }
 
     fn path_begin(&mut self) {
-        let Self { frame, batch, paths, queue, .. } = self;
+        let Self { world, options, frame, batch, paths, queue, .. } = self;
         let n_paths = batch.n_pixels << frame.samples_log2;
-        self.clock.time(Pass::PathBegin, Some(0), || paths.begin(frame, batch, n_paths, queue));
+        let inputs = KernelInputs::new(world, frame).with_noise_tiles(tiles_of(options));
+        self.clock.time(Pass::PathBegin, Some(0), || paths.begin(&inputs, batch, n_paths, queue));
     }
 
     /// Finds the closest hits of the bounce's paths, tests the segments of the bounce before, and counts both.
@@ -350,8 +369,9 @@ impl Renderer {
     }
 
     fn path_scatter(&mut self, depth: u32) {
-        let Self { world, frame, links, batch, paths, queue, path_materials, .. } = self;
+        let Self { world, options, frame, links, batch, paths, queue, path_materials, .. } = self;
         let inputs = KernelInputs::new(world, frame).with_links(links).of_paths(path_materials, world.emitters());
+        let inputs = inputs.with_noise_tiles(tiles_of(options));
         self.clock.time(Pass::PathScatter, Some(depth), || paths.scatter(&inputs, batch, queue));
     }
 
@@ -571,4 +591,9 @@ impl Renderer {
             n_batches: self.n_batches,
         }
     }
+}
+
+/// Returns the places of the noise tiles that are drawn, none for a rectangle of the picture.
+fn tiles_of(options: &RenderOptions) -> &[u32] {
+    options.noise_tiles.as_ref().map_or(&[], NoiseTiles::words)
 }

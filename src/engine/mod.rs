@@ -9,6 +9,7 @@
 mod caster;
 pub mod choices;
 mod group;
+mod noise;
 mod renderer;
 
 use std::sync::Arc;
@@ -17,6 +18,7 @@ use self::choices::{Cache, ChosenAccel, Methods, Processor, Request, Workload};
 pub use self::{
     caster::Caster,
     group::FilmRenderer,
+    noise::{NoiseGoal, NoisePicture},
     renderer::{Rendered, Renderer},
 };
 use crate::{

@@ -2,12 +2,16 @@
 
 use std::{borrow::Cow, sync::Arc};
 
+use glam::UVec2;
 use tracing::info_span;
 
-use super::group::RendererGroup;
+use super::{
+    group::RendererGroup,
+    noise::{self, NoiseGoal, NoisePicture},
+};
 use crate::{
     cpu::{self, Batching},
-    frame::{Drawn, Goal, Integrator, Pacer, Picture, RangeSums, RenderOptions, SampleRange, Watcher},
+    frame::{Drawn, Goal, Integrator, NoiseTiles, Pacer, Picture, RangeSums, RenderOptions, SampleRange, Watcher},
     gpu::{Context, GivenImage, GpuError, TimelinePoint},
     render::BandedRenderer,
     scene::Camera,
@@ -24,7 +28,10 @@ pub struct Rendered {
 }
 
 /// Draws pictures of a world, on the device or on the CPU.
-pub struct Renderer(Backend);
+pub struct Renderer {
+    backend: Backend,
+    options: RenderOptions,
+}
 
 enum Backend {
     Device(Box<BandedRenderer>),
@@ -35,16 +42,17 @@ enum Backend {
 impl Renderer {
     /// Creates a renderer on the devices. If there are none, the renderer runs on the CPU.
     pub(super) fn new(contexts: &[Arc<Context>], world: &World, options: &RenderOptions) -> Result<Self, GpuError> {
-        Ok(Self(match contexts {
+        let backend = match contexts {
             [] => Backend::Cpu(Box::new(cpu::Renderer::new(world, options, Batching::default()))),
             [context] => Backend::Device(Box::new(BandedRenderer::new(Arc::clone(context), world, options)?)),
             contexts => Backend::Group(Box::new(RendererGroup::new(contexts, world, options)?)),
-        }))
+        };
+        Ok(Self { backend, options: options.clone() })
     }
 
     /// Returns the number of bands: parts of the picture that are drawn one after the other.
     pub fn n_bands(&self) -> u32 {
-        match &self.0 {
+        match &self.backend {
             Backend::Device(renderer) => renderer.n_bands(),
             Backend::Group(_) | Backend::Cpu(_) => 1,
         }
@@ -73,7 +81,7 @@ impl Renderer {
     ) -> Result<(Drawn, RangeSums), GpuError> {
         let (mut drawn, mut sums) = (None::<Drawn>, RangeSums::default());
         for block in samples.blocks() {
-            match &mut self.0 {
+            match &mut self.backend {
                 Backend::Device(renderer) => renderer.set_first_sample(block.first)?,
                 Backend::Group(group) => group.set_first_sample(block.first),
                 Backend::Cpu(renderer) => renderer.set_first_sample(block.first),
@@ -93,20 +101,60 @@ impl Renderer {
         Ok((drawn, sums))
     }
 
-    fn draw_watched(&mut self, camera: &Camera, goal: Goal, watcher: &mut impl Watcher) -> Result<Drawn, GpuError> {
-        match &mut self.0 {
+    /// Draws what a camera sees until the noise of each tile of the picture is low, or the tile has the most samples.
+    /// The watcher is notified by [`Watcher::part`] of the share of the work that is done, and of one sample at the end.
+    ///
+    /// # Panics
+    /// The options do not ask for paths, have a noise filter or another first sample than 0.
+    ///
+    /// # Errors
+    /// Fails as [`Renderer::draw`] does.
+    pub fn draw_until(
+        &mut self,
+        camera: &Camera,
+        goal: NoiseGoal,
+        mut watcher: impl Watcher,
+    ) -> Result<NoisePicture, GpuError> {
+        let options = self.options.clone();
+        self.set_camera(camera);
+        let progress = |share: f32| watcher.part(share);
+        let drawn = noise::draw_until(goal, &options, &mut |places, block| self.draw_tiles(places, block), progress);
+        // Also after an error, what is drawn next are rectangles.
+        match &mut self.backend {
             Backend::Device(renderer) => {
-                renderer.set_camera(camera);
-                renderer.draw(goal, watcher)
+                renderer.set_crop(options.crop_or_whole())?;
+                renderer.set_first_sample(0)?;
             }
-            Backend::Group(group) => {
-                group.set_camera(camera);
-                group.draw(goal, watcher)
-            }
-            Backend::Cpu(renderer) => {
-                renderer.set_camera(camera);
-                Ok(draw_on_cpu(renderer, goal, watcher))
-            }
+            Backend::Group(group) => group.leave_tiles()?,
+            Backend::Cpu(renderer) => renderer.set_window(None, 0),
+        }
+        watcher.sample();
+        drawn
+    }
+
+    /// Draws samples of noise tiles.
+    fn draw_tiles(&mut self, places: &[UVec2], samples: SampleRange) -> Result<(Drawn, Vec<[f32; 4]>), GpuError> {
+        match &mut self.backend {
+            Backend::Device(renderer) => renderer.draw_tiles(places, samples),
+            Backend::Group(group) => group.draw_tiles(places, samples),
+            Backend::Cpu(renderer) => Ok(draw_tiles_on_cpu(renderer, places, samples)),
+        }
+    }
+
+    fn set_camera(&mut self, camera: &Camera) {
+        match &mut self.backend {
+            Backend::Device(renderer) => renderer.set_camera(camera),
+            Backend::Group(group) => group.set_camera(camera),
+            Backend::Cpu(renderer) => renderer.set_camera(camera),
+        }
+    }
+
+    fn draw_watched(&mut self, camera: &Camera, goal: Goal, watcher: &mut impl Watcher) -> Result<Drawn, GpuError> {
+        self.set_camera(camera);
+        match &mut self.backend {
+            Backend::Device(renderer) => renderer.draw(goal, watcher),
+            Backend::Group(group) => group.draw(goal, watcher),
+            Backend::Cpu(renderer) => Ok(draw_on_cpu(renderer, goal, watcher)),
         }
     }
 
@@ -123,10 +171,10 @@ impl Renderer {
         after: Option<TimelinePoint>,
         then: Option<TimelinePoint>,
     ) -> Result<(), GpuError> {
-        match &self.0 {
+        match &self.backend {
             Backend::Device(renderer) => renderer.copy_picture_to(image, after, then),
             Backend::Group(_) | Backend::Cpu(_) => {
-                let device = if matches!(self.0, Backend::Cpu(_)) { "CPU" } else { "several devices" };
+                let device = if matches!(self.backend, Backend::Cpu(_)) { "CPU" } else { "several devices" };
                 let missing = "images to copy a picture into".to_owned();
                 Err(GpuError::Lacks { device: device.to_owned(), missing })
             }
@@ -138,7 +186,7 @@ impl Renderer {
     /// # Errors
     /// The copy from the device fails.
     pub fn picture(&self) -> Result<Cow<'_, Picture>, GpuError> {
-        match &self.0 {
+        match &self.backend {
             Backend::Device(renderer) => renderer.picture(),
             Backend::Group(group) => Ok(Cow::Borrowed(group.picture())),
             Backend::Cpu(renderer) => Ok(Cow::Owned(renderer.picture())),
@@ -166,4 +214,17 @@ fn draw_on_cpu(renderer: &mut cpu::Renderer, goal: Goal, watcher: &mut impl Watc
     }
     drawn.light = renderer.light_layers();
     drawn
+}
+
+fn draw_tiles_on_cpu(renderer: &mut cpu::Renderer, places: &[UVec2], samples: SampleRange) -> (Drawn, Vec<[f32; 4]>) {
+    let (mut all, mut means) = (Drawn::default(), Vec::with_capacity(places.len() * NoiseTiles::N_PIXELS));
+    for places in places.chunks(NoiseTiles::MOST) {
+        renderer.set_window(Some(NoiseTiles::new(places)), samples.first);
+        let mut drawn = draw_on_cpu(renderer, Goal::Samples(samples.len()), &mut || ());
+        means.extend_from_slice(renderer.window_mean());
+        all.profile.add(&drawn.profile);
+        all.features.append(&mut drawn.features);
+        all.light.append(drawn.light);
+    }
+    (all, means)
 }

@@ -4,8 +4,8 @@
 use glam::{DMat4, DVec2, DVec3, DVec4, Vec3, dvec2};
 
 use crate::{
-    frame::{Crop, Denoise, PixelFilter, RenderOptions, sampling::sample_offset},
-    layout::{FILTER_BOX, FILTER_GAUSSIAN, FILTER_TENT, Frame},
+    frame::{Crop, Denoise, Integrator, PixelFilter, RenderOptions, sampling::sample_offset},
+    layout::{FILTER_BOX, FILTER_GAUSSIAN, FILTER_TENT, Frame, WINDOW_OF_TILES},
     scene::{Camera, Projection},
 };
 
@@ -22,14 +22,22 @@ impl Frame {
     /// reads the picture's size.
     ///
     /// # Panics
-    /// The crop exceeds the picture.
+    /// The crop exceeds the picture, or tiles have a noise filter.
     pub fn set_options(&mut self, options: &RenderOptions) {
         let window = options.window();
-        let Crop { x1, y1, .. } = window;
-        assert!(x1 <= options.width && y1 <= options.height, "a crop lies within its picture");
         self.picture_width = options.width;
         self.picture_height = options.height;
-        (self.window_x, self.window_y) = (window.x0, window.y0);
+        (self.window_x, self.window_y) = match options.noise_tiles {
+            Some(_) => {
+                assert!(options.integrator == Integrator::Path && options.noise_filter() == Denoise::Off, "tiles");
+                (WINDOW_OF_TILES, 0)
+            }
+            None => {
+                let Crop { x1, y1, .. } = window;
+                assert!(x1 <= options.width && y1 <= options.height, "a crop lies within its picture");
+                (window.x0, window.y0)
+            }
+        };
         (self.width, self.height) = (window.width(), window.height());
         self.max_depth = options.n_bounces();
         self.pixel_filter = match options.paths.filter {

@@ -69,15 +69,21 @@ impl Crop {
 }
 
 impl RenderOptions {
-    /// Returns the crop or, without one, the whole picture.
+    /// Returns the crop or, without one, the whole picture. Noise tiles count as the column that they are drawn as.
     pub fn crop_or_whole(&self) -> Crop {
-        self.crop.unwrap_or(Crop::whole(self.width, self.height))
+        match &self.noise_tiles {
+            Some(tiles) => tiles.window(),
+            None => self.crop.unwrap_or(Crop::whole(self.width, self.height)),
+        }
     }
 
     /// Returns the window, the part of the picture to be rendered: the crop and the border around it that the noise
     /// filter reads.
     pub fn window(&self) -> Crop {
-        self.crop_or_whole().grown(self.border(), self.width, self.height)
+        match &self.noise_tiles {
+            Some(tiles) => tiles.window(),
+            None => self.crop_or_whole().grown(self.border(), self.width, self.height),
+        }
     }
 
     /// Returns the width of the border around the crop that the noise filter reads, pixels.

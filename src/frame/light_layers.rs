@@ -17,6 +17,11 @@ impl LightLayers {
         self.0.iter().all(Vec::is_empty)
     }
 
+    /// Appends the pixels of each layer.
+    pub(crate) fn append(&mut self, mut next: Self) {
+        self.0.iter_mut().zip(&mut next.0).for_each(|(layer, next)| layer.append(next));
+    }
+
     /// Copies the pixels of `crop` to their places in those of `whole`, whose pixels these layers have.
     pub(crate) fn place(&mut self, whole: &Crop, crop: &Crop, part: &Self) {
         let layers = self.0.iter_mut().zip(&part.0).filter(|(layer, _)| !layer.is_empty());

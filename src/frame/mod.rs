@@ -21,6 +21,7 @@ mod crop;
 mod drawn;
 mod goal;
 mod light_layers;
+mod noise_tiles;
 mod pass;
 pub mod plan;
 mod profile;
@@ -35,6 +36,7 @@ pub use self::{
     drawn::{Drawn, Watcher},
     goal::{Goal, Pacer},
     light_layers::{LightLayers, RangeSums},
+    noise_tiles::NoiseTiles,
     pass::{Pass, Role, Scope},
     plan::{FrameKind, Plan, Section, Step, Touch},
     profile::{BounceStats, PassTime, Profile},
@@ -56,6 +58,9 @@ pub struct RenderOptions {
     pub height: u32,
     /// The part of the picture to render, which is inside the picture. None: all of it.
     pub crop: Option<Crop>,
+    /// The tiles to render in place of a crop, which have no border. Only [`Integrator::Path`] without a noise filter
+    /// renders tiles.
+    pub noise_tiles: Option<NoiseTiles>,
     /// How light is computed.
     pub integrator: Integrator,
     /// Number of bounces, the primary rays included: 1 is ray casting with shadows (Algorithm 1's `maximumDepth`).
@@ -138,6 +143,7 @@ impl Default for RenderOptions {
             width: 1024,
             height: 768,
             crop: None,
+            noise_tiles: None,
             integrator: Integrator::Whitted,
             max_depth: 5,
             exposure: 1.0,

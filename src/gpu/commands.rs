@@ -346,8 +346,8 @@ impl Commands<'_> {
     ///
     /// # Panics
     /// The data exceeds 64 KiB or the buffer, or is not a multiple of 4 bytes.
-    pub fn update_buffer(&self, destination: &AnyBuffer, data: &impl Pod) {
-        let bytes = bytemuck::bytes_of(data);
+    pub fn update_buffer(&self, destination: &AnyBuffer, data: &[impl Pod]) {
+        let bytes = bytemuck::cast_slice(data);
         assert!(bytes.len() as u64 <= destination.bytes() && bytes.len() <= 1 << 16 && bytes.len().is_multiple_of(4));
         // SAFETY: the commands are being recorded, no rendering is open, and the buffer holds that many bytes.
         unsafe { self.context.device.cmd_update_buffer(self.raw, destination.raw(), 0, bytes) };

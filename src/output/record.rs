@@ -70,6 +70,9 @@ pub struct WholeRecord {
     /// The filters and bounds of paths; none for whitted.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub paths: Option<PathRecord>,
+    /// The most noise of a tile, if tiles have as many samples as they needed for it. `n_samples` is the most then.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub noise: Option<f32>,
 }
 
 /// The filters and bounds of paths.
@@ -116,6 +119,7 @@ impl WholeRecord {
                 aperture: paths.aperture,
                 focus: paths.focus,
             }),
+            noise: None,
         }
     }
 

@@ -42,7 +42,7 @@ impl Rasterize {
     /// [`Rasterize::triangles`] needs them.
     pub fn reset(commands: &Commands, resources: &Resources) {
         let groups = RasterGroups { x: RASTER_GROUPS_X, y: 0, z: 1, reserved: 0 };
-        commands.update_buffer(resources.raster.groups.any(), &RasterState { groups, count: 0, reserved: 0 });
+        commands.update_buffer(resources.raster.groups.any(), &[RasterState { groups, count: 0, reserved: 0 }]);
     }
 
     /// Needs what [`Rasterize::reset`] leaves. Clears `pixel_nearest`, and leaves the nearest hits of small triangles

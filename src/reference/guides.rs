@@ -46,8 +46,8 @@ struct FirstSurface {
 
 /// Returns the surface that a camera ray hits. A lamp in front of the hit ends the path.
 fn first_surface(inputs: &KernelInputs, batch: &Batch, pixel: UVec2, path_ix: u32, hit: &Hit) -> Option<FirstSurface> {
-    let key = key_of_path(inputs.frame(), batch, path_ix, pixel);
-    let ray = path_camera_ray(inputs.frame(), pixel, random_pair(key, 0), random_pair(key, 1));
+    let key = key_of_path(inputs, batch, path_ix, pixel);
+    let ray = path_camera_ray(inputs, pixel, random_pair(key, 0), random_pair(key, 1));
     if hit.triangle_ix == NO_TRIANGLE || seen_light(inputs, ray.origin, ray.direction, hit.t).t.is_finite() {
         return None;
     }

@@ -19,6 +19,8 @@ use crate::{
 pub struct KernelInputs<'a, R = NoCounter> {
     /// The frame's constants; `None` for rays that do not belong to a frame.
     pub frame: Option<&'a Frame>,
+    /// The places of the noise tiles of which the window consists; empty if it is a rectangle of the picture.
+    pub noise_tiles: &'a [u32],
     /// Least corner of the box that holds all triangles, with the structure's rounding margin (world units).
     pub box_min: Vec3,
     /// Greatest corner of this box.
@@ -150,6 +152,7 @@ impl<'a> KernelInputs<'a> {
     fn without_accel(triangles: &'a [Triangle], [box_min, box_max]: [Vec3; 2]) -> Self {
         Self {
             frame: None,
+            noise_tiles: &[],
             box_min,
             box_max,
             triangles,
@@ -180,6 +183,7 @@ impl<'a> KernelInputs<'a> {
     pub fn counted<'c>(self, counts: &'c ReadCounts) -> KernelInputs<'a, Counted<'c>> {
         KernelInputs {
             frame: self.frame,
+            noise_tiles: self.noise_tiles,
             box_min: self.box_min,
             box_max: self.box_max,
             triangles: self.triangles,
@@ -230,6 +234,11 @@ impl<'a> KernelInputs<'a> {
     /// and the world's emitters.
     pub fn of_paths(self, materials: &'a [Material], emitters: &'a Emitters) -> Self {
         Self { materials, emitters: Some(emitters), ..self }
+    }
+
+    /// Returns the inputs of paths in a window of noise tiles, or with an empty slice, in a rectangle.
+    pub fn with_noise_tiles(self, noise_tiles: &'a [u32]) -> Self {
+        Self { noise_tiles, ..self }
     }
 
     /// Returns the inputs of paths, whose rays pass through see-through surfaces at random, as often as their opacity

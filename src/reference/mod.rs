@@ -54,6 +54,7 @@ pub mod maps;
 pub mod material;
 pub mod microfacet;
 pub mod noise;
+pub mod noise_tiles;
 pub mod path_accumulate;
 pub mod path_begin;
 pub mod path_camera;

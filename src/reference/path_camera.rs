@@ -2,7 +2,7 @@
 
 use glam::{UVec2, Vec2, Vec3, vec2};
 
-use super::camera::{in_picture, pixel_ix_of};
+use super::{camera::pixel_ix_of, inputs::KernelInputs, noise_tiles::picture_pixel_of};
 use crate::layout::{FILTER_BOX, FILTER_TENT, Frame, NO_TRIANGLE, PathRay};
 
 /// The offset on one axis with the share `u` of a tent of radius 1 to its left.
@@ -41,8 +41,9 @@ pub fn lens_point(u: Vec2) -> Vec2 {
 }
 
 /// The camera ray of a sample of the window's pixel. `in_pixel`, `in_lens`: random numbers in [0, 1).
-pub fn path_camera_ray(frame: &Frame, pixel: UVec2, in_pixel: Vec2, in_lens: Vec2) -> PathRay {
-    let at_px = in_picture(frame, pixel).as_vec2() + 0.5 + filter_offset(frame, in_pixel);
+pub fn path_camera_ray(inputs: &KernelInputs, pixel: UVec2, in_pixel: Vec2, in_lens: Vec2) -> PathRay {
+    let frame = inputs.frame();
+    let at_px = picture_pixel_of(frame, inputs.noise_tiles, pixel).as_vec2() + 0.5 + filter_offset(frame, in_pixel);
     let at = at_px / vec2(frame.picture_width as f32, frame.picture_height as f32) * 2.0 - 1.0;
     let in_image = at.x * frame.right - at.y * frame.up;
     let (mut origin, mut direction) = (frame.eye, frame.forward);

@@ -27,7 +27,7 @@ pub fn path_scatter(
 ) {
     let step = |&path_ix: &u32| {
         let ix = path_ix as usize;
-        let key = key_of_path(inputs.frame(), batch, path_ix, pixel_of_path(inputs.frame(), batch, path_ix));
+        let key = key_of_path(inputs, batch, path_ix, pixel_of_path(inputs.frame(), batch, path_ix));
         let (mut ray, mut state) = (paths.rays[ix], paths.states[ix]);
         let (goes_on, segment) = step_path(inputs, key, batch.depth, &hits[ix], &mut ray, &mut state);
         (goes_on, ray, state, segment)

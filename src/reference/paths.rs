@@ -3,7 +3,9 @@
 use glam::UVec2;
 
 use super::{
-    camera::{in_picture, pixel_of},
+    camera::pixel_of,
+    inputs::KernelInputs,
+    noise_tiles::picture_pixel_of,
     sampler::{SampleKey, sample_key},
 };
 use crate::layout::{Batch, Frame};
@@ -14,6 +16,8 @@ pub fn pixel_of_path(frame: &Frame, batch: &Batch, path_ix: u32) -> UVec2 {
 }
 
 /// What the random numbers of a path depend on. `pixel`: the window's pixel.
-pub fn key_of_path(frame: &Frame, batch: &Batch, path_ix: u32, pixel: UVec2) -> SampleKey {
-    sample_key(in_picture(frame, pixel), frame.first_sample + path_ix / batch.n_pixels)
+pub fn key_of_path(inputs: &KernelInputs, batch: &Batch, path_ix: u32, pixel: UVec2) -> SampleKey {
+    let frame = inputs.frame();
+    let picture_pixel = picture_pixel_of(frame, inputs.noise_tiles, pixel);
+    sample_key(picture_pixel, frame.first_sample + path_ix / batch.n_pixels)
 }

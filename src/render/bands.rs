@@ -20,12 +20,12 @@ use crate::{
 /// Renderer of whole pictures of any size. If the widest buffer of pixels exceeds what the device can bind as one
 /// storage buffer, bands are drawn. The joined picture has the same bits as one that is drawn at once.
 pub struct BandedRenderer {
-    renderer: Renderer,
+    pub(super) renderer: Renderer,
     /// The bands from top to bottom, and from left to right. Together they are the picture, or its crop.
-    bands: Vec<Crop>,
+    pub(super) bands: Vec<Crop>,
     /// The picture that was drawn last, joined from its bands. None before the first picture is complete. Always None
     /// if there is a single band: its picture stays on the device.
-    joined: Option<Picture>,
+    pub(super) joined: Option<Picture>,
     /// Whether the next sample is expected to be slow, as the last one was. The first one is expected to be slow if
     /// the driver runs kernels on the CPU.
     is_slow: bool,
@@ -63,7 +63,7 @@ impl BandedRenderer {
         self.renderer.set_camera(camera);
     }
 
-    /// Sets the part of the picture that is drawn next. Buffers are kept as [`Renderer::set_crop`] keeps them.
+    /// Sets the part of the picture that is drawn next, a rectangle. Buffers are kept as [`Renderer::set_crop`] keeps them.
     ///
     /// # Panics
     /// The crop exceeds the picture.
@@ -71,12 +71,13 @@ impl BandedRenderer {
     /// # Errors
     /// The part exceeds the device's limits or memory.
     pub fn set_crop(&mut self, crop: Crop) -> Result<(), GpuError> {
-        if self.bands == [crop] {
+        if self.bands == [crop] && self.renderer.options().noise_tiles.is_none() {
             return Ok(());
         }
-        let options = RenderOptions { crop: Some(crop), ..self.renderer.options().clone() };
+        let options = RenderOptions { crop: Some(crop), noise_tiles: None, ..self.renderer.options().clone() };
         let bands = bands(self.renderer.context.limits(), &options);
-        self.renderer.set_crop(largest(&bands, &options).unwrap_or(crop))?;
+        let crop = largest(&bands, &options).unwrap_or(crop);
+        self.renderer.set_options(&RenderOptions { crop: Some(crop), ..options })?;
         (self.bands, self.joined) = (bands, None);
         Ok(())
     }
@@ -203,7 +204,7 @@ impl BandedRenderer {
         self.renderer.copy_picture_to(image, after, then)
     }
 
-    fn draw_band(&mut self, goal: Goal, watcher: &mut impl Watcher) -> Result<Drawn, GpuError> {
+    pub(super) fn draw_band(&mut self, goal: Goal, watcher: &mut impl Watcher) -> Result<Drawn, GpuError> {
         self.renderer.reset_samples();
         let integrator = self.renderer.options().integrator;
         let mut pacer = Pacer::new(goal, integrator);

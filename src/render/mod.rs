@@ -17,6 +17,7 @@
 mod bands;
 mod given;
 mod incremental;
+mod noise_tiles;
 mod profile;
 mod reconfigure;
 mod schedule;
@@ -439,8 +440,11 @@ impl Renderer {
 
     fn update_constants(&self, commands: &Commands) {
         commands.barrier(Access::AnyUse, Access::TransferWrite); // all that the last frame reads: frame, bounces ...
-        commands.update_buffer(self.resources.frame.any(), self.resources.constants());
-        commands.barrier(Access::TransferWrite, Access::AnyUse); // frame
+        commands.update_buffer(self.resources.frame.any(), &[*self.resources.constants()]);
+        if let (Some(tiles), Some(paths)) = (&self.in_use.noise_tiles, &self.resources.paths) {
+            commands.update_buffer(paths.noise_tiles.any(), tiles.words());
+        }
+        commands.barrier(Access::TransferWrite, Access::AnyUse); // frame, noise_tiles
     }
 
     fn record_section(&self, commands: &Commands, section: &[Step], batch: &Batch) {

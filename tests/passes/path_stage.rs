@@ -128,7 +128,7 @@ impl PathStage {
     pub fn rays_and_hits(&self) -> (Vec<PathRay>, Vec<Hit>) {
         let n = 1200 << self.frame().samples_log2;
         let mut rays = vec![PathRay { pixel_ix: 0, ..super::stage::UNTOUCHED_RAY }; n];
-        path_begin(self.frame(), &self.batch(), &mut rays);
+        path_begin(&self.inputs(), &self.batch(), &mut rays);
         let all: Vec<u32> = (0..n as u32).collect();
         let mut hits = vec![super::stage::UNTOUCHED_HIT; n];
         path_trace::closest_hits(&self.inputs(), self.options.traversal, &all, &rays, &mut hits);

@@ -7,7 +7,7 @@ use std::{
 
 use kdray::{
     cpu,
-    engine::{Engine, Renderer},
+    engine::{Engine, NoiseGoal, Renderer},
     frame::{Drawn, Goal, Picture, Profile, RangeSums, RenderOptions, SampleRange, SampleSums, Watcher},
     gpu::GpuError,
     output::{Layers, Record, WholeRecord},
@@ -15,7 +15,7 @@ use kdray::{
     world::World,
 };
 
-use super::files::Files;
+use super::{files::Files, noise::NoiseReached};
 use crate::cli::{
     args::RenderArgs,
     error::CliError,
@@ -39,7 +39,9 @@ pub struct Common<'a> {
     pub camera: Camera,
     /// The end of each picture, if all samples are drawn.
     pub goal: Goal,
-    /// Number of samples of each pixel that are drawn, if they have a number.
+    /// The noise at which pictures end, if the user wants that.
+    pub noise_goal: Option<NoiseGoal>,
+    /// Number of samples of each pixel that are drawn, if they have a number. The most samples if pictures end at a noise.
     pub n_drawn: u32,
     /// The samples that are drawn, if they are not all samples of the pictures.
     pub some_samples: Option<SampleRange>,
@@ -53,6 +55,8 @@ pub struct DrawnPictures {
     pub profiles: Vec<Profile>,
     /// Number of samples of each pixel.
     pub n_samples: u32,
+    /// What the noise of all pictures has led to.
+    pub noise: Option<NoiseReached>,
     /// Time from the beginning until the pictures were in memory, without the time of writing files. If each of several
     /// devices drew whole frames, it is the time of the device that drew longest.
     pub render_ms: f64,
@@ -71,6 +75,7 @@ struct WrittenView {
     /// The profile of each repetition.
     profiles: Vec<Profile>,
     n_samples: u32,
+    noise: Option<NoiseReached>,
 }
 
 /// Draws each view `--repeat` times and writes its picture. Of several devices, each draws whole frames if there are
@@ -84,8 +89,9 @@ pub fn draw_and_write(
     let draw = if draws_whole_frames(engine, views) { draw_frames_apart } else { draw_in_turn };
     let (written, drawing) = draw(common, (engine, world), views, stage)?;
     let n_samples = written.last().map_or(common.n_drawn, |view| view.n_samples);
+    let noise = NoiseReached::of_all(written.iter().filter_map(|view| view.noise));
     let profiles = written.into_iter().flat_map(|view| view.profiles).collect();
-    Ok(DrawnPictures { profiles, n_samples, render_ms: drawing.as_secs_f64() * 1e3 })
+    Ok(DrawnPictures { profiles, n_samples, noise, render_ms: drawing.as_secs_f64() * 1e3 })
 }
 
 /// Whether each of several devices draws whole frames. Each has to get at least two on average: with fewer frames, some
@@ -147,7 +153,9 @@ impl Common<'_> {
     /// Returns the counter of the samples of all bands of all views.
     fn steps<'a>(&self, (progress, message): (&'a Progress, &str), n_views: u32, n_bands: u32) -> StepProgress<'a> {
         let args = self.args;
-        let factors = [n_views, self.n_drawn, args.repeat.into(), n_bands];
+        // A picture that ends at a noise is a single step.
+        let (n_drawn, n_bands) = if self.noise_goal.is_some() { (1, 1) } else { (self.n_drawn, n_bands) };
+        let factors = [n_views, n_drawn, args.repeat.into(), n_bands];
         let mut steps = match self.goal {
             Goal::Samples(_) => progress.steps(message, factors.into_iter().fold(1, u32::saturating_mul)),
             Goal::Time(time) => progress.steps_until(message, time),
@@ -169,15 +177,22 @@ fn draw_view(
     let camera = common.camera_of(view);
     if let Some(range) = common.some_samples {
         let (mut drawn, sums) = renderer.draw_range(&camera, range, Relay(watcher))?;
-        let written = WrittenView { profiles: vec![take(&mut drawn.profile)], n_samples: common.n_drawn };
+        let written = WrittenView { profiles: vec![take(&mut drawn.profile)], n_samples: common.n_drawn, noise: None };
         return Ok(DrawnView { picture: part(common, &sums.picture), drawn, sums, written });
+    }
+    if let Some(goal) = common.noise_goal {
+        let mut noisy = renderer.draw_until(&camera, goal, Relay(watcher))?;
+        let (profiles, noise) = (vec![take(&mut noisy.drawn.profile)], Some(NoiseReached::of(&noisy)));
+        // Pictures of other crops have the same number, whatever their tiles have needed.
+        let written = WrittenView { profiles, n_samples: common.n_drawn, noise };
+        return Ok(DrawnView { picture: noisy.picture, drawn: noisy.drawn, sums: RangeSums::default(), written });
     }
     let (mut drawn, mut profiles) = (Drawn::default(), Vec::new());
     for _ in 0..common.args.repeat {
         drawn = renderer.draw(&camera, common.goal, Relay(watcher))?;
         profiles.push(take(&mut drawn.profile));
     }
-    let written = WrittenView { profiles, n_samples: drawn.n_samples };
+    let written = WrittenView { profiles, n_samples: drawn.n_samples, noise: None };
     Ok(DrawnView { picture: renderer.picture()?.into_owned(), drawn, sums: RangeSums::default(), written })
 }
 

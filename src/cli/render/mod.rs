@@ -3,6 +3,7 @@
 mod draw;
 mod files;
 mod memory;
+mod noise;
 mod views;
 
 use std::time::Instant;
@@ -65,6 +66,7 @@ pub fn run(args: RenderArgs) -> Result<(), CliError> {
     let options = args.options(&scene)?;
     let n_samples = args.samples(&scene);
     let some_samples = args.some_samples(&scene, &options)?;
+    let noise_goal = args.noise_goal(&scene, &options)?;
     let n_drawn = some_samples.map_or(n_samples, |range| range.len());
     check_memory(&options, n_drawn, args.cpu, 1)?;
     let open = || open_devices(args.device.as_ref(), args.validate, &progress);
@@ -93,14 +95,15 @@ pub fn run(args: RenderArgs) -> Result<(), CliError> {
     let methods = engine.methods(&world, &workload)?;
     let mut options = methods.apply(&options);
     args.picture.meter(&world, &mut options).into_iter().for_each(|note| progress.note(&note));
-    let record = record(&engine, &world, &options, accel, (n_samples, some_samples));
+    let mut record = record(&engine, &world, &options, accel, (n_samples, some_samples));
+    record.whole.noise = args.noise;
     let crop = record.crop;
     let goal = args.time.map_or(Goal::Samples(n_drawn), Goal::Time);
-    let common = Common { args, options: &options, camera, goal, n_drawn, some_samples, record };
+    let common = Common { args, options: &options, camera, goal, noise_goal, n_drawn, some_samples, record };
     let rendering = format!("rendering {}x{}", crop.width(), crop.height());
     let (drawn, _) =
         progress.stage(&rendering, || draw_and_write(&common, (&engine, &world), &views, (&progress, &rendering)));
-    let DrawnPictures { profiles, n_samples, render_ms } = drawn.map_err(CliError::of_drawing)?;
+    let DrawnPictures { profiles, n_samples, noise, render_ms } = drawn.map_err(CliError::of_drawing)?;
     drop(progress);
 
     let repeated = FrameTimeRange::of(&profiles);
@@ -115,6 +118,7 @@ pub fn run(args: RenderArgs) -> Result<(), CliError> {
         options: (&options).into(),
         choices: Choices::of_pictures(accel, methods),
         samples: n_samples,
+        noise: noise_goal.zip(noise).map(|(goal, noise)| noise.report(goal)),
         devices: contexts.len().max(1),
         whole_frames,
         triangles: n_triangles,

@@ -12,6 +12,7 @@
 mod film;
 mod rows;
 mod samples;
+mod tiles;
 mod work_queue;
 
 use std::{
@@ -42,6 +43,7 @@ pub struct RendererGroup {
     first_sample: u32,
     rows: WorkQueue,
     samples: WorkQueue,
+    tiles: WorkQueue,
     /// The picture that was drawn last.
     picture: Picture,
 }
@@ -83,6 +85,7 @@ impl RendererGroup {
             first_sample: 0,
             rows: WorkQueue::new(n_devices, rows::chunking(contexts, options)),
             samples: WorkQueue::new(n_devices, of_samples),
+            tiles: WorkQueue::new(n_devices, tiles::chunking(contexts)),
             picture: Picture::default(),
         })
     }
@@ -132,6 +135,15 @@ impl RendererGroup {
         }
         let phrase = |(name, n): (&str, usize)| if n == 1 { name.to_owned() } else { format!("{n} x {name}") };
         counted.into_iter().map(phrase).collect::<Vec<_>>().join(", ")
+    }
+
+    /// Draws rectangles of the picture from now on, after noise tiles.
+    ///
+    /// # Errors
+    /// The picture exceeds a device's memory.
+    pub fn leave_tiles(&mut self) -> Result<(), GpuError> {
+        let asked = self.options.crop_or_whole();
+        self.members.iter_mut().try_for_each(|member| member.renderer.set_crop(asked))
     }
 
     /// Returns the picture that was drawn last.

@@ -124,7 +124,7 @@ impl GridPasses {
     /// Needs `triangles`. Leaves their bounding box in `build`, and `cells` cleared to zero.
     fn bounds(&self, commands: &Commands, buffers: &GridBuffers) {
         let reset = || {
-            commands.update_buffer(buffers.build.any(), buffers.initial());
+            commands.update_buffer(buffers.build.any(), std::slice::from_ref(buffers.initial()));
             commands.clear_buffer(buffers.cells.any());
             commands.barrier(Access::TransferWrite, Access::KernelUpdate); // build, cells
         };

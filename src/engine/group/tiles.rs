@@ -1,0 +1,42 @@
+//! Draws noise tiles that are shared among several devices.
+
+use std::sync::Arc;
+
+use glam::UVec2;
+
+use super::{RendererGroup, share, work_queue::Chunking};
+use crate::{
+    frame::{Drawn, SampleRange},
+    gpu::{Context, GpuError},
+};
+
+/// The fewest tiles that a GPU draws together. Fewer pixels leave parts of a large GPU idle.
+const FEWEST_TILES: u32 = 1 << 8;
+/// The same for a software driver.
+const FEWEST_SOFTWARE_TILES: u32 = 1;
+
+/// Returns how tiles are shared.
+pub fn chunking(contexts: &[Arc<Context>]) -> Chunking {
+    let is_software = contexts[0].is_software();
+    Chunking::Guided { least: if is_software { FEWEST_SOFTWARE_TILES } else { FEWEST_TILES } }
+}
+
+impl RendererGroup {
+    /// Draws samples of the tiles at the given places, as
+    /// [`BandedRenderer::draw_tiles`](crate::render::BandedRenderer::draw_tiles) does.
+    pub fn draw_tiles(&mut self, places: &[UVec2], samples: SampleRange) -> Result<(Drawn, Vec<[f32; 4]>), GpuError> {
+        let units = 0..places.len() as u32;
+        let parts = share(&mut self.members, &mut self.tiles, units, &mut || (), |renderer, units, _| {
+            renderer.draw_tiles(&places[units.start as usize..units.end as usize], samples)
+        })?;
+        let (mut all, mut all_means) = (Drawn::default(), Vec::new());
+        for (_, (mut drawn, mut means)) in parts {
+            all_means.append(&mut means);
+            all.profile.add(&drawn.profile);
+            all.features.append(&mut drawn.features);
+            all.light.append(drawn.light);
+        }
+        all.profile.device = self.device_names();
+        Ok((all, all_means))
+    }
+}

@@ -1,0 +1,215 @@
+//! Draws pictures of paths until their noise is low enough, tile by tile.
+//!
+//! All tiles of the picture get 16 samples of each pixel, then 16 more, then as many again as they have, until their
+//! noise is low enough. A tile whose noise is low gets no more samples, and the others are drawn together, wherever
+//! they are. So a tile has the bits of a picture of a fixed number of samples, and a crop has the bits of the whole
+//! picture.
+//!
+//! The noise of a tile is measured by its samples alone: the two halves of them are two pictures, and half of the
+//! difference between two pictures of equal noise is, on average, the error of their mean.
+
+use glam::UVec2;
+
+use crate::{
+    cpu,
+    frame::{Crop, Drawn, LightLayers, NoiseTiles, Picture, Profile, RenderOptions, SampleRange},
+    gpu::GpuError,
+    layout::{Feature, LIGHT_LAYERS, MOST_SAMPLES_LOG2},
+};
+
+/// Number of pixels of a tile.
+const N_PIXELS: usize = NoiseTiles::N_PIXELS;
+/// Number of the layers of light.
+const N_LAYERS: usize = LIGHT_LAYERS as usize;
+
+/// How low the noise of a picture has to be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NoiseGoal {
+    /// The most noise of a tile: the root mean square error of the square roots of its colours, times the exposure. A
+    /// display shows about the square root of light, so 0.01 is an error of about a hundredth of white.
+    pub noise: f32,
+    /// Number of samples of each pixel after which a tile gets no more: 2^n, at least [`NoiseGoal::FEWEST`].
+    pub most_samples: u32,
+}
+
+impl NoiseGoal {
+    /// The most samples of a pixel if nothing else is said.
+    pub const MOST: u32 = 4096;
+    /// The fewest samples of a pixel.
+    pub const FEWEST: u32 = 2 << MOST_SAMPLES_LOG2;
+
+    /// Returns the blocks of samples that a tile gets one after the other: each but the first has as many samples as
+    /// all before it.
+    fn blocks(&self) -> impl Iterator<Item = SampleRange> + use<> {
+        let first = SampleRange { first: 0, end: 1 << MOST_SAMPLES_LOG2 };
+        let doubled = |block: &SampleRange| Some(SampleRange { first: block.end, end: 2 * block.end });
+        let most = self.most_samples;
+        std::iter::successors(Some(first), doubled).take_while(move |block| block.end <= most)
+    }
+}
+
+/// A picture whose noise is low, or whose tiles have the most samples.
+#[derive(Clone, Debug)]
+pub struct NoisePicture {
+    /// The picture.
+    pub picture: Picture,
+    /// What belongs to it. The number of samples is that of the pixels with the most.
+    pub drawn: Drawn,
+    /// Number of samples of a pixel, on average.
+    pub mean_samples: f64,
+    /// Number of tiles.
+    pub n_tiles: usize,
+    /// Number of tiles with more noise than the goal, because they have the most samples.
+    pub n_noisy: usize,
+}
+
+/// Draws samples of tiles. Returns what is known of their pixels, and the means of the samples with those of their
+/// squared luminance, tile by tile.
+pub(super) type DrawTiles<'a> = dyn FnMut(&[UVec2], SampleRange) -> Result<(Drawn, Vec<[f32; 4]>), GpuError> + 'a;
+
+/// Draws a picture of the options' crop until the goal is met. `progress` is called with the share of the work that is
+/// done, as far as the noise tells it.
+pub(super) fn draw_until(
+    goal: NoiseGoal,
+    options: &RenderOptions,
+    draw: &mut DrawTiles,
+    mut progress: impl FnMut(f32),
+) -> Result<NoisePicture, GpuError> {
+    let mut tiles: Vec<Tile> = NoiseTiles::places_of(&options.crop_or_whole()).into_iter().map(Tile::new).collect();
+    let mut profile = Profile::default();
+    for block in goal.blocks() {
+        let mut noisy: Vec<&mut Tile> = tiles.iter_mut().filter(|tile| tile.noise > goal.noise).collect();
+        if noisy.is_empty() {
+            break;
+        }
+        let places: Vec<UVec2> = noisy.iter().map(|tile| tile.place).collect();
+        let (mut drawn, means) = draw(&places, block)?;
+        profile.add(&drawn.profile);
+        if block.first == 0 {
+            let features = drawn.features.chunks_exact(N_PIXELS);
+            noisy.iter_mut().zip(features).for_each(|(tile, features)| tile.features = features.to_vec());
+        }
+        let light = std::mem::take(&mut drawn.light);
+        for (tile_ix, tile) in noisy.into_iter().enumerate() {
+            let pixels = tile_ix * N_PIXELS..(tile_ix + 1) * N_PIXELS;
+            let layers = light.0.iter().filter(|layer| !layer.is_empty()).map(|layer| &layer[pixels.clone()]);
+            tile.add(block, &means[pixels.clone()], layers, options);
+        }
+        let shares = tiles.iter().map(|tile| tile.share_of(goal)).sum::<f32>();
+        progress(shares / tiles.len() as f32);
+    }
+    Ok(joined(&tiles, goal, options, profile))
+}
+
+/// A tile and its samples.
+struct Tile {
+    /// In units of the side of a tile.
+    place: UVec2,
+    /// Number of samples of each pixel.
+    n_samples: u32,
+    /// The sums of the samples, and of their squared luminance. The sums of the layers of light follow, if there are
+    /// any.
+    sums: Vec<[f32; 4]>,
+    /// What the first sample of each pixel shows; empty unless the options ask for it.
+    features: Vec<Feature>,
+    /// Infinite before there are two halves of samples.
+    noise: f32,
+}
+
+impl Tile {
+    fn new(place: UVec2) -> Self {
+        Self { place, n_samples: 0, sums: Vec::new(), features: Vec::new(), noise: f32::INFINITY }
+    }
+
+    /// Adds a block with as many samples as there are, or the first one. A power of two divides and multiplies without
+    /// rounding, so the sums have the bits of a picture of all samples.
+    fn add<'a>(
+        &mut self,
+        block: SampleRange,
+        means: &'a [[f32; 4]],
+        layers: impl Iterator<Item = &'a [[f32; 4]]>,
+        options: &RenderOptions,
+    ) {
+        let n = block.len() as f32;
+        let pixels = means.iter().chain(layers.flatten());
+        let added = pixels.map(|pixel| pixel.map(|value| value * n));
+        if self.sums.is_empty() {
+            self.sums = added.collect();
+        } else {
+            let halves: Vec<[f32; 4]> = added.collect();
+            self.noise = self.noise_between(&halves, n, options);
+            self.sums.as_flattened_mut().iter_mut().zip(halves.as_flattened()).for_each(|(sum, half)| *sum += half);
+        }
+        self.n_samples = block.end;
+    }
+
+    /// Returns the noise of the tile's samples and of as many others together. `n`: number of samples of each half.
+    fn noise_between(&self, others: &[[f32; 4]], n: f32, options: &RenderOptions) -> f32 {
+        let shown = |sum: f32| f64::from((sum / n * options.exposure).max(0.0)).sqrt();
+        let (mut squares, mut n_values) = (0.0, 0_u32);
+        for (pixel_ix, (sums, others)) in self.sums.iter().zip(others).take(N_PIXELS).enumerate() {
+            let at = self.pixel(pixel_ix);
+            // Tiles at the right and at the lower edge extend beyond the picture.
+            if at.x < options.width && at.y < options.height {
+                squares += (0..3).map(|i| (0.5 * (shown(sums[i]) - shown(others[i]))).powi(2)).sum::<f64>();
+                n_values += 3;
+            }
+        }
+        (squares / f64::from(n_values.max(1))).sqrt() as f32
+    }
+
+    /// Returns the coordinates in the picture of one of the tile's pixels.
+    fn pixel(&self, pixel_ix: usize) -> UVec2 {
+        let side = NoiseTiles::SIZE;
+        side * self.place + UVec2::new(pixel_ix as u32 % side, pixel_ix as u32 / side)
+    }
+
+    /// Returns which share of the tile's work is done. The error falls by half when the number of samples becomes four
+    /// times as large.
+    fn share_of(&self, goal: NoiseGoal) -> f32 {
+        let of_noise = (goal.noise / self.noise).powi(2).min(1.0);
+        of_noise.max(self.n_samples as f32 / goal.most_samples as f32)
+    }
+}
+
+/// Joins the tiles to the picture of the options' crop.
+fn joined(tiles: &[Tile], goal: NoiseGoal, options: &RenderOptions, profile: Profile) -> NoisePicture {
+    let crop = options.crop_or_whole();
+    let n_pixels = crop.width() as usize * crop.height() as usize;
+    let has_layers = tiles.iter().any(|tile| tile.sums.len() > N_PIXELS);
+    let mut radiance = vec![[0.0; 4]; n_pixels];
+    let mut light = LightLayers(std::array::from_fn(|_| vec![[0.0; 4]; if has_layers { n_pixels } else { 0 }]));
+    let mut features = vec![Feature::default(); if options.features { n_pixels } else { 0 }];
+    let mut n_samples = 0.0;
+    for tile in tiles {
+        let mean = |ix: usize| tile.sums[ix].map(|sum| sum / tile.n_samples as f32);
+        for (pixel_ix, ix) in (0..N_PIXELS).filter_map(|pixel_ix| Some((pixel_ix, ix_in(&crop, tile.pixel(pixel_ix))?)))
+        {
+            let [r, g, b, squared] = mean(pixel_ix);
+            radiance[ix] = [r, g, b, 1.0];
+            n_samples += f64::from(tile.n_samples);
+            if let Some(feature) = tile.features.get(pixel_ix) {
+                features[ix] = *feature;
+                features[ix].set_noise([r, g, b, squared], tile.n_samples);
+            }
+            if has_layers {
+                (0..N_LAYERS).for_each(|layer| light.0[layer][ix] = mean((1 + layer) * N_PIXELS + pixel_ix));
+            }
+        }
+    }
+    let display = cpu::display(&radiance, options.exposure, options.tonemap);
+    let most = tiles.iter().map(|tile| tile.n_samples).max().unwrap_or(0);
+    NoisePicture {
+        picture: Picture { width: crop.width(), height: crop.height(), radiance, display },
+        drawn: Drawn { features, light, profile, n_samples: most },
+        mean_samples: n_samples / n_pixels as f64,
+        n_tiles: tiles.len(),
+        n_noisy: tiles.iter().filter(|tile| tile.noise > goal.noise).count(),
+    }
+}
+
+/// Returns the index of a pixel of the picture among those of a crop, if it is one of them.
+fn ix_in(crop: &Crop, pixel: UVec2) -> Option<usize> {
+    let is_inside = (crop.x0..crop.x1).contains(&pixel.x) && (crop.y0..crop.y1).contains(&pixel.y);
+    is_inside.then(|| (pixel.y - crop.y0) as usize * crop.width() as usize + (pixel.x - crop.x0) as usize)
+}
