@@ -20,8 +20,9 @@ pub fn run(args: &MergeArgs) -> Result<(), CliError> {
     // Joining is quick, so only an engine is told of it.
     let kind = if args.progress == ProgressKind::Auto { ProgressKind::None } else { args.progress };
     let progress = Progress::of_kind(kind, args.quiet, &SHARES, None);
-    let (merged, _) = progress.stage(&format!("joining {} parts", args.parts.len()), || merge::merge(&args.parts));
-    let merged = merged?;
+    let noun = if args.parts.len() == 1 { "part" } else { "parts" };
+    let joining = format!("joining {} {noun}", args.parts.len());
+    let merged = progress.stage(&joining, || merge::merge(&args.parts)).0?;
     let writing = format!("writing {}", args.output.display());
     progress.stage(&writing, || merged.write(&args.output)).0?;
     if args.quiet {

@@ -16,6 +16,7 @@ import sys
 import tempfile
 import time
 import unittest
+import zipfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 FARM = ROOT / "farm"
@@ -62,28 +63,31 @@ class Farm(unittest.TestCase):
     def out(self):
         return pathlib.Path(tempfile.mkdtemp(dir=self.folder))
 
-    def unit(self, out, *words, scene=None, **options):
-        """Starts a unit."""
+    def unit(self, out, *words, changed=None, **options):
+        """Starts a unit. `changed`: variables of its environment that are not those of the film."""
         env = {
-            **os.environ, "SCENE": str(scene or self.pack), "OUT": str(out), "KDRAY": KDRAY, "OPTIONS": OPTIONS,
-            "TILES": str(TILES), "BLOCKS": str(BLOCKS), "SPP": str(SPP),
+            **os.environ, "SCENE": self.pack, "OUT": out, "KDRAY": KDRAY, "OPTIONS": OPTIONS, "TILES": TILES,
+            "BLOCKS": BLOCKS, "SPP": SPP, **(changed or {}),
         }  # fmt: skip
+        env = {name: str(value) for name, value in env.items()}
         command = [FARM / "unit", *map(str, words)]
         return subprocess.Popen(command, env=env, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, **options)
 
     def do(self, out, *words, code=0, named="", **options):
-        """Does a unit, which has to end with an exit code and a message that contains `named`."""
+        """Does a unit, which has to end with an exit code and a message that contains `named`. Returns its output."""
         unit = self.unit(out, *words, **options)
-        _, errors = unit.communicate()
+        output, errors = unit.communicate()
         self.assertEqual(unit.returncode, code, errors)
         self.assertIn(named, errors)
+        return output
 
-    def finish(self, out, frames=f"0-{FRAMES - 1}"):
+    def finish(self, out, frames=f"0-{FRAMES - 1}", changed=None):
         """Does all units one after the other. Those that are done already are left out."""
-        for tile in range(1, TILES + 1):
-            for block in range(1, BLOCKS + 1):
-                self.do(out, "render", frames, tile, block)
-        self.do(out, "merge", frames)
+        changed = changed or {}
+        for tile in range(1, changed.get("TILES", TILES) + 1):
+            for block in range(1, changed.get("BLOCKS", BLOCKS) + 1):
+                self.do(out, "render", frames, tile, block, changed=changed)
+        self.do(out, "merge", frames, changed=changed)
 
     def test_openjd(self):
         out, template = self.out(), FARM / "openjd.yaml"
@@ -96,14 +100,14 @@ class Farm(unittest.TestCase):
         summary = run(BIN / "openjd", "summary", template, *parameters).stdout
         self.assertIn(f"Total tasks: {FRAMES * TILES * BLOCKS + FRAMES}", summary)
         log = run(BIN / "openjd", "run", template, *parameters, "--step", "Merge", "--run-dependencies").stdout
-        self.assertIn("openjd_progress: 100", log)
+        self.assertIn("openjd_progress: 100.0", log)
         self.assertEqual(film(out), self.alone)
         # What fails is told to the engine.
         parameters += ["-p", "Options=--size none", "-p", f"Out={self.out()}"]
         command = [BIN / "openjd", "run", template, *parameters, "--step", "Render", "--maximum-tasks", "1"]
         failed = subprocess.run([str(word) for word in command], capture_output=True, text=True)
         self.assertNotEqual(failed.returncode, 0)
-        self.assertIn("openjd_fail: error: invalid value 'none'", failed.stdout)
+        self.assertIn("openjd_fail: invalid value 'none'", failed.stdout)
 
     def test_dask_loses_a_worker(self):
         out, addresses = self.out(), self.out()
@@ -132,11 +136,14 @@ class Farm(unittest.TestCase):
             self.assertLess(time.monotonic(), until, "it takes too long")
             time.sleep(0.02)
 
+    def duration_of_a_unit(self):
+        out, begin = self.out(), time.monotonic()
+        self.do(out, "render", "0", 1, 1)
+        return time.monotonic() - begin
+
     def test_units_that_are_killed_at_any_time(self):
         out, chance = self.out(), random.Random(1)
-        begin = time.monotonic()
-        self.do(self.out(), "render", "0", 1, 1)
-        duration = time.monotonic() - begin
+        duration = min(self.duration_of_a_unit() for _ in range(3))
         n_killed = 0
         for _ in range(100):
             words = (chance.randrange(FRAMES), chance.randint(1, TILES), chance.randint(1, BLOCKS))
@@ -182,11 +189,116 @@ class Farm(unittest.TestCase):
         changed = self.out() / "cornell.toml"
         changed.write_text(text.replace("intensity = [", "intensity = [1", 1))
         self.assertNotEqual(changed.read_text(), text)
-        self.do(out, "render", "0", 2, 1, scene=self.packed(changed))
+        # Its unit is refused. If it were not, its part would be.
+        other = {"SCENE": self.packed(changed)}
+        self.do(out, "render", "0", 2, 1, changed=other, code=2, named="SCENE is `cornell.kdpack ")
+        (out / "film.txt").unlink()
+        self.do(out, "render", "0", 2, 1, changed=other)
+        (out / "film.txt").unlink()
         self.do(out, "merge", "0", code=3, named="scene_hash")
         part.write_bytes(good)
         self.do(out, "merge", "0")
         self.assertEqual((out / "0000.exr").read_bytes(), self.alone[0])
+
+    def test_an_engine_of_open_job_description_learns_what_a_unit_does(self):
+        out, openjd = self.out(), {"PROGRESS": "openjd"}
+        output = self.do(out, "render", "5-4", 1, 1, changed=openjd, code=2)
+        self.assertEqual(output, "openjd_fail: unit: `5-4` are no frames A-B\n")
+        self.assertEqual(self.do(out, "render", "5-4", 1, 1, code=2), "")
+        one = {"TILES": 1, "BLOCKS": 1, **openjd}
+        output = self.do(out, "render", "0-2", 1, 1, changed=one)
+        self.assertTrue(output.startswith("openjd_status: frames 0-2, tile 1 of 1, block 1 of 1\n"), output)
+        self.assertTrue(output.endswith("\nopenjd_progress: 100.0\n"), output)
+        # The frames of a merge share the percents.
+        lines = self.do(out, "merge", "0-2", changed=one).splitlines()
+        told = [float(line.split()[1]) for line in lines if line.startswith("openjd_progress: ")]
+        self.assertEqual((told, sorted(set(told))), (sorted(told), [0, 33, 66, 100]))
+        output = self.do(out, "merge", "3", changed=one, code=3)
+        self.assertIn("\nopenjd_fail: ", output)
+        # A block without samples is done at once.
+        output = self.do(self.out(), "render", "0", 1, 3, changed={"BLOCKS": 3, **openjd})
+        self.assertEqual(output, "openjd_progress: 100\n")
+
+    def test_a_signal_to_the_unit_alone_ends_its_command(self):
+        chance, durations = random.Random(2), [self.duration_of_a_unit() for _ in range(3)]
+        n_ended = 0
+        for _ in range(40):
+            out = self.out()
+            unit = self.unit(out, "render", f"0-{FRAMES - 1}", 1, 1, start_new_session=True, preexec_fn=obey_signals)
+            time.sleep(chance.uniform(0, 2 * min(durations)))
+            unit.send_signal(chance.choice([signal.SIGTERM, signal.SIGINT, signal.SIGHUP]))
+            begin = time.monotonic()
+            unit.wait()
+            self.assertLess(time.monotonic() - begin, 1.0, "a unit ends within a second")
+            # All processes of the unit are in its group.
+            self.assertRaises(ProcessLookupError, os.killpg, unit.pid, 0)
+            unit.communicate()
+            self.assertEqual([*out.glob("**/.kdray-*"), *out.glob("**/.film-*")], [])
+            n_ended += unit.returncode > 128 or unit.returncode < 0
+        self.assertGreater(n_ended, 25)
+
+    def test_a_signal_just_before_the_command_starts_is_not_lost(self):
+        out, folder = self.out(), self.out()
+        # The unit makes a folder before it starts the command. This `mkdir` sends the unit a signal.
+        mkdir = folder / "mkdir"
+        mkdir.write_text("#!/bin/sh\nkill -TERM $(cut -d ' ' -f 6 /proc/$$/stat)\nexec /bin/mkdir \"$@\"\n")
+        mkdir.chmod(0o755)
+        path = {"PATH": f"{folder}:{os.environ['PATH']}"}
+        self.do(out, "render", "0", 1, 1, changed=path, code=128 + signal.SIGTERM, start_new_session=True)
+        self.assertEqual(list(out.glob("parts/*")), [])
+
+    def test_units_of_another_film_are_refused(self):
+        out = self.out()
+        other = self.out() / "other.kdpack"
+        run(KDRAY, "pack", ROOT / "scenes/lamp.toml", "--path", self.folder / "path.toml", "-o", other)
+        self.do(out, "render", "0", 1, 1)
+        description = (out / "film.txt").read_bytes()
+        for name, value in (("SPP", 64), ("TILES", 2), ("BLOCKS", 1), ("OPTIONS", "--cpu"), ("SCENE", other)):
+            words = dict(changed={name: value}, code=2, named=f"{name} is `")
+            self.do(out, "render", "1", 1, 1, **words)
+            self.do(out, "merge", "0", **words)
+        self.assertEqual((out / "film.txt").read_bytes(), description)
+        self.assertEqual(len(list(out.glob("parts/*"))), 1)
+        # A pack is the same wherever it is, and a word that is written in another way is the same.
+        copy = self.out() / self.pack.name
+        shutil.copyfile(self.pack, copy)
+        same = {"SCENE": copy, "OPTIONS": OPTIONS.replace(" ", "  ") + "\n"}
+        self.do(out, "render", "1", 1, 1, changed=same)
+        # The pack's scene may be named, as in a folder.
+        with zipfile.ZipFile(self.pack) as pack:
+            name = json.loads(pack.read("kdpack.json"))["scene"]
+        inside = {"SCENE": f"{self.pack}/{name}", "OPTIONS": f"{OPTIONS} --path path.toml"}
+        out = self.out()
+        self.do(out, "render", "1", 1, 1, changed=inside, cwd=self.folder)
+        self.assertIn(f"SCENE film.kdpack/{name} ", (out / "film.txt").read_text())
+
+    def test_one_of_many_workers_describes_the_film(self):
+        out = self.out()
+        # Half of the workers have another film: either film may be the first.
+        units = [self.unit(out, "render", "0", 1, 1, changed={"SPP": 32 + 16 * (n % 2)}) for n in range(12)]
+        errors = [unit.communicate()[1] for unit in units]
+        codes = [unit.returncode for unit in units]
+        self.assertIn(codes, ([0, 2] * 6, [2, 0] * 6), errors)
+        self.assertEqual(list(out.glob(".film-*")), [])
+        # What could not work describes no film.
+        out = self.out()
+        self.do(out, "render", "0", 1, 1, changed={"OPTIONS": "--size none"}, code=2)
+        self.do(out, "render", "0", 1, 1, changed={"SCENE": "none.kdpack"}, code=3)
+        self.do(out, "render", "0", 1, 1)
+
+    def test_options_that_a_unit_sets_are_refused(self):
+        for options, named in (
+            ("--denoise edge", "--denoise off"), ("--denoise=paper", "--denoise off"), ("--tile 1/2", "--tile"),
+            ("--denoise-threshold 1", "--denoise-threshold"), ("--spp 4", "SPP"), ("--frames=2", "--frames"),
+        ):  # fmt: skip
+            self.do(self.out(), "render", "0", 1, 1, changed={"OPTIONS": f"{OPTIONS} {options}"}, code=2, named=named)
+        for options in ("--denoise off", "--denoise=off"):
+            self.do(self.out(), "render", "0", 1, 1, changed={"OPTIONS": f"{OPTIONS} {options}"})
+        # Without blocks, a filter is no matter of the unit.
+        filtered = {"BLOCKS": 1, "OPTIONS": f"{OPTIONS} --denoise edge"}
+        self.do(self.out(), "render", "0", 1, 1, changed=filtered)
+        for name in ("TILES", "BLOCKS", "SPP"):
+            self.do(self.out(), "render", "0", 1, 1, changed={name: "a[$(date)]"}, code=2, named=name)
 
     def packed(self, scene):
         pack = scene.with_suffix(".kdpack")
@@ -194,7 +306,7 @@ class Farm(unittest.TestCase):
         return pack
 
     def test_exit_codes_tell_whether_to_try_again(self):
-        self.do(self.out(), "render", "0", 1, 1, scene="none.kdpack", code=3, named="none.kdpack")
+        self.do(self.out(), "render", "0", 1, 1, changed={"SCENE": "none.kdpack"}, code=3, named="none.kdpack")
         for words in (("render", "9-0", 1, 1), ("merge", "9-0"), ("merge", "0-4x2"), ("merge", "abc"), ("merge",)):
             self.do(self.out(), *words, code=2, named="are no frames A-B")
         self.do(self.out(), "render", "0", 5, 1, code=2, named="there is no tile 5 of 4")
@@ -203,7 +315,7 @@ class Farm(unittest.TestCase):
         unwritable = self.out()
         (unwritable / "units.tsv").symlink_to("/dev/full")
         self.do(unwritable, "render", "0", 1, 1)
-        self.do(unwritable, "render", "0", 1, 2, scene="none.kdpack", code=3, named="none.kdpack")
+        self.do(unwritable, "render", "0", 1, 2, changed={"SCENE": "none.kdpack"}, code=3, named="none.kdpack")
         # The folder is gone, or the disk is full.
         gone = self.out()
         (gone / "parts").write_text("no folder")
@@ -219,13 +331,19 @@ class Farm(unittest.TestCase):
         self.finish(out, "0")
         (out / "parts/t1of4_b1of2.0000.exr").unlink()
         self.do(out, "render", "0", 1, 1)
-        self.do(out, "render", "0", 1, 1, scene="none.kdpack", code=3)
+        self.do(out, "render", "0", 1, 1, changed={"SCENE": "none.kdpack"}, code=3)
         text = run(sys.executable, FARM / "report.py", out, "--json", out / "report.json").stdout
         report = json.loads((out / "report.json").read_text())
         self.assertEqual(len(report["units"]), TILES * BLOCKS + 1)
         self.assertEqual(report["done_again"], {"frames 0 tile 1/4 block 1/2": 2})
         self.assertEqual(report["failed"], {"frames 0 tile 1/4 block 1/2": 1})
         self.assertIn(f"{TILES * BLOCKS + 1} units", text)
+
+
+def obey_signals():
+    """Lets a signal end a process that is about to start, even if a shell has started the tests in the background."""
+    for name in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+        signal.signal(name, signal.SIG_DFL)
 
 
 def end(process):
