@@ -41,6 +41,23 @@ def run(*command, **options):
     return subprocess.run([str(word) for word in command], capture_output=True, text=True, check=True, **options)
 
 
+def header_and_pixels(path):
+    """The attributes of a picture by their names, and all bytes after them and after the table of offsets."""
+    data, at, attributes = path.read_bytes(), 8, {}
+    while data[at]:
+        (name, kind, rest) = data[at : at + 600].split(b"\0", 2)
+        begin = at + len(name) + len(kind) + 6
+        end = begin + int.from_bytes(data[begin - 4 : begin], "little")
+        attributes[name.decode()] = data[begin:end]
+        at = end
+    return attributes, data[int.from_bytes(data[at + 1 : at + 9], "little") :]
+
+
+def record(path):
+    """What a picture says of itself."""
+    return json.loads(header_and_pixels(path)[0]["kdray"])
+
+
 def film(folder):
     """The bytes of all frames, in order."""
     return [(folder / f"{frame:04}.exr").read_bytes() for frame in range(FRAMES)]
@@ -286,6 +303,47 @@ class Farm(unittest.TestCase):
         self.do(out, "render", "0", 1, 1, changed={"SCENE": "none.kdpack"}, code=3)
         self.do(out, "render", "0", 1, 1)
 
+    def test_the_methods_that_workers_choose_change_no_pixel(self):
+        """Workers may find other trees and traversals quicker than each other, so these must not change a bit."""
+        methods = ["--traversal stack", "--traversal ropes", "--traversal mask", "--build fast", "--build best"]
+        for integrator in ("path", "whitted"):
+            wanted, records = None, set()
+            for method in [*methods, "--accel grid2", "--primary auto" if integrator == "path" else "--primary trace"]:
+                out, options = self.out(), f"--size 40x30 --cpu --threads 1 -q --integrator {integrator} {method}"
+                self.do(out, "render", "0", 2, 1, changed={"BLOCKS": 1, "SPP": 2, "OPTIONS": options})
+                part = out / "parts/t2of4_b1of1.0000.exr"
+                pixels = header_and_pixels(part)[1]
+                wanted = wanted or pixels
+                self.assertEqual(pixels, wanted, method)
+                records.add(record(part)["accel"])
+            self.assertGreater(len(records), 4, "the methods were taken")
+
+    def test_primary_rays_are_found_in_one_way_by_all_workers(self):
+        alone = self.out() / "alone.exr"
+        whitted = "--size 40x30 --integrator whitted --cpu --threads 1 -q"
+        run(KDRAY, "render", self.pack, *whitted.split(), "-o", alone)
+        self.assertTrue(record(alone)["whole"]["is_rasterized"], "the rule would rasterize so few triangles")
+        for option, is_rasterized in (("", False), ("--primary auto", True), ("--primary=raster", True)):
+            out = self.out()
+            self.do(out, "render", "0", 1, 1, changed={"BLOCKS": 1, "SPP": 1, "OPTIONS": f"{whitted} {option}"})
+            part = record(out / "parts/t1of4_b1of1.0000.exr")
+            self.assertEqual(part["whole"]["is_rasterized"], is_rasterized, option)
+
+    def test_parts_have_the_exposure_of_the_whole(self):
+        scene = self.out() / "metered.toml"
+        text = (ROOT / "scenes/cornell.toml").read_text()
+        metered = text.replace("[render]", "[render]\nmetered = true", 1).replace("8.6, 8.0, 6.9", "860, 800, 690")
+        scene.write_text(metered)
+        out, pack = self.out(), self.packed(scene)
+        self.finish(out, "0-1", changed={"SCENE": pack, "TILES": 2, "BLOCKS": 2})
+        exposures = {record(part)["whole"]["exposure"] for part in [*out.glob("parts/*.exr"), *out.glob("*.exr")]}
+        alone = self.out()
+        options = [*OPTIONS.split(), "--spp", SPP, "--denoise", "off", "--frames", "0-1"]
+        run(KDRAY, "render", pack, *options, "-o", alone / "####.exr")
+        self.assertEqual(exposures, {record(alone / "0000.exr")["whole"]["exposure"]})
+        self.assertNotEqual(exposures, {1.0})
+        self.assertEqual((out / "0001.exr").read_bytes(), (alone / "0001.exr").read_bytes())
+
     def test_options_that_a_unit_sets_are_refused(self):
         for options, named in (
             ("--denoise edge", "--denoise off"), ("--denoise=paper", "--denoise off"), ("--tile 1/2", "--tile"),
@@ -299,6 +357,48 @@ class Farm(unittest.TestCase):
         self.do(self.out(), "render", "0", 1, 1, changed=filtered)
         for name in ("TILES", "BLOCKS", "SPP"):
             self.do(self.out(), "render", "0", 1, 1, changed={name: "a[$(date)]"}, code=2, named=name)
+
+    def on_another_worker(self, options):
+        """A command that calls kdray with further options for rendering."""
+        command = self.out() / "kdray"
+        command.write_text(f'#!/bin/sh\n[ "$1" != render ] || set -- "$@" {options}\nexec "{KDRAY}" "$@"\n')
+        command.chmod(0o755)
+        return command
+
+    def test_parts_of_several_devices_are_named(self):
+        """Workers of two kinds: the CPU and a Vulkan driver."""
+        out = self.out()
+        changed = {"TILES": 2, "BLOCKS": 1, "OPTIONS": "--size 40x30 --integrator path --max-depth 3"}
+        self.do(out, "render", "0", 1, 1, changed={**changed, "KDRAY": self.on_another_worker("--cpu")})
+        self.do(out, "render", "0", 2, 1, changed=changed)
+        self.do(out, "merge", "0", changed=changed, named="note: the parts come from several devices")
+        self.assertIn("CPU; ", record(out / "0000.exr")["device"])
+
+    def test_parts_of_several_versions_are_refused(self):
+        out, changed = self.out(), {"TILES": 2, "BLOCKS": 1}
+        self.do(out, "render", "0", 1, 1, changed=changed)
+        self.do(out, "render", "0", 2, 1, changed=changed)
+        self.do(out, "merge", "0", changed=changed)
+        part = out / "parts/t2of2_b1of1.0000.exr"
+        version = f'"version":"{record(part)["whole"]["version"]}"'
+        other = version[:-2] + ("2" if version[-2] != "2" else "3") + '"'
+        good = part.read_bytes()
+        self.assertEqual(good.count(version.encode()), 1)
+        part.write_bytes(good.replace(version.encode(), other.encode()))
+        self.do(out, "merge", "0", changed=changed, code=3, named="has written it, and this is kdray")
+
+    def test_the_folder_is_removed_while_a_unit_works(self):
+        out = self.out() / "out"
+        unit = self.unit(out, "render", "0-9", 1, 1, changed={"SPP": 4096})
+        self.wait_for(lambda: list(out.glob("parts/*.exr")))
+        # Until nothing is written any more.
+        while out.exists():
+            shutil.rmtree(out, ignore_errors=True)
+        _, errors = unit.communicate()
+        self.assertEqual(unit.returncode, 5, errors)
+        self.assertIn("parts", errors)
+        self.assertFalse(out.exists())
+        self.do(out, "render", "0", 1, 1)
 
     def packed(self, scene):
         pack = scene.with_suffix(".kdpack")
@@ -332,12 +432,53 @@ class Farm(unittest.TestCase):
         (out / "parts/t1of4_b1of2.0000.exr").unlink()
         self.do(out, "render", "0", 1, 1)
         self.do(out, "render", "0", 1, 1, changed={"SCENE": "none.kdpack"}, code=3)
-        text = run(sys.executable, FARM / "report.py", out, "--json", out / "report.json").stdout
-        report = json.loads((out / "report.json").read_text())
+        report, text = self.report(out)
         self.assertEqual(len(report["units"]), TILES * BLOCKS + 1)
         self.assertEqual(report["done_again"], {"frames 0 tile 1/4 block 1/2": 2})
         self.assertEqual(report["failed"], {"frames 0 tile 1/4 block 1/2": 1})
         self.assertIn(f"{TILES * BLOCKS + 1} units", text)
+
+    def report(self, out):
+        text = run(sys.executable, FARM / "report.py", out, "--json", out / "report.json").stdout
+        return json.loads((out / "report.json").read_text()), text
+
+    def test_a_run_that_finds_its_parts_is_no_time_of_a_unit(self):
+        out = self.out()
+        lines = [
+            "100.0\t110.0\ta\t0\tframes 0 tile 1/1 block 1/1",
+            # The parts were there. Also, a run that failed late took longer than the one that did the work.
+            "120.0\t120.1\tb\t0\tframes 0 tile 1/1 block 1/1",
+            "130.0\t190.0\tb\t143\tframes 0 tile 1/1 block 1/1",
+            "100.0\t112.0\tb\t0\tframes 1 tile 1/1 block 1/1",
+            "100.0\t126.0\tb\t0\tframes 2 tile 1/1 block 1/1",
+            "200.0\t200.5\ta\t0\tmerge 0000",
+        ]
+        (out / "units.tsv").write_text("\n".join(lines) + "\n")
+        report, text = self.report(out)
+        seconds = {"frames 0 tile 1/1 block 1/1": 10, "frames 1 tile 1/1 block 1/1": 12, "merge 0000": 0.5}
+        self.assertEqual(report["units"], {**seconds, "frames 2 tile 1/1 block 1/1": 26})
+        self.assertEqual(report["median_s"], {"frames": 12, "merge": 0.5})
+        self.assertEqual(report["stragglers"], ["frames 2 tile 1/1 block 1/1"])
+        self.assertEqual(report["failed"], {"frames 0 tile 1/1 block 1/1": 1})
+        self.assertEqual((report["elapsed_s"], report["malformed_lines"]), (100.5, 0))
+        self.assertNotIn("malformed", text)
+
+    def test_lines_that_a_killed_worker_has_cut_are_counted(self):
+        out = self.out()
+        good = "100.0\t110.0\ta\t0\tframes 0 tile 1/1 block 1/1"
+        bad = ["100.0", "1.0\t2.0\ta\t0", "x\t2.0\ta\t0\tmerge 1", "1.0\t2.0\ta\t\tmerge 1", "1\tnan\ta\t0\tmerge 2"]
+        bad += [good + "100.0\t110.0\ta\t0\tmerge 0001", "3.0\t2.0\ta\t0\tmerge 0001", "1.0\t2.0\ta\t0\t"]
+        (out / "units.tsv").write_bytes("\n".join([*bad, "", good, "\0\0"]).encode() + b"\xff")
+        report, text = self.report(out)
+        self.assertEqual((report["units"], report["busy_s"]), ({"frames 0 tile 1/1 block 1/1": 10}, 10))
+        self.assertEqual(report["malformed_lines"], len(bad) + 1)
+        self.assertIn(f"{len(bad) + 1} malformed lines", text)
+        # A film that has no units yet, and one that has no file.
+        (out / "units.tsv").write_text("")
+        self.assertIn("0 units", self.report(out)[1])
+        missing = subprocess.run([sys.executable, FARM / "report.py", self.out()], capture_output=True, text=True)
+        self.assertEqual(missing.returncode, 3)
+        self.assertRegex(missing.stderr, r"^error: .*units.tsv.*\n$")
 
 
 def obey_signals():
