@@ -17,7 +17,7 @@ import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests/farm"))
-import farm  # noqa: E402
+import film  # noqa: E402
 
 CONFIGURATION = """
 ClusterName=kdray
@@ -98,7 +98,7 @@ class Cluster:
 
     def stop(self):
         for daemon in reversed(self.daemons):
-            farm.end(daemon)
+            film.end(daemon)
 
 
 def requeue_a_running_task(cluster, job):
@@ -114,8 +114,8 @@ def requeue_a_running_task(cluster, job):
 
 def submit(out, *words, environment=None):
     """Submits a film, and returns how that ends."""
-    command = [ROOT / "farm/slurm/submit", farm.Farm.pack, out, *words]
-    environment = {**os.environ, "KDRAY": farm.KDRAY, **(environment or {})}
+    command = [ROOT / "farm/slurm/submit", film.FilmCase.pack, out, *words]
+    environment = {**os.environ, "KDRAY": film.KDRAY, **(environment or {})}
     return subprocess.run([*map(str, command)], env=environment, capture_output=True, text=True)
 
 
@@ -128,9 +128,9 @@ def a_film(cluster, folder):
     # Slurm must not take a part of the name for the number of a job.
     out, kdray = folder / "out of 100%j", folder / "kdray"
     failure = f"[ $1 = render ] && mkdir {folder}/failed 2>/dev/null && exit 4"
-    kdray.write_text(f'#!/bin/sh\n{failure}\nexec {farm.KDRAY} "$@"\n')
+    kdray.write_text(f'#!/bin/sh\n{failure}\nexec {film.KDRAY} "$@"\n')
     kdray.chmod(0o755)
-    words = (f"0-{farm.FRAMES - 1}", farm.TILES, farm.BLOCKS, farm.SPP, farm.OPTIONS)
+    words = (f"0-{film.FRAMES - 1}", film.TILES, film.BLOCKS, film.SPP, film.OPTIONS)
     done = submit(out, *words, environment={"CHUNK": "3", "KDRAY": str(kdray)})
     assert done.returncode == 0, done.stderr
     render, merge = done.stdout.split()
@@ -138,14 +138,14 @@ def a_film(cluster, folder):
     cluster.wait_for(lambda: len(list(out.glob("parts/*.exr"))) >= 5)
     cluster.wait_for(lambda: requeue_a_running_task(cluster, render))
     wait_for_jobs(cluster, [render, merge])
-    assert farm.film(out) == farm.Farm.alone, "the film differs"
+    assert film.film(out) == film.FilmCase.alone, "the film differs"
     codes = [line.split("\t")[3] for line in (out / "units.tsv").read_text().splitlines()]
     assert codes.count("4") == 1, codes
     logs = [path.read_text() for path in (out / "log").iterdir()]
-    n_tasks = -(-farm.FRAMES // 3) * farm.TILES * farm.BLOCKS
+    n_tasks = -(-film.FRAMES // 3) * film.TILES * film.BLOCKS
     assert len(logs) == n_tasks + 1, [path.name for path in (out / "log").iterdir()]
     assert sum("the task is done again, try 2 of 4" in log for log in logs) == 1, logs
-    print(f"{farm.FRAMES} frames in {n_tasks} tasks: the film of a single process")
+    print(f"{film.FRAMES} frames in {n_tasks} tasks: the film of a single process")
     subprocess.run([sys.executable, ROOT / "farm/report.py", out], check=True)
 
 
@@ -187,7 +187,7 @@ def main():
     folder = pathlib.Path(tempfile.mkdtemp(prefix="kdray-slurm-"))
     cluster = None
     try:
-        farm.Farm.setUpClass()
+        film.FilmCase.setUpClass()
         cluster = Cluster(folder)
         wrong_calls(folder)
         films_that_fail(cluster, folder)
@@ -196,7 +196,7 @@ def main():
         if cluster:
             cluster.stop()
         shutil.rmtree(folder, ignore_errors=True)
-        farm.Farm.doClassCleanups()
+        film.FilmCase.doClassCleanups()
 
 
 if __name__ == "__main__":
