@@ -24,6 +24,7 @@ use super::{
     file_roles::require_ending,
     load_args::LoadArgs,
     look_args::LookArgs,
+    openjd::ProgressKind,
     or_auto::OrAuto,
     picture_args::{
         PictureArgs, accel_help, accel_long_help, build_help, build_long_help, check_accel, listed, traversal_help,
@@ -31,6 +32,15 @@ use super::{
     },
 };
 
+const PROGRESS: &str = "How the progress is shown: auto, none, or openjd for engines of Open Job Description [default: \
+                        auto]";
+const PROGRESS_LONG: &str = "How the progress is shown [default: auto]
+
+- auto: on standard error, as a bar or as lines, without --quiet
+- none: not at all; the report and notes remain
+- openjd: on standard output, as lines that engines of Open Job Description read: openjd_progress, openjd_status, and \
+                             openjd_fail if the command fails; also with --quiet
+- openjd:A-B: the same for one of several commands of a task, as percents A to B of the task";
 const AOV: &str = "Layers of each pixel to write into an .exr, separated by commas";
 
 /// Ray tracing by depth-first kd-tree traversal, in Vulkan compute.
@@ -146,6 +156,9 @@ pub struct RenderArgs {
     /// Run under the Khronos validation layer, and fail if it reports anything
     #[arg(long)]
     pub validate: bool,
+    #[arg(long, value_name = "KIND", help = PROGRESS, long_help = PROGRESS_LONG)]
+    #[arg(default_value = "auto", hide_default_value = true)]
+    pub progress: ProgressKind,
     /// Print errors only
     #[arg(short, long)]
     pub quiet: bool,
@@ -260,6 +273,9 @@ pub struct MergeArgs {
     /// Picture to write: .png, or .exr for linear radiance
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
+    #[arg(long, value_name = "KIND", help = PROGRESS, long_help = PROGRESS_LONG)]
+    #[arg(default_value = "auto", hide_default_value = true)]
+    pub progress: ProgressKind,
     /// Print errors only
     #[arg(short, long)]
     pub quiet: bool,

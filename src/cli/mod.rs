@@ -1,6 +1,7 @@
 //! The command line: arguments, progress, reports and exit codes.
 //!
-//! Reports go to standard output. Progress, notes and errors go to standard error.
+//! Reports go to standard output. Progress, notes and errors go to standard error, but progress for an engine goes to
+//! standard output.
 
 mod args;
 #[cfg(feature = "bench")]
@@ -18,6 +19,7 @@ mod load_args;
 mod log;
 mod look_args;
 mod merge;
+mod openjd;
 mod or_auto;
 mod pack;
 mod picture_args;
@@ -44,13 +46,16 @@ use args::{Args, Command};
 use clap::Parser;
 use error::CliError;
 use kdray::util::text::{escape_controls, one_line};
+use openjd::ProgressKind;
 
 /// Runs the command that `arguments` describe. The first argument is the program's name.
 pub fn main(arguments: impl Iterator<Item = OsString>) -> ExitCode {
     #[cfg(unix)]
     signals::handle();
-    let result = match Args::try_parse_from(arguments) {
-        Ok(args) => run(args),
+    let words: Vec<_> = arguments.collect();
+    let progress = ProgressKind::of_words(&words);
+    let result = match Args::try_parse_from(words) {
+        Ok(args) => run(args).inspect(|()| progress.end(None)),
         // clap returns the texts of --help and --version as errors that belong on standard output.
         Err(request) if !request.use_stderr() => print(&request.render().to_string()),
         Err(mistake) => Err(CliError::from(mistake)),
@@ -59,6 +64,7 @@ pub fn main(arguments: impl Iterator<Item = OsString>) -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             print_line("error", &error.to_string());
+            progress.end(Some(&error.to_string()));
             ExitCode::from(error.exit_code())
         }
     }

@@ -1,4 +1,5 @@
-//! Progress of a command on standard error: a bar on a terminal, elsewhere one line per stage.
+//! Progress of a command: on standard error a bar on a terminal, elsewhere one line per stage; or on standard output
+//! lines for an engine.
 
 use std::{
     io::{self, IsTerminal},
@@ -13,70 +14,139 @@ use kdray::util::{
     text::one_line,
 };
 
-use super::{log, print_line, spans::Spans};
+use super::{
+    log,
+    openjd::{OpenJd, ProgressKind},
+    print_line,
+    spans::Spans,
+};
 
 /// Number of the bar's positions per stage.
 const BAR_STEPS: u64 = 1000;
 
-/// Shows the stages of a command on standard error.
-pub enum Progress {
-    Silent,
+/// Shows the stages of a command.
+pub struct Progress {
+    shown: Shown,
+    /// Whether notes are left out.
+    quiet: bool,
+}
+
+/// Where the progress is shown.
+enum Shown {
+    Nowhere,
+    /// One line per stage.
     Lines,
+    Meter(Meter),
+}
+
+/// Shows how much of the present stage is done.
+#[derive(Clone)]
+enum Meter {
     Bar(ProgressBar),
+    OpenJd(Arc<OpenJd>),
+}
+
+impl Meter {
+    /// Returns the position of the bar, in steps of [`BAR_STEPS`] a stage.
+    fn position(&self) -> u64 {
+        match self {
+            Self::Bar(bar) => bar.position(),
+            Self::OpenJd(openjd) => (openjd.stages() * BAR_STEPS as f64).round() as u64,
+        }
+    }
+
+    fn set_position(&self, position: u64) {
+        match self {
+            Self::Bar(bar) => bar.set_position(position),
+            Self::OpenJd(openjd) => openjd.set_stages(position as f64 / BAR_STEPS as f64),
+        }
+    }
+
+    /// Shows what the command does now, at the beginning of a stage.
+    fn begin_stage(&self, message: &str) {
+        match self {
+            Self::Bar(bar) => bar.set_message(one_line(message)),
+            Self::OpenJd(openjd) => openjd.status(message),
+        }
+    }
+
+    /// Shows the message of a stage with what is left of it. An engine computes the time that is left by itself.
+    fn set_message(&self, message: String) {
+        if let Self::Bar(bar) = self {
+            bar.set_message(message);
+        }
+    }
 }
 
 impl Progress {
     /// Shows the progress of a command that has `n_stages` stages. The library's warnings and errors appear above the
     /// bar, or as lines of their own.
     pub fn new(quiet: bool, n_stages: u64) -> Self {
-        Self::with_spans(quiet, n_stages, None)
+        Self { shown: Self::for_people(quiet, n_stages), quiet }.logging(None)
     }
 
-    /// Does what [`Progress::new`] does, and also collects the library's tracing spans in `spans`.
-    pub fn with_spans(quiet: bool, n_stages: u64, spans: Option<&Spans>) -> Self {
-        let progress = match (quiet, io::stderr().is_terminal()) {
-            (true, _) => Self::Silent,
-            (false, false) => Self::Lines,
-            (false, true) => Self::bar(n_stages),
+    /// Shows the progress of a command as the user wants it. `shares`: the share of the work that each stage is. Also
+    /// collects the library's tracing spans in `spans`.
+    pub fn of_kind(kind: ProgressKind, quiet: bool, shares: &'static [f64], spans: Option<&Spans>) -> Self {
+        let shown = match kind {
+            ProgressKind::Auto => Self::for_people(quiet, shares.len() as u64),
+            ProgressKind::OpenJd(percents) => Shown::Meter(Meter::OpenJd(Arc::new(OpenJd::new(percents, shares)))),
+            ProgressKind::None => Shown::Nowhere,
         };
-        match &progress {
-            Self::Bar(bar) => log::start(quiet, Some(bar), spans),
-            Self::Silent | Self::Lines => log::start(quiet, None, spans),
-        }
-        progress
+        Self { shown, quiet }.logging(spans)
     }
 
-    fn bar(n_stages: u64) -> Self {
+    fn for_people(quiet: bool, n_stages: u64) -> Shown {
+        match (quiet, io::stderr().is_terminal()) {
+            (true, _) => Shown::Nowhere,
+            (false, false) => Shown::Lines,
+            (false, true) => Shown::Meter(Meter::Bar(Self::bar(n_stages))),
+        }
+    }
+
+    /// Starts to print the library's events.
+    fn logging(self, spans: Option<&Spans>) -> Self {
+        let bar = if let Shown::Meter(Meter::Bar(bar)) = &self.shown { Some(bar) } else { None };
+        log::start(self.quiet, bar, spans);
+        self
+    }
+
+    fn bar(n_stages: u64) -> ProgressBar {
         let style = ProgressStyle::with_template("{bar:20} {msg} {elapsed}").expect("a valid template");
         let bar = ProgressBar::new(n_stages * BAR_STEPS).with_style(style);
         bar.enable_steady_tick(Duration::from_millis(100));
-        Self::Bar(bar)
+        bar
+    }
+
+    /// Returns what shows the progress within a stage, if anything does.
+    fn meter(&self) -> Option<&Meter> {
+        if let Shown::Meter(meter) = &self.shown { Some(meter) } else { None }
     }
 
     /// Runs the work of a stage. Returns its result and its duration in milliseconds.
     pub fn stage<T>(&self, message: &str, work: impl FnOnce() -> T) -> (T, f64) {
-        match self {
-            Self::Silent => {}
-            Self::Lines => print_line("kdray", message),
-            Self::Bar(bar) => bar.set_message(one_line(message)),
+        match &self.shown {
+            Shown::Nowhere => {}
+            Shown::Lines => print_line("kdray", message),
+            Shown::Meter(meter) => meter.begin_stage(message),
         }
         let start = Instant::now();
         let begin = self.position();
         let made = work();
-        if let Self::Bar(bar) = self {
-            bar.set_position(begin + BAR_STEPS);
+        if let Some(meter) = self.meter() {
+            meter.set_position(begin + BAR_STEPS);
         }
         (made, start.elapsed().as_secs_f64() * 1e3)
     }
 
     /// Returns the observer of a stage that consists of pieces of `work`, which share its part of the bar. It is none
-    /// without a bar.
+    /// if nothing shows the progress within a stage.
     pub fn observer(&self, message: &str, work: &'static [Work]) -> progress::Progress {
-        let Self::Bar(bar) = self else { return progress::Progress::default() };
+        let Some(meter) = self.meter() else { return progress::Progress::default() };
         progress::Progress::to(Arc::new(StageObserver {
-            bar: bar.clone(),
+            meter: meter.clone(),
             message: one_line(message),
-            begin: bar.position(),
+            begin: meter.position(),
             work,
             state: Mutex::new(StageState { present: None, shares: vec![0.0; work.len()] }),
         }))
@@ -84,22 +154,22 @@ impl Progress {
 
     /// Returns the bar's position, or 0 without a bar.
     fn position(&self) -> u64 {
-        if let Self::Bar(bar) = self { bar.position() } else { 0 }
+        self.meter().map_or(0, Meter::position)
     }
 
     /// Prints a note: something that the user should know but need not act on.
     pub fn note(&self, message: &str) {
-        match self {
-            Self::Silent => {}
-            Self::Lines => print_line("note", message),
-            Self::Bar(bar) => bar.suspend(|| print_line("note", message)),
+        match &self.shown {
+            _ if self.quiet => {}
+            Shown::Meter(Meter::Bar(bar)) => bar.suspend(|| print_line("note", message)),
+            _ => print_line("note", message),
         }
     }
 }
 
 /// Moves the bar while the library works on a stage.
 struct StageObserver {
-    bar: ProgressBar,
+    meter: Meter,
     message: String,
     /// Position of the bar when the stage began.
     begin: u64,
@@ -128,13 +198,13 @@ impl Observer for StageObserver {
         state.present = Some((ix, begin, share));
         state.shares[ix] = state.shares[ix].max(share);
         let done = state.shares.iter().sum::<f32>() / self.work.len() as f32;
-        self.bar.set_position(self.begin + (done * BAR_STEPS as f32) as u64);
+        self.meter.set_position(self.begin + (done * BAR_STEPS as f32) as u64);
         let name = match work {
             Work::Reading | Work::Building => "",
             Work::Images => " images",
         };
         let left = left_text(time_left(begin.elapsed(), share.into()));
-        self.bar.set_message(format!("{}:{name} {:.0} %, {left} left", self.message, 100.0 * share));
+        self.meter.set_message(format!("{}:{name} {:.0} %, {left} left", self.message, 100.0 * share));
     }
 }
 
@@ -160,7 +230,7 @@ impl Progress {
     /// Returns a counter of steps that shows the stage's progress and the time left. `message` names the stage.
     pub fn steps(&self, message: &str, n_steps: u32) -> StepProgress<'_> {
         let (message, start) = (message.to_owned(), Instant::now());
-        let (begin, shows_parts) = (self.position(), matches!(self, Self::Bar(_)));
+        let (begin, shows_parts) = (self.position(), matches!(self.shown, Shown::Meter(Meter::Bar(_))));
         StepProgress {
             progress: self,
             message,
@@ -191,28 +261,28 @@ impl StepProgress<'_> {
         if self.n_done >= self.n_steps {
             return;
         }
-        match self.progress {
-            Progress::Silent => {}
-            Progress::Lines if self.last_line.elapsed() >= PAUSE => {
+        match &self.progress.shown {
+            Shown::Nowhere => {}
+            Shown::Lines if self.last_line.elapsed() >= PAUSE => {
                 self.last_line = Instant::now();
                 print_line("kdray", &self.text());
             }
-            Progress::Lines => {}
-            Progress::Bar(bar) => self.move_bar(bar),
+            Shown::Lines => {}
+            Shown::Meter(meter) => self.move_meter(meter),
         }
     }
 
     /// Notes that a share of the current step is done, 0 to 1.
     pub fn part(&mut self, share: f32) {
         self.part = share.clamp(0.0, 1.0);
-        if let Progress::Bar(bar) = self.progress {
-            self.move_bar(bar);
+        if let Some(meter) = self.progress.meter() {
+            self.move_meter(meter);
         }
     }
 
-    fn move_bar(&self, bar: &ProgressBar) {
-        bar.set_position(self.begin + (self.share() * BAR_STEPS as f64) as u64);
-        bar.set_message(self.text());
+    fn move_meter(&self, meter: &Meter) {
+        meter.set_position(self.begin + (self.share() * BAR_STEPS as f64) as u64);
+        meter.set_message(self.text());
     }
 
     /// Returns the finished share of the stage, 0 to 1.
@@ -252,7 +322,7 @@ fn left_text(left: Duration) -> String {
 
 impl Drop for Progress {
     fn drop(&mut self) {
-        if let Self::Bar(bar) = self {
+        if let Shown::Meter(Meter::Bar(bar)) = &self.shown {
             bar.finish_and_clear();
         }
     }
@@ -262,12 +332,16 @@ impl Drop for Progress {
 mod tests {
     use super::*;
 
+    fn shown(shown: Shown) -> Progress {
+        Progress { shown, quiet: false }
+    }
+
     #[test]
     fn what_is_left_takes_as_long_as_what_is_done() {
         assert_eq!(time_left(Duration::from_secs(3), 0.25), Duration::from_secs(9));
         assert_eq!(time_left(Duration::from_secs(3), 1.0), Duration::ZERO);
         assert_eq!(time_left(Duration::from_secs(3), 0.0), Duration::ZERO);
-        let progress = Progress::Silent;
+        let progress = shown(Shown::Nowhere);
         let mut steps = progress.steps("rendering", 3);
         steps.step();
         assert!(steps.text().starts_with("rendering: 1 of 3, ") && steps.text().ends_with(" left"), "{}", steps.text());
@@ -280,7 +354,7 @@ mod tests {
     fn the_bar_moves_while_the_library_works() {
         let bar = ProgressBar::hidden();
         bar.set_length(3 * BAR_STEPS);
-        let progress = Progress::Bar(bar.clone());
+        let progress = shown(Shown::Meter(Meter::Bar(bar.clone())));
         progress.stage("first", || ());
         progress.stage("loading x", || {
             let observer = progress.observer("loading x", &[Work::Reading, Work::Images]);
@@ -302,14 +376,14 @@ mod tests {
             assert_eq!(bar.position(), BAR_STEPS + BAR_STEPS * 3 / 4);
         });
         assert_eq!(bar.position(), 2 * BAR_STEPS);
-        assert_eq!(Progress::Lines.observer("x", &[Work::Reading]), progress::Progress::default());
+        assert_eq!(shown(Shown::Lines).observer("x", &[Work::Reading]), progress::Progress::default());
     }
 
     #[test]
     fn the_bar_moves_within_a_step() {
         let bar = ProgressBar::hidden();
         bar.set_length(3 * BAR_STEPS);
-        let progress = Progress::Bar(bar.clone());
+        let progress = shown(Shown::Meter(Meter::Bar(bar.clone())));
         progress.stage("loading", || ());
         progress.stage("rendering", || {
             let mut steps = progress.steps("rendering", 2);

@@ -40,6 +40,9 @@ use super::{
     trace::trace_json,
 };
 
+/// What an engine is told of the shares of the work: loading, building, and rendering, which takes longest in films.
+const SHARES: [f64; 3] = [0.05, 0.05, 0.9];
+
 /// Runs `kdray render`: loads the scene, builds its structure, renders, writes and reports. Arguments, files and
 /// memory are checked before the work that an error would waste.
 pub fn run(args: RenderArgs) -> Result<(), CliError> {
@@ -50,7 +53,8 @@ pub fn run(args: RenderArgs) -> Result<(), CliError> {
     set_threads(args.threads)?;
 
     let (begun_at, spans) = (Instant::now(), Spans::default());
-    let progress = Progress::with_spans(args.quiet, 3, args.trace.is_some().then_some(&spans));
+    let spans_of_trace = args.trace.is_some().then_some(&spans);
+    let progress = Progress::of_kind(args.progress, args.quiet, &SHARES, spans_of_trace);
     let path = args.path.as_deref().map(NamedPath::load).transpose()?;
     let mut views = views(args, path.as_ref(), roles, &progress)?;
     if views.is_empty() {
@@ -134,7 +138,7 @@ pub fn run(args: RenderArgs) -> Result<(), CliError> {
         output::write(path, &report.json())?;
     }
     if !args.quiet {
-        print(&report.text())?;
+        print(&args.progress.report(&report.text()))?;
     }
     contexts.iter().try_for_each(|context| report_validation(context))
 }
