@@ -609,7 +609,7 @@ struct Segment {
 #define MOST_SAMPLES_LOG2 4u
 // Side of a noise tile, which gets samples until its noise is low (pixels). A multiple of `TILE_SIZE`.
 #define NOISE_TILE_SIZE 16u
-// The most noise tiles that are drawn together. Their places fill the smallest uniform buffer that a device may have.
+// The most noise tiles that are drawn together. Their words fill the smallest uniform buffer that a device may have.
 #define MOST_NOISE_TILES 4096u
 // `Frame.window_x` if the window is a column of noise tiles (noise_tiles.glsl).
 #define WINDOW_OF_TILES 0xffffffffu
@@ -661,7 +661,7 @@ struct Hit {
 // - `queue_capacity`: rays that the ray queue has room for.
 // - `picture_width`, `picture_height`: of the whole picture (pixels).
 // - `window_x`, `window_y`: the picture's pixel at which the window begins. Of paths, `window_x` can also be
-//   `WINDOW_OF_TILES`.
+//   `WINDOW_OF_TILES`, and `window_y` is the number of samples that each tile gets then.
 // - `sample_x`, `sample_y`: position of the frame's sample in each pixel (pixels from its upper left corner).
 // - `n_samples`: samples of each pixel so far, including this frame's.
 // - `n_lanes`: lanes of the device, which are shared out if there are fewer rays. 0: each ray gets one lane.
@@ -1227,7 +1227,7 @@ struct GridSort {
 // A vec4 for each path: its radiance when the last layer of light was complete. Empty unless the picture has layers of
 // light.
 #define BIND_PATH_SNAPSHOTS 37u
-// The places of `MOST_NOISE_TILES` noise tiles, a word each (noise_tiles.glsl).
+// A word for each of `MOST_NOISE_TILES` noise tiles (noise_tiles.glsl).
 #define BIND_NOISE_TILES 38u
 
 // The scene's arrays as texels: the binding of each is this plus its own. All other bindings are below it.

@@ -24,7 +24,7 @@ uvec2 pixel_of_path(uint path_ix) {
 
 // What the random numbers of a path depend on. pixel: the window's pixel.
 SampleKey key_of_path(uint path_ix, uvec2 pixel) {
-    return sample_key(picture_pixel_of(pixel), frame.first_sample + path_ix / batch.n_pixels);
+    return sample_key(picture_pixel_of(pixel), first_sample_of(pixel) + path_ix / batch.n_pixels);
 }
 
 #endif

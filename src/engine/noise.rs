@@ -3,7 +3,8 @@
 //! All tiles of the picture get 16 samples of each pixel, then 16 more, then as many again as they have, until their
 //! noise is low enough. A tile whose noise is low gets no more samples, and the others are drawn together, wherever
 //! they are. So a tile has the bits of a picture of a fixed number of samples, and a crop has the bits of the whole
-//! picture.
+//! picture. When few tiles are left, several blocks of their samples are drawn together, so that a device has enough to
+//! do.
 //!
 //! The noise of a tile is measured by its samples alone: the two halves of them are two pictures, and half of the
 //! difference between two pictures of equal noise is, on average, the error of their mean.
@@ -12,7 +13,7 @@ use glam::UVec2;
 
 use crate::{
     cpu,
-    frame::{Crop, Drawn, LightLayers, NoiseTiles, Picture, Profile, RenderOptions, SampleRange},
+    frame::{Crop, Drawn, LightLayers, NoiseTiles, Picture, Profile, RenderOptions, SampleRange, TileSamples},
     gpu::GpuError,
     layout::{Feature, LIGHT_LAYERS, MOST_SAMPLES_LOG2},
 };
@@ -25,8 +26,8 @@ const N_LAYERS: usize = LIGHT_LAYERS as usize;
 /// How low the noise of a picture has to be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoiseGoal {
-    /// The most noise of a tile: the root mean square error of the square roots of its colours, times the exposure. A
-    /// display shows about the square root of light, so 0.01 is an error of about a hundredth of white.
+    /// The most noise of a tile: the root mean square error of what its colours look like ([`appearance`]). 0.01 is an
+    /// error of about a hundredth of white on a display.
     pub noise: f32,
     /// Number of samples of each pixel after which a tile gets no more: 2^n, at least [`NoiseGoal::FEWEST`].
     pub most_samples: u32,
@@ -63,9 +64,20 @@ pub struct NoisePicture {
     pub n_noisy: usize,
 }
 
-/// Draws samples of tiles. Returns what is known of their pixels, and the means of the samples with those of their
-/// squared luminance, tile by tile.
-pub(super) type DrawTiles<'a> = dyn FnMut(&[UVec2], SampleRange) -> Result<(Drawn, Vec<[f32; 4]>), GpuError> + 'a;
+/// Draws samples of tiles, all of which get equally many. Returns what is known of their pixels, and the means of the
+/// samples with those of their squared luminance, tile by tile.
+pub(super) type DrawTiles<'a> = dyn FnMut(&[TileSamples]) -> Result<(Drawn, Vec<[f32; 4]>), GpuError> + 'a;
+
+/// Number of tiles with which a device has enough to do. Their pixels have two million paths of 16 samples each, as many
+/// as a frame traces together.
+const ENOUGH_TILES: usize = 512;
+
+/// Returns into how many blocks the samples of each tile are divided, which are drawn together: a power of two.
+fn n_parts(n_tiles: usize, samples: SampleRange) -> u32 {
+    let wanted = (ENOUGH_TILES / n_tiles).max(1).ilog2();
+    let most = (samples.len() >> MOST_SAMPLES_LOG2).min(NoiseTiles::MOST_BLOCKS);
+    most.min(1 << wanted)
+}
 
 /// Draws a picture of the options' crop until the goal is met. `progress` is called with the share of the work that is
 /// done, as far as the noise tells it.
@@ -78,22 +90,30 @@ pub(super) fn draw_until(
     let mut tiles: Vec<Tile> = NoiseTiles::places_of(&options.crop_or_whole()).into_iter().map(Tile::new).collect();
     let mut profile = Profile::default();
     for block in goal.blocks() {
-        let mut noisy: Vec<&mut Tile> = tiles.iter_mut().filter(|tile| tile.noise > goal.noise).collect();
+        let noisy: Vec<&mut Tile> = tiles.iter_mut().filter(|tile| tile.noise > goal.noise).collect();
         if noisy.is_empty() {
             break;
         }
-        let places: Vec<UVec2> = noisy.iter().map(|tile| tile.place).collect();
-        let (mut drawn, means) = draw(&places, block)?;
+        let n_parts = n_parts(noisy.len(), block);
+        let len = block.len() / n_parts;
+        let part = |ix: u32| SampleRange { first: block.first + ix * len, end: block.first + (ix + 1) * len };
+        let parts_of = |tile: &&mut Tile| {
+            let place = tile.place;
+            (0..n_parts).map(move |ix| TileSamples { place, samples: part(ix) })
+        };
+        let (drawn, means) = draw(&noisy.iter().flat_map(parts_of).collect::<Vec<_>>())?;
         profile.add(&drawn.profile);
-        if block.first == 0 {
-            let features = drawn.features.chunks_exact(N_PIXELS);
-            noisy.iter_mut().zip(features).for_each(|(tile, features)| tile.features = features.to_vec());
-        }
-        let light = std::mem::take(&mut drawn.light);
+        let layers: Vec<&[[f32; 4]]> = [&means[..]]
+            .into_iter()
+            .chain(drawn.light.0.iter().map(Vec::as_slice).filter(|it| !it.is_empty()))
+            .collect();
         for (tile_ix, tile) in noisy.into_iter().enumerate() {
-            let pixels = tile_ix * N_PIXELS..(tile_ix + 1) * N_PIXELS;
-            let layers = light.0.iter().filter(|layer| !layer.is_empty()).map(|layer| &layer[pixels.clone()]);
-            tile.add(block, &means[pixels.clone()], layers, options);
+            let pixels = tile_ix * n_parts as usize * N_PIXELS..(tile_ix + 1) * n_parts as usize * N_PIXELS;
+            if block.first == 0 && options.features {
+                tile.features = drawn.features[pixels.clone()].to_vec();
+            }
+            let sums = layers.iter().flat_map(|layer| sum_of_parts(&layer[pixels.clone()], len as f32)).collect();
+            tile.add(block, sums, options);
         }
         let shares = tiles.iter().map(|tile| tile.share_of(goal)).sum::<f32>();
         progress(shares / tiles.len() as f32);
@@ -121,37 +141,26 @@ impl Tile {
         Self { place, n_samples: 0, sums: Vec::new(), features: Vec::new(), noise: f32::INFINITY }
     }
 
-    /// Adds a block with as many samples as there are, or the first one. A power of two divides and multiplies without
-    /// rounding, so the sums have the bits of a picture of all samples.
-    fn add<'a>(
-        &mut self,
-        block: SampleRange,
-        means: &'a [[f32; 4]],
-        layers: impl Iterator<Item = &'a [[f32; 4]]>,
-        options: &RenderOptions,
-    ) {
-        let n = block.len() as f32;
-        let pixels = means.iter().chain(layers.flatten());
-        let added = pixels.map(|pixel| pixel.map(|value| value * n));
+    /// Adds the sums of a block with as many samples as there are, or of the first one.
+    fn add(&mut self, block: SampleRange, sums: Vec<[f32; 4]>, options: &RenderOptions) {
         if self.sums.is_empty() {
-            self.sums = added.collect();
+            self.sums = sums;
         } else {
-            let halves: Vec<[f32; 4]> = added.collect();
-            self.noise = self.noise_between(&halves, n, options);
-            self.sums.as_flattened_mut().iter_mut().zip(halves.as_flattened()).for_each(|(sum, half)| *sum += half);
+            self.noise = self.noise_between(&sums, block.len() as f32, options);
+            add(&mut self.sums, &sums);
         }
         self.n_samples = block.end;
     }
 
     /// Returns the noise of the tile's samples and of as many others together. `n`: number of samples of each half.
     fn noise_between(&self, others: &[[f32; 4]], n: f32, options: &RenderOptions) -> f32 {
-        let shown = |sum: f32| f64::from((sum / n * options.exposure).max(0.0)).sqrt();
+        let seen = |sum: f32| appearance(f64::from(sum / n * options.exposure));
         let (mut squares, mut n_values) = (0.0, 0_u32);
         for (pixel_ix, (sums, others)) in self.sums.iter().zip(others).take(N_PIXELS).enumerate() {
             let at = self.pixel(pixel_ix);
             // Tiles at the right and at the lower edge extend beyond the picture.
             if at.x < options.width && at.y < options.height {
-                squares += (0..3).map(|i| (0.5 * (shown(sums[i]) - shown(others[i]))).powi(2)).sum::<f64>();
+                squares += (0..3).map(|i| (0.5 * (seen(sums[i]) - seen(others[i]))).powi(2)).sum::<f64>();
                 n_values += 3;
             }
         }
@@ -170,6 +179,28 @@ impl Tile {
         let of_noise = (goal.noise / self.noise).powi(2).min(1.0);
         of_noise.max(self.n_samples as f32 / goal.most_samples as f32)
     }
+}
+
+/// Returns what light looks like, in units of white: a display shows about its square root, and of light that is
+/// brighter than white, relative differences count. `light`: radiance times exposure.
+fn appearance(light: f64) -> f64 {
+    if light < 1.0 { light.max(0.0).sqrt() } else { 1.0 + 0.5 * light.ln() }
+}
+
+/// Returns the sums of a tile's pixels over all blocks of samples, whose means the parts are: 2^n parts of `len` samples.
+/// They are added as a binary tree. A power of two multiplies without rounding, so the sums have the bits of one block.
+fn sum_of_parts(parts: &[[f32; 4]], len: f32) -> Vec<[f32; 4]> {
+    if parts.len() == N_PIXELS {
+        return parts.iter().map(|pixel| pixel.map(|mean| mean * len)).collect();
+    }
+    let (first, second) = parts.split_at(parts.len() / 2);
+    let mut sums = sum_of_parts(first, len);
+    add(&mut sums, &sum_of_parts(second, len));
+    sums
+}
+
+fn add(sums: &mut [[f32; 4]], others: &[[f32; 4]]) {
+    sums.as_flattened_mut().iter_mut().zip(others.as_flattened()).for_each(|(sum, other)| *sum += other);
 }
 
 /// Joins the tiles to the picture of the options' crop.

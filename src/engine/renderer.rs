@@ -2,7 +2,6 @@
 
 use std::{borrow::Cow, sync::Arc};
 
-use glam::UVec2;
 use tracing::info_span;
 
 use super::{
@@ -11,7 +10,10 @@ use super::{
 };
 use crate::{
     cpu::{self, Batching},
-    frame::{Drawn, Goal, Integrator, NoiseTiles, Pacer, Picture, RangeSums, RenderOptions, SampleRange, Watcher},
+    frame::{
+        Drawn, Goal, Integrator, NoiseTiles, Pacer, Picture, RangeSums, RenderOptions, SampleRange, TileSamples,
+        Watcher,
+    },
     gpu::{Context, GivenImage, GpuError, TimelinePoint},
     render::BandedRenderer,
     scene::Camera,
@@ -118,7 +120,7 @@ impl Renderer {
         let options = self.options.clone();
         self.set_camera(camera);
         let progress = |share: f32| watcher.part(share);
-        let drawn = noise::draw_until(goal, &options, &mut |places, block| self.draw_tiles(places, block), progress);
+        let drawn = noise::draw_until(goal, &options, &mut |tiles| self.draw_tiles(tiles), progress);
         // Also after an error, what is drawn next are rectangles.
         match &mut self.backend {
             Backend::Device(renderer) => {
@@ -133,11 +135,11 @@ impl Renderer {
     }
 
     /// Draws samples of noise tiles.
-    fn draw_tiles(&mut self, places: &[UVec2], samples: SampleRange) -> Result<(Drawn, Vec<[f32; 4]>), GpuError> {
+    fn draw_tiles(&mut self, tiles: &[TileSamples]) -> Result<(Drawn, Vec<[f32; 4]>), GpuError> {
         match &mut self.backend {
-            Backend::Device(renderer) => renderer.draw_tiles(places, samples),
-            Backend::Group(group) => group.draw_tiles(places, samples),
-            Backend::Cpu(renderer) => Ok(draw_tiles_on_cpu(renderer, places, samples)),
+            Backend::Device(renderer) => renderer.draw_tiles(tiles),
+            Backend::Group(group) => group.draw_tiles(tiles),
+            Backend::Cpu(renderer) => Ok(draw_tiles_on_cpu(renderer, tiles)),
         }
     }
 
@@ -216,11 +218,13 @@ fn draw_on_cpu(renderer: &mut cpu::Renderer, goal: Goal, watcher: &mut impl Watc
     drawn
 }
 
-fn draw_tiles_on_cpu(renderer: &mut cpu::Renderer, places: &[UVec2], samples: SampleRange) -> (Drawn, Vec<[f32; 4]>) {
-    let (mut all, mut means) = (Drawn::default(), Vec::with_capacity(places.len() * NoiseTiles::N_PIXELS));
-    for places in places.chunks(NoiseTiles::MOST) {
-        renderer.set_window(Some(NoiseTiles::new(places)), samples.first);
-        let mut drawn = draw_on_cpu(renderer, Goal::Samples(samples.len()), &mut || ());
+fn draw_tiles_on_cpu(renderer: &mut cpu::Renderer, tiles: &[TileSamples]) -> (Drawn, Vec<[f32; 4]>) {
+    let (mut all, mut means) = (Drawn::default(), Vec::with_capacity(tiles.len() * NoiseTiles::N_PIXELS));
+    for together in tiles.chunks(NoiseTiles::MOST) {
+        let tiles = NoiseTiles::new(together);
+        let (first_sample, n_samples) = (tiles.first_sample(), tiles.n_samples());
+        renderer.set_window(Some(tiles), first_sample);
+        let mut drawn = draw_on_cpu(renderer, Goal::Samples(n_samples), &mut || ());
         means.extend_from_slice(renderer.window_mean());
         all.profile.add(&drawn.profile);
         all.features.append(&mut drawn.features);

@@ -28,9 +28,9 @@ impl Frame {
         self.picture_width = options.width;
         self.picture_height = options.height;
         (self.window_x, self.window_y) = match options.noise_tiles {
-            Some(_) => {
+            Some(ref tiles) => {
                 assert!(options.integrator == Integrator::Path && options.noise_filter() == Denoise::Off, "tiles");
-                (WINDOW_OF_TILES, 0)
+                (WINDOW_OF_TILES, tiles.n_samples())
             }
             None => {
                 let Crop { x1, y1, .. } = window;

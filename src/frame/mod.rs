@@ -36,7 +36,7 @@ pub use self::{
     drawn::{Drawn, Watcher},
     goal::{Goal, Pacer},
     light_layers::{LightLayers, RangeSums},
-    noise_tiles::NoiseTiles,
+    noise_tiles::{NoiseTiles, TileSamples},
     pass::{Pass, Role, Scope},
     plan::{FrameKind, Plan, Section, Step, Touch},
     profile::{BounceStats, PassTime, Profile},

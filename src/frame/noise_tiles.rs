@@ -5,32 +5,53 @@ use std::sync::Arc;
 
 use glam::{UVec2, uvec2};
 
-use super::Crop;
+use super::{Crop, SampleRange};
 use crate::layout::{MOST_NOISE_TILES, NOISE_TILE_SIZE};
 
-/// Places of noise tiles, in units of their side.
+/// A tile, and samples that each of its pixels gets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TileSamples {
+    /// The place of the tile in the picture, in units of its side.
+    pub place: UVec2,
+    /// The samples: an aligned block.
+    pub samples: SampleRange,
+}
+
+/// Tiles that are drawn together.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct NoiseTiles(Arc<[u32]>);
+pub struct NoiseTiles {
+    /// The tiles as the kernels read them (glsl/shared/noise_tiles.glsl).
+    words: Arc<[u32]>,
+    /// The first sample of all, and the number of samples of each tile.
+    first_sample: u32,
+    n_samples: u32,
+}
 
 impl NoiseTiles {
     /// The most tiles that are drawn together.
     pub const MOST: usize = MOST_NOISE_TILES as usize;
+    /// The most blocks of samples that are drawn together.
+    pub const MOST_BLOCKS: u32 = 1 << 8;
     /// Side of a tile, pixels.
     pub const SIZE: u32 = NOISE_TILE_SIZE;
     /// Number of pixels of a tile.
     pub const N_PIXELS: usize = (NOISE_TILE_SIZE * NOISE_TILE_SIZE) as usize;
 
-    /// Returns tiles at the given places.
+    /// Returns tiles that are drawn together.
     ///
     /// # Panics
-    /// There are none or more than [`NoiseTiles::MOST`], or a coordinate has more than 16 bits.
-    pub fn new(places: &[UVec2]) -> Self {
-        assert!((1..=Self::MOST).contains(&places.len()), "{} tiles", places.len());
-        let word = |place: &UVec2| {
-            assert!(place.max_element() <= 0xffff, "a place with {place}");
-            place.x | place.y << 16
+    /// There are none or more than [`NoiseTiles::MOST`]; a coordinate has more than 12 bits; the tiles get different
+    /// numbers of samples, or samples of more than [`NoiseTiles::MOST_BLOCKS`] blocks.
+    pub fn new(tiles: &[TileSamples]) -> Self {
+        assert!((1..=Self::MOST).contains(&tiles.len()), "{} tiles", tiles.len());
+        let first_sample = tiles.iter().map(|tile| tile.samples.first).min().expect("tiles");
+        let n_samples = tiles[0].samples.len();
+        let word = |&TileSamples { place, samples }: &TileSamples| {
+            let block = (samples.first - first_sample) / n_samples;
+            assert!(place.max_element() <= 0xfff && samples.len() == n_samples && block < Self::MOST_BLOCKS);
+            place.x | place.y << 12 | block << 24
         };
-        Self(places.iter().map(word).collect())
+        Self { words: tiles.iter().map(word).collect(), first_sample, n_samples }
     }
 
     /// Returns the places of all tiles that have pixels of a crop, row by row.
@@ -40,13 +61,23 @@ impl NoiseTiles {
         rows.flat_map(|y| columns.clone().map(move |x| uvec2(x, y))).collect()
     }
 
-    /// The places as the kernels read them.
+    /// Index of the first sample of all tiles.
+    pub(crate) fn first_sample(&self) -> u32 {
+        self.first_sample
+    }
+
+    /// Number of samples that each tile gets.
+    pub(crate) fn n_samples(&self) -> u32 {
+        self.n_samples
+    }
+
+    /// The tiles as the kernels read them.
     pub(crate) fn words(&self) -> &[u32] {
-        &self.0
+        &self.words
     }
 
     /// Returns the window that the tiles fill, one below the other.
     pub(crate) fn window(&self) -> Crop {
-        Crop::whole(Self::SIZE, Self::SIZE * self.0.len() as u32)
+        Crop::whole(Self::SIZE, Self::SIZE * self.words.len() as u32)
     }
 }

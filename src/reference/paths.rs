@@ -5,7 +5,7 @@ use glam::UVec2;
 use super::{
     camera::pixel_of,
     inputs::KernelInputs,
-    noise_tiles::picture_pixel_of,
+    noise_tiles::{first_sample_of, picture_pixel_of},
     sampler::{SampleKey, sample_key},
 };
 use crate::layout::{Batch, Frame};
@@ -19,5 +19,5 @@ pub fn pixel_of_path(frame: &Frame, batch: &Batch, path_ix: u32) -> UVec2 {
 pub fn key_of_path(inputs: &KernelInputs, batch: &Batch, path_ix: u32, pixel: UVec2) -> SampleKey {
     let frame = inputs.frame();
     let picture_pixel = picture_pixel_of(frame, inputs.noise_tiles, pixel);
-    sample_key(picture_pixel, frame.first_sample + path_ix / batch.n_pixels)
+    sample_key(picture_pixel, first_sample_of(frame, inputs.noise_tiles, pixel) + path_ix / batch.n_pixels)
 }

@@ -1,16 +1,14 @@
 //! Draws samples of noise tiles, from anywhere in the picture, all at once.
 
-use glam::UVec2;
-
 use super::BandedRenderer;
 use crate::{
     buffers::Pixels,
-    frame::{Drawn, Goal, NoiseTiles, PathOptions, RenderOptions, SampleRange},
+    frame::{Drawn, Goal, NoiseTiles, PathOptions, RenderOptions, TileSamples},
     gpu::GpuError,
 };
 
 impl BandedRenderer {
-    /// Draws samples of the tiles at the given places, as many of them together as the device can bind. Returns the
+    /// Draws samples of tiles, as many tiles together as the device can bind. All get equally many. Returns the
     /// means of the samples of their pixels, tile by tile; the fourth component is the mean of their squared luminance.
     /// Features and layers have the same order. [`BandedRenderer::set_crop`] ends the drawing of tiles.
     ///
@@ -19,17 +17,18 @@ impl BandedRenderer {
     ///
     /// # Errors
     /// Fails as [`BandedRenderer::draw`] does.
-    pub fn draw_tiles(&mut self, places: &[UVec2], samples: SampleRange) -> Result<(Drawn, Vec<[f32; 4]>), GpuError> {
+    pub fn draw_tiles(&mut self, tiles: &[TileSamples]) -> Result<(Drawn, Vec<[f32; 4]>), GpuError> {
         let options = self.renderer.options().clone();
         let most_pixels = self.renderer.context.limits().storage_range / Pixels::bytes_per_pixel(&options);
         let most_tiles = (most_pixels as usize / NoiseTiles::N_PIXELS).clamp(1, NoiseTiles::MOST);
-        let paths = PathOptions { first_sample: samples.first, ..options.paths };
-        let (mut all, mut means) = (Drawn::default(), Vec::with_capacity(places.len() * NoiseTiles::N_PIXELS));
-        for places in places.chunks(most_tiles) {
-            let tiles = NoiseTiles::new(places);
+        let (mut all, mut means) = (Drawn::default(), Vec::with_capacity(tiles.len() * NoiseTiles::N_PIXELS));
+        for together in tiles.chunks(most_tiles) {
+            let tiles = NoiseTiles::new(together);
+            let (paths, n_samples) =
+                (PathOptions { first_sample: tiles.first_sample(), ..options.paths }, tiles.n_samples());
             (self.bands, self.joined) = (vec![tiles.window()], None);
             self.renderer.set_options(&RenderOptions { noise_tiles: Some(tiles), paths, ..options.clone() })?;
-            let mut drawn = self.draw_band(Goal::Samples(samples.len()), &mut || ())?;
+            let mut drawn = self.draw_band(Goal::Samples(n_samples), &mut || ())?;
             means.append(&mut self.renderer.window_mean()?);
             all.profile.add(&drawn.profile);
             all.features.append(&mut drawn.features);

@@ -2,11 +2,9 @@
 
 use std::sync::Arc;
 
-use glam::UVec2;
-
 use super::{RendererGroup, share, work_queue::Chunking};
 use crate::{
-    frame::{Drawn, SampleRange},
+    frame::{Drawn, TileSamples},
     gpu::{Context, GpuError},
 };
 
@@ -22,12 +20,12 @@ pub fn chunking(contexts: &[Arc<Context>]) -> Chunking {
 }
 
 impl RendererGroup {
-    /// Draws samples of the tiles at the given places, as
+    /// Draws samples of tiles, as
     /// [`BandedRenderer::draw_tiles`](crate::render::BandedRenderer::draw_tiles) does.
-    pub fn draw_tiles(&mut self, places: &[UVec2], samples: SampleRange) -> Result<(Drawn, Vec<[f32; 4]>), GpuError> {
-        let units = 0..places.len() as u32;
+    pub fn draw_tiles(&mut self, tiles: &[TileSamples]) -> Result<(Drawn, Vec<[f32; 4]>), GpuError> {
+        let units = 0..tiles.len() as u32;
         let parts = share(&mut self.members, &mut self.tiles, units, &mut || (), |renderer, units, _| {
-            renderer.draw_tiles(&places[units.start as usize..units.end as usize], samples)
+            renderer.draw_tiles(&tiles[units.start as usize..units.end as usize])
         })?;
         let (mut all, mut all_means) = (Drawn::default(), Vec::new());
         for (_, (mut drawn, mut means)) in parts {
