@@ -192,9 +192,9 @@ fn a_device_may_fail_at_any_time() {
     let world = world(&options);
     let contexts = [device(), device()];
     // Samples of the first picture are shared, and rows of the second.
-    for (n_samples, step) in [(48, 1), (8, 3)] {
+    for (n_samples, steps) in [(48, [1, 3]), (8, [3, 5])] {
         let [(one, _), _] = draw(vec![device()], &world, &options, n_samples);
-        for failing in &contexts {
+        for (failing, step) in contexts.iter().zip(steps) {
             let n_failures = (0..).step_by(step).take_while(|&n_creations| {
                 let mut renderer = Engine::on_devices(contexts.to_vec()).renderer(&world, &options).unwrap();
                 failing.fail_creations_after(Some(n_creations));

@@ -11,6 +11,7 @@ mod cast_report;
 mod convert;
 mod device_args;
 mod devices;
+mod doctor;
 mod error;
 mod file_roles;
 mod inspect;
@@ -73,6 +74,7 @@ fn run(args: Args) -> Result<(), CliError> {
         Command::Merge(args) => merge::run(&args),
         Command::Pack(args) => pack::run(&args),
         Command::Devices => devices::run(),
+        Command::Doctor(args) => doctor::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Convert(args) => convert::run(&args),
         #[cfg(feature = "bench")]

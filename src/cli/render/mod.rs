@@ -20,10 +20,10 @@ use kdray::{
 };
 use tracing::info_span;
 
+pub(super) use self::memory::check_memory;
 use self::{
     draw::{Common, DrawnPictures, FrameJob, draw_and_write, draws_whole_frames},
     files::{Files, check_outputs, numbered, output_of, roles},
-    memory::check_memory,
 };
 use super::{
     args::{Frames, RenderArgs},
