@@ -104,6 +104,19 @@ fn a_machine_without_a_driver_renders_on_the_cpu() {
     }
 }
 
+/// An empty file in the place of the Vulkan loader is as good as none.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_machine_without_a_loader_renders_on_the_cpu() {
+    let directory = TempDir::new().unwrap();
+    fs::write(directory.path().join("libvulkan.so.1"), "").unwrap();
+    let output = kdray(directory.path(), &["doctor"]).env("LD_LIBRARY_PATH", directory.path()).output().unwrap();
+    let text = stdout(&output);
+    assert_eq!(output.status.code(), Some(0), "{text}{}", stderr(&output));
+    assert!(text.contains("\nVulkan: wrong: no Vulkan loader"), "{text}");
+    assert_eq!(text.lines().last(), Some("ok, but only the CPU can render: use --cpu"), "{text}");
+}
+
 /// A picture that no memory holds is refused with what to do about it.
 #[test]
 fn a_picture_beyond_the_memory_ends_with_4() {

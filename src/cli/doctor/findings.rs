@@ -177,8 +177,8 @@ impl SceneFindings {
         let Self { name, hash, triangles, structure_bytes, width, height, load_ms, build_ms } = self;
         let structure = in_words(*structure_bytes);
         format!(
-            ", {name}, {triangles} triangles, hash {hash}\n  loaded in {load_ms:.0} ms, structure of {structure} built in \
-             {build_ms:.0} ms, picture of {width}x{height} pixels"
+            ", {name}, {triangles} triangles, hash {hash}\n  loaded in {load_ms:.0} ms, structure of {structure} built \
+             in {build_ms:.0} ms, picture of {width}x{height} pixels"
         )
     }
 }
@@ -188,11 +188,11 @@ impl Findings {
     pub fn text(&self) -> String {
         let mut text = self.host.text();
         text += &self.vulkan.line("Vulkan", |()| String::new());
-        self.processors.iter().for_each(|processor| text += &processor.text());
         if let Some(scene) = &self.scene {
             text.push('\n');
             text += &scene.line("scene", SceneFindings::text);
         }
+        self.processors.iter().for_each(|processor| text += &processor.text());
         text + &format!("\n{}\n", self.summary())
     }
 
