@@ -35,6 +35,7 @@ fn device() -> DeviceInfo {
         driver: "beads 1.2".to_owned(),
         api_version: "1.3.0".to_owned(),
         subgroup_size: 32,
+        memory_bytes: 1 << 30,
         missing: Vec::new(),
     }
 }

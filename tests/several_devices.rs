@@ -6,7 +6,7 @@ use std::{
     fs,
     path::Path,
     sync::{
-        Arc,
+        Arc, Mutex,
         atomic::{AtomicU32, Ordering},
     },
 };
@@ -192,9 +192,9 @@ fn a_device_may_fail_at_any_time() {
     let world = world(&options);
     let contexts = [device(), device()];
     // Samples of the first picture are shared, and rows of the second.
-    for (n_samples, step) in [(48, 1), (8, 3)] {
+    for (n_samples, steps) in [(48, [1, 3]), (8, [3, 5])] {
         let [(one, _), _] = draw(vec![device()], &world, &options, n_samples);
-        for failing in &contexts {
+        for (failing, step) in contexts.iter().zip(steps) {
             let n_failures = (0..).step_by(step).take_while(|&n_creations| {
                 let mut renderer = Engine::on_devices(contexts.to_vec()).renderer(&world, &options).unwrap();
                 failing.fail_creations_after(Some(n_creations));
@@ -215,19 +215,39 @@ fn cameras(world: &World, n_frames: u32) -> Vec<Camera> {
     (0..n_frames).map(|ix| Camera { eye: camera.eye + 0.05 * ix as f32 * Vec3::X, ..camera }).collect()
 }
 
-/// Draws a film of one sample a frame. Returns the result and the number of samples that the watcher was told of.
+/// What is known of a film after it was drawn.
+struct DrawnFilm<E> {
+    frames: Result<Vec<Picture>, E>,
+    /// Number of samples that the watcher was told of.
+    n_samples: u32,
+    /// For each device that failed, the number of samples of the frame that it had drawn.
+    failures: Vec<u32>,
+}
+
+/// Number of samples of a frame of a film.
+const FRAME_SAMPLES: u32 = 3;
+
 fn draw_film<E: From<GpuError> + Send>(
     film: &mut FilmRenderer,
     cameras: &[Camera],
     finish: impl Fn(u32, Picture) -> Result<Picture, E> + Sync,
-) -> (Result<Vec<Picture>, E>, u32) {
-    let mut samples = Samples::default();
+) -> DrawnFilm<E> {
+    let (mut samples, failures) = (Samples::default(), Mutex::new(Vec::new()));
     let draw = |renderer: &mut Renderer, frame_ix: u32, tell_sample: &dyn Fn()| {
-        renderer.draw(&cameras[frame_ix as usize], Goal::Samples(2), tell_sample)?;
-        Ok(renderer.picture()?.into_owned())
+        let mut n_drawn = 0;
+        let watcher = || {
+            n_drawn += 1;
+            tell_sample();
+        };
+        let drawn = renderer.draw(&cameras[frame_ix as usize], Goal::Samples(FRAME_SAMPLES), watcher);
+        let picture = drawn.and_then(|_| Ok(renderer.picture()?.into_owned()));
+        if picture.is_err() {
+            failures.lock().unwrap().push(n_drawn);
+        }
+        picture
     };
-    let result = film.draw(cameras.len() as u32, &mut &mut samples, draw, finish);
-    (result, samples.n_samples)
+    let frames = film.draw(cameras.len() as u32, &mut &mut samples, draw, finish);
+    DrawnFilm { frames, n_samples: samples.n_samples, failures: failures.into_inner().unwrap() }
 }
 
 /// The frames of a film have the bits of one device's, in their order, also if a device fails at any time.
@@ -239,7 +259,7 @@ fn a_film_outlives_a_device() {
     let mut alone = Engine::on_device(device()).renderer(&world, &options).unwrap();
     let expected: Vec<_> = (cameras.iter())
         .map(|camera| {
-            alone.draw(camera, Goal::Samples(2), || ()).unwrap();
+            alone.draw(camera, Goal::Samples(FRAME_SAMPLES), || ()).unwrap();
             alone.picture().unwrap().into_owned()
         })
         .collect();
@@ -247,19 +267,28 @@ fn a_film_outlives_a_device() {
     let contexts = [device(), device()];
     let engine = Engine::on_devices(contexts.to_vec());
     let whole = |_: u32, picture: Picture| Ok::<_, GpuError>(picture);
-    for n_creations in [None, Some(0), Some(2), Some(5), Some(8)] {
+    let mut all_failures = Vec::new();
+    for n_creations in 0.. {
         let mut film = engine.film_renderer(&world, &options).unwrap();
-        contexts[1].fail_creations_after(n_creations);
-        for _ in 0..2 {
-            let (frames, n_samples) = draw_film(&mut film, &cameras, whole);
-            assert!(frames.unwrap() == expected, "{n_creations:?}");
-            assert_eq!(n_samples, 8, "{n_creations:?}: samples that the watcher is told of");
-        }
+        contexts[1].fail_creations_after(Some(n_creations));
+        let first = draw_film(&mut film, &cameras, whole);
         contexts[1].fail_creations_after(None);
+        let second = draw_film(&mut film, &cameras, whole);
+        for film in [&first, &second] {
+            assert!(film.frames.as_ref().unwrap() == &expected, "after {n_creations} creations");
+            assert_eq!(film.n_samples, 4 * FRAME_SAMPLES, "samples that the watcher is told of");
+        }
+        assert!(second.failures.is_empty());
+        if first.failures.is_empty() {
+            break;
+        }
+        all_failures.extend(first.failures);
     }
+    // Devices failed before the first sample of a frame, within it, and after it.
+    assert!((0..=FRAME_SAMPLES).all(|n_drawn| all_failures.contains(&n_drawn)), "{all_failures:?}");
     let mut film = engine.film_renderer(&world, &options).unwrap();
     contexts.iter().for_each(|context| context.fail_creations_after(Some(0)));
-    assert!(draw_film(&mut film, &cameras, whole).0.is_err(), "no device is left");
+    assert!(draw_film(&mut film, &cameras, whole).frames.is_err(), "no device is left");
     contexts.iter().for_each(|context| context.fail_creations_after(None));
 }
 
@@ -275,7 +304,7 @@ fn an_error_of_writing_ends_a_film() {
         n_written.fetch_add(1, Ordering::Relaxed);
         if frame_ix == 2 { Err(GpuError::NoDriver) } else { Ok(picture) }
     };
-    let (frames, _) = draw_film(&mut film, &cameras, refuse_third);
+    let frames = draw_film(&mut film, &cameras, refuse_third).frames;
     assert!(matches!(frames, Err(GpuError::NoDriver)), "{frames:?}");
     let n_written = n_written.into_inner();
     assert!((3..=5).contains(&n_written), "{n_written} frames");

@@ -68,6 +68,8 @@ pub enum Command {
     Pack(PackArgs),
     /// List the Vulkan devices
     Devices,
+    /// Check whether this machine can render, and whether it can render a scene
+    Doctor(DoctorArgs),
     /// Describe a scene and its acceleration structure
     Inspect(InspectArgs),
     /// Write a scene file that shows what another file shows, to be edited
@@ -224,6 +226,17 @@ pub struct InspectArgs {
     #[command(flatten)]
     pub load: LoadArgs,
     /// Print the description as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(clap::Args)]
+pub struct DoctorArgs {
+    /// Scene file (TOML), mesh file (glTF, OBJ, PLY, STL), or pack to check
+    pub scene: Option<PathBuf>,
+    #[command(flatten)]
+    pub load: LoadArgs,
+    /// Print the findings as JSON
     #[arg(long)]
     pub json: bool,
 }

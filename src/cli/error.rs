@@ -32,6 +32,8 @@ pub enum CliError {
     Validation(usize),
     #[error("{0}")]
     WrongHits(String),
+    #[error("{0}")]
+    NoProcessor(String),
     #[error(transparent)]
     Output(#[from] OutputError),
     #[error("cannot write to standard output: {0}")]
@@ -45,7 +47,8 @@ impl CliError {
         match self {
             Self::Usage(_) | Self::Output(OutputError::UnknownEnding { .. }) => 2,
             Self::Scene(_) | Self::Rays(_) | Self::Merge(_) | Self::Pack(_) | Self::Memory(_) => 3,
-            Self::Device(_) | Self::DeviceMemory(_) | Self::Window(_) | Self::Validation(_) | Self::WrongHits(_) => 4,
+            Self::Device(_) | Self::DeviceMemory(_) | Self::Window(_) | Self::Validation(_) => 4,
+            Self::WrongHits(_) | Self::NoProcessor(_) => 4,
             Self::Output(_) | Self::Stdout(_) => 5,
         }
     }

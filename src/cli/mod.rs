@@ -12,6 +12,7 @@ mod cast_report;
 mod convert;
 mod device_args;
 mod devices;
+mod doctor;
 mod error;
 mod file_roles;
 mod inspect;
@@ -79,6 +80,7 @@ fn run(args: Args) -> Result<(), CliError> {
         Command::Merge(args) => merge::run(&args),
         Command::Pack(args) => pack::run(&args),
         Command::Devices => devices::run(),
+        Command::Doctor(args) => doctor::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Convert(args) => convert::run(&args),
         #[cfg(feature = "bench")]

@@ -22,6 +22,8 @@ pub struct DeviceInfo {
     pub api_version: String,
     /// Number of invocations in a subgroup. 0 if the device lacks Vulkan 1.3.
     pub subgroup_size: u32,
+    /// Size of the device's own memory, bytes. On a device that shares the memory of the host, it is that memory.
+    pub memory_bytes: u64,
     /// Features that kdray needs and the device lacks. The list of a usable device is empty.
     pub missing: Vec<String>,
 }
@@ -186,6 +188,7 @@ fn describe(instance: &Instance, device: vk::PhysicalDevice, index: usize) -> De
             vk::api_version_patch(version)
         ),
         subgroup_size: 0,
+        memory_bytes: memory_bytes(instance, device),
         missing: Vec::new(),
     };
     if !is_1_3 {
@@ -205,6 +208,14 @@ fn describe(instance: &Instance, device: vk::PhysicalDevice, index: usize) -> De
     info.subgroup_size = subgroup.subgroup_size;
     info.missing.extend(missing(instance, device, &subgroup));
     info
+}
+
+/// Returns the size of all heaps that are local to the device.
+fn memory_bytes(instance: &Instance, device: vk::PhysicalDevice) -> u64 {
+    // SAFETY: the device belongs to the instance.
+    let memory = unsafe { instance.raw.get_physical_device_memory_properties(device) };
+    let is_local = |heap: &&vk::MemoryHeap| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL);
+    memory.memory_heaps_as_slice().iter().filter(is_local).map(|heap| heap.size).sum()
 }
 
 pub(super) fn text(raw: &CStr) -> String {

@@ -48,8 +48,12 @@ pub(super) const DEFAULT_MATERIAL: &str = "(default)";
 
 /// Loads a scene file and the meshes that it names. Their names are relative to the scene file's folder.
 pub(super) fn load_toml(path: &Path, options: &LoadOptions) -> Result<(Scene, Lacks), SceneError> {
-    let text = read_utf8(path)?;
-    let file = File { path, text: &text, access: Access::of(options) };
+    parse_toml(path, &read_utf8(path)?, options)
+}
+
+/// Makes a scene of the text of the scene file `path`.
+pub(super) fn parse_toml(path: &Path, text: &str, options: &LoadOptions) -> Result<(Scene, Lacks), SceneError> {
+    let file = File { path, text, access: Access::of(options) };
     assemble(&file, file.parse()?, options)
 }
 

@@ -189,6 +189,18 @@ impl Scene {
         scene
     }
 
+    /// Makes a scene of the text of a scene file that names no other files. `name` is the name that the file would
+    /// have.
+    ///
+    /// # Errors
+    /// Those of [`Scene::load`].
+    pub fn of_text(name: &str, text: &str) -> Result<Scene, SceneError> {
+        let (path, options) = (Path::new(name), LoadOptions::default());
+        let (mut scene, lacks) = assemble::parse_toml(path, text, &options)?;
+        standard::fill_in(&mut scene, lacks, &options).map_err(|what| SceneError::file(path, what))?;
+        Ok(scene)
+    }
+
     /// Loads a scene from a file that is no pack.
     fn load_file(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
         let (mut scene, lacks) = if is_scene_file(path) {

@@ -45,6 +45,12 @@ pub fn available() -> Option<u64> {
     [of_machine, of_container, address_space_left()].into_iter().flatten().min()
 }
 
+/// Returns the size of the machine's memory in bytes. `None` if the system does not report it.
+pub fn total() -> Option<u64> {
+    let memory = RefreshKind::nothing().with_memory(MemoryRefreshKind::nothing().with_ram());
+    System::new_with_specifics(memory).ok().map(|system| system.total_memory()).filter(|bytes| *bytes > 0)
+}
+
 /// Returns the number of bytes up to the limit on the process's address space. `None` without a limit.
 #[cfg(target_os = "linux")]
 fn address_space_left() -> Option<u64> {
@@ -60,7 +66,7 @@ fn address_space_left() -> Option<u64> {
 }
 
 /// Formats a size: below 1 GiB in whole MiB, otherwise in GiB with one decimal.
-fn in_words(bytes: u64) -> String {
+pub fn in_words(bytes: u64) -> String {
     let mebibytes = bytes as f64 / f64::from(1 << 20);
     if mebibytes < 1024.0 { format!("{mebibytes:.0} MiB") } else { format!("{:.1} GiB", mebibytes / 1024.0) }
 }
@@ -72,6 +78,7 @@ mod tests {
     #[test]
     fn what_no_machine_has_is_refused() {
         assert!(available().is_some_and(|bytes| bytes > NEGLIGIBLE));
+        assert!(total() >= Some(NEGLIGIBLE));
         require("nothing", 0).unwrap();
         require("a little", NEGLIGIBLE).unwrap();
         let error = require("a sphere of 2 triangles", 1 << 60).unwrap_err().to_string();

@@ -22,10 +22,10 @@ use kdray::{
 };
 use tracing::info_span;
 
+pub(super) use self::memory::check_memory;
 use self::{
     draw::{Common, DrawnPictures, draw_and_write, draws_whole_frames},
     files::{check_outputs, roles},
-    memory::check_memory,
     views::{NamedPath, views},
 };
 use super::{

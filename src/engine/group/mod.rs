@@ -101,8 +101,8 @@ impl RendererGroup {
     }
 
     /// Draws a new picture. The watcher is told of the samples of the whole picture. If a device fails, a warning says
-    /// so, the others do its work, and it draws nothing more. Times of passes are sums over all devices. The time of the
-    /// frame is the elapsed time.
+    /// so, the others do its work, and it draws nothing more. Times of passes are sums over all devices. The time of
+    /// the frame is the elapsed time.
     ///
     /// # Errors
     /// All devices have failed, or the goal is a time. The next picture is tried on the device that failed last.
@@ -124,7 +124,8 @@ impl RendererGroup {
         Ok(drawn)
     }
 
-    /// Returns the names of the devices. A name that several devices have is preceded by their number, as in `2 x name`.
+    /// Returns the names of the devices. A name that several devices have is preceded by their number, as in
+    /// `2 x name`.
     fn device_names(&self) -> String {
         let mut counted: Vec<(&str, usize)> = Vec::new();
         for Member { name, .. } in &self.members {

@@ -1,0 +1,141 @@
+//! `kdray doctor`: checks whether this machine can render, and whether it can render a scene.
+//!
+//! ```text
+//! host       the machine: operating system, threads, memory
+//! check      draws a small picture on a processor and compares it with the CPU's
+//! examine    draws a part of the user's scene on a processor, and finds the memory that a whole picture takes
+//! findings   what was found, as text and as JSON
+//! ```
+//!
+//! A processor is a Vulkan device or the CPU.
+
+mod check;
+mod examine;
+mod findings;
+mod host;
+
+use std::path::Path;
+
+use kdray::{
+    engine::{Built, Engine},
+    gpu::{self, Context, ContextOptions, DeviceInfo, DeviceSelector, GpuError},
+    scene::{LoadOptions, Scene},
+    util::progress::Work,
+    world::World,
+};
+
+use self::{
+    check::Sample,
+    examine::SceneOnProcessor,
+    findings::{Findings, Problem, ProcessorFindings, SceneFindings, Verdict},
+    host::Host,
+};
+use super::{args::DoctorArgs, build, error::CliError, load_args::LoadArgs, print, print_raw, progress::Progress};
+
+/// Examines the machine and, if there is one, the scene. Prints what was found even if that is an error.
+pub fn run(args: &DoctorArgs) -> Result<(), CliError> {
+    let progress = Progress::new(false, 3);
+    let devices = gpu::devices();
+    let (mut processors, _) = progress.stage("checking the CPU and the Vulkan devices", || check_all(&devices));
+    let (mut scene, mut error) = (None, None);
+    if let Some(path) = &args.scene {
+        let examined = examine_scene(path, &args.load, &mut processors, &progress);
+        scene = Some(Verdict(examined.map_err(|refused| {
+            let problem = Problem::of_scene(&refused.to_string());
+            error = Some(refused);
+            problem
+        })));
+    }
+    drop(progress);
+    let findings = Findings {
+        host: Host::of_machine(),
+        vulkan: Verdict(devices.as_ref().map(|_| ()).map_err(Problem::of_vulkan)),
+        processors: processors.into_iter().map(|processor| processor.findings).collect(),
+        scene,
+    };
+    match args.json {
+        true => print_raw(&findings.json())?,
+        false => print(&findings.text())?,
+    }
+    match error {
+        Some(error) => Err(error),
+        None if findings.can_render() => Ok(()),
+        None => Err(CliError::NoProcessor(findings.refusal())),
+    }
+}
+
+/// A processor that was found. Its engine is none if it cannot be used.
+struct Processor {
+    engine: Option<Engine>,
+    findings: ProcessorFindings,
+}
+
+/// Checks the CPU and all devices with the sample picture. The CPU comes last.
+fn check_all(devices: &Result<Vec<DeviceInfo>, GpuError>) -> Vec<Processor> {
+    let sample = Sample::on_cpu();
+    let mut processors: Vec<_> = (devices.iter().flatten()).map(|device| check_device(&sample, device)).collect();
+    processors.push(Processor {
+        engine: Some(Engine::on_cpu()),
+        findings: ProcessorFindings::new(None, sample.check_of_cpu()),
+    });
+    processors
+}
+
+fn check_device(sample: &Sample, device: &DeviceInfo) -> Processor {
+    let opened = match device.missing.is_empty() {
+        true => Context::new(&ContextOptions::new(Some(DeviceSelector::Index(device.index)), false))
+            .map_err(|error| Problem::of_device(&error)),
+        false => Err(Problem::of_lacking(device)),
+    };
+    let engine = opened.map(Engine::on_device);
+    let checked = match &engine {
+        Ok(engine) => sample.check(engine),
+        Err(problem) => Err(problem.clone()),
+    };
+    Processor { engine: engine.ok(), findings: ProcessorFindings::new(Some(device.clone()), checked) }
+}
+
+/// Loads the scene, builds its structure, and examines it on each processor that has passed its check.
+///
+/// # Errors
+/// The scene cannot be loaded, or the system has too little memory for its structure.
+fn examine_scene(
+    path: &Path,
+    load: &LoadArgs,
+    processors: &mut [Processor],
+    progress: &Progress,
+) -> Result<SceneFindings, CliError> {
+    let loading = format!("loading {}", path.display());
+    let observer = progress.observer(&loading, &[Work::Reading, Work::Images]);
+    let options = LoadOptions { progress: observer, ..load.options_of_pictures() };
+    let (scene, load_ms) = progress.stage(&loading, || Scene::load_with(path, &options));
+    let scene = scene?;
+    let on_processor = SceneOnProcessor::new(&scene);
+    let n_triangles = scene.n_triangles();
+    let engine = processors.iter().find(|it| it.findings.is_ok()).and_then(|it| it.engine.clone());
+    let engine = engine.unwrap_or_else(Engine::on_cpu);
+    let accel = engine.choose_accel(n_triangles, on_processor.workload());
+    build::check_memory(accel, n_triangles)?;
+    let building = build::building(accel, n_triangles);
+    let (built, build_ms) = progress.stage(&building, || engine.build(scene, on_processor.workload()));
+    let Built { world, .. } = built.map_err(GpuError::from)?;
+    for processor in processors.iter_mut().filter(|it| it.findings.is_ok()) {
+        let engine = processor.engine.as_ref().expect("a processor that has passed its check has an engine");
+        processor.findings.examine(on_processor.examine(engine, &world));
+    }
+    Ok(findings_of(&world, &on_processor, [load_ms, build_ms]))
+}
+
+fn findings_of(world: &World, on_processor: &SceneOnProcessor, [load_ms, build_ms]: [f64; 2]) -> SceneFindings {
+    let scene = world.scene();
+    SceneFindings {
+        name: scene.name.clone(),
+        hash: scene.hash(),
+        triangles: scene.triangles.len(),
+        structure_bytes: world.statistics().bytes(),
+        width: on_processor.options().width,
+        height: on_processor.options().height,
+        load_ms,
+        build_ms,
+    }
+}

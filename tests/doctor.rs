@@ -1,0 +1,136 @@
+//! Tests of `kdray doctor`.
+
+mod support;
+
+use std::{fs, path::Path, process::Output};
+
+use serde_json::Value;
+use support::command::{cornell, kdray, stderr, stdout};
+use tempfile::TempDir;
+
+/// Runs the command, which has to end with an exit code.
+fn doctor(directory: &Path, arguments: &[&str], code: i32) -> Output {
+    let output = kdray(directory, &[&["doctor"], arguments].concat()).output().unwrap();
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {}{}", stdout(&output), stderr(&output));
+    output
+}
+
+fn json(output: &Output) -> Value {
+    serde_json::from_str(&stdout(output)).unwrap()
+}
+
+#[test]
+fn a_healthy_machine_is_found_so() {
+    let directory = TempDir::new().unwrap();
+    let text = stdout(&doctor(directory.path(), &[], 0));
+    let lines: Vec<_> = text.lines().collect();
+    assert!(lines[0].starts_with(concat!("kdray ", env!("CARGO_PKG_VERSION"), " on ")), "{text}");
+    assert!(lines[1].contains(" CPU threads, memory ") && !lines[1].contains("unknown"), "{text}");
+    assert!(lines.contains(&"Vulkan: ok") && lines.contains(&"CPU"), "{text}");
+    assert!(text.contains("device 0: ") && text.contains("  sample picture: ok, "), "{text}");
+    assert!(text.contains(" of 3072 pixels differ from the CPU's"), "{text}");
+    assert!(lines.last().unwrap().starts_with("ok: 1 of 1 Vulkan devices can render"), "{text}");
+
+    let found = json(&doctor(directory.path(), &["--json"], 0));
+    let processors = found["processors"].as_array().unwrap();
+    assert_eq!(processors.len(), 2);
+    assert!(processors.iter().all(|processor| processor["sample"]["ok"] == true), "{found}");
+    assert!(processors[0]["device"]["memory_bytes"].as_u64() > Some(1 << 20), "{found}");
+    assert_eq!((&processors[1]["device"], &found["scene"]), (&Value::Null, &Value::Null));
+}
+
+#[test]
+fn a_scene_is_examined_on_each_processor() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    let found = json(&doctor(path, &[&cornell(), "--json"], 0));
+    let scene = &found["scene"]["found"];
+    assert_eq!((&scene["name"], scene["triangles"].as_u64()), (&"cornell".into(), Some(34)));
+    for processor in found["processors"].as_array().unwrap() {
+        assert_eq!(processor["scene"]["ok"], true, "{found}");
+    }
+    let needed = |found: &Value| found["processors"][0]["scene"]["found"]["needed_bytes"].as_u64().unwrap();
+    // The picture has 768x768 pixels, each of which takes at least its radiance and its colour.
+    assert!(needed(&found) > 768 * 768 * 20 && needed(&found) < 1 << 30, "{}", needed(&found));
+    // A smaller picture of the same scene needs less memory.
+    let text = fs::read_to_string(cornell()).unwrap().replace("= 768", "= 96");
+    fs::write(path.join("small.toml"), text).unwrap();
+    let small = json(&doctor(path, &["small.toml", "--json"], 0));
+    assert!(needed(&small) < needed(&found) / 4, "{} {}", needed(&small), needed(&found));
+    assert_eq!(small["scene"]["found"]["hash"], scene["hash"]);
+
+    // The hash is the one that pictures state.
+    let render = kdray(path, &["render", "small.toml", "--cpu", "-q", "-o", "small.png"]).output().unwrap();
+    assert!(render.status.success(), "{}", stderr(&render));
+    let hash = scene["hash"].as_str().unwrap();
+    let png = fs::read(path.join("small.png")).unwrap();
+    assert!(png.windows(hash.len()).any(|bytes| bytes == hash.as_bytes()), "{hash}");
+    let text = stdout(&doctor(path, &["small.toml"], 0));
+    assert!(text.contains(&format!("scene: ok, small, 34 triangles, hash {hash}")), "{text}");
+    assert_eq!(text.matches("\n  scene: ok, ").count(), 2, "{text}");
+}
+
+#[test]
+fn a_wrong_scene_ends_with_3_and_names_the_file() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    fs::write(path.join("lacks.toml"), "[[mesh]]\nfile = \"absent.obj\"\n").unwrap();
+    for (scene, named) in [("lacks.toml", "absent.obj"), ("none.kdpack", "none.kdpack")] {
+        let output = doctor(path, &[scene], 3);
+        assert!(stderr(&output).lines().last().unwrap().starts_with("error: "), "{}", stderr(&output));
+        let text = stdout(&output);
+        let line = text.lines().find(|line| line.starts_with("scene: wrong: ")).unwrap_or_else(|| panic!("{text}"));
+        assert!(line.contains(named), "{line}");
+        let found = json(&doctor(path, &[scene, "--json"], 3));
+        assert!(found["scene"]["problem"].as_str().unwrap().contains(named), "{found}");
+    }
+}
+
+/// Without a driver, the CPU still renders, and a scene is examined there.
+#[test]
+fn a_machine_without_a_driver_renders_on_the_cpu() {
+    let directory = TempDir::new().unwrap();
+    let scene = cornell();
+    for arguments in [&["doctor"][..], &["doctor", &scene]] {
+        let mut command = kdray(directory.path(), arguments);
+        let none = directory.path().join("none.json");
+        let output = command.env("VK_DRIVER_FILES", &none).env("VK_ICD_FILENAMES", &none).output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        let text = stdout(&output);
+        assert!(text.contains("\nVulkan: wrong: "), "{text}");
+        assert!(text.contains("render with --cpu") && !text.contains("device 0"), "{text}");
+        assert_eq!(text.lines().last(), Some("ok, but only the CPU can render: use --cpu"), "{text}");
+        assert_eq!(text.matches("\n  scene: ok, ").count(), arguments.len() - 1, "{text}");
+    }
+}
+
+/// An empty file in the place of the Vulkan loader is as good as none.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_machine_without_a_loader_renders_on_the_cpu() {
+    let directory = TempDir::new().unwrap();
+    fs::write(directory.path().join("libvulkan.so.1"), "").unwrap();
+    let output = kdray(directory.path(), &["doctor"]).env("LD_LIBRARY_PATH", directory.path()).output().unwrap();
+    let text = stdout(&output);
+    assert_eq!(output.status.code(), Some(0), "{text}{}", stderr(&output));
+    assert!(text.contains("\nVulkan: wrong: no Vulkan loader"), "{text}");
+    assert_eq!(text.lines().last(), Some("ok, but only the CPU can render: use --cpu"), "{text}");
+}
+
+/// A picture that no memory holds is refused with what to do about it.
+#[test]
+fn a_picture_beyond_the_memory_ends_with_4() {
+    let directory = TempDir::new().unwrap();
+    let text = fs::read_to_string(cornell()).unwrap().replace("= 768", "= 16384");
+    fs::write(directory.path().join("large.toml"), text).unwrap();
+    let limited = "ulimit -v 4000000; exec \"$0\" doctor large.toml";
+    let output = std::process::Command::new("sh")
+        .args(["-c", limited, env!("CARGO_BIN_EXE_kdray")])
+        .current_dir(directory.path())
+        .output()
+        .unwrap();
+    let text = stdout(&output);
+    assert_eq!(output.status.code(), Some(4), "{text}{}", stderr(&output));
+    assert!(text.contains("  scene: wrong: ") && text.contains("--tile"), "{text}");
+    assert!(text.lines().last().unwrap().starts_with("wrong: neither a Vulkan device nor the CPU"), "{text}");
+}
