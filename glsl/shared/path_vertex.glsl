@@ -55,14 +55,14 @@ vec3 met_environment(PathRay ray, PathState state) {
 
 // The segment to a light that is picked at a hit.
 Segment segment_to_light(
-    uint depth, vec3 u, Surface surface, Material material, uint triangle_ix, vec3 to_viewer, vec3 throughput
+    uint depth, vec3 u, Surface surface, BsdfTerms terms, uint triangle_ix, vec3 throughput
 ) {
     Segment segment;
     segment.state = SEGMENT_NONE;
-    if (is_smooth(material)) return segment;
+    if (is_smooth(terms.material)) return segment;
     LightPick pick = pick_light(surface.point_world, u);
     if (pick.light == vec3(0.0)) return segment;
-    BsdfValue scattered = value_at(material, surface, to_viewer, pick.direction);
+    BsdfValue scattered = value_at(terms, surface, pick.direction);
     if (!any(greaterThan(scattered.value, vec3(0.0)))) return segment;
     float share = pick.density > 0.0 ? power_share(pick.density, scattered.density) : 1.0;
     vec3 light = added_light(throughput * scattered.value * pick.light * share, depth + 1u);
@@ -117,14 +117,12 @@ bool step_path(
     }
     // The last ray of a path only meets light.
     if (is_unlit(material) || depth + 1u >= frame.max_depth) return false;
-    vec3 to_viewer = -ray.direction;
+    BsdfTerms terms = bsdf_terms(material, surface, -ray.direction);
     uint first_pair = PAIRS_OF_CAMERA + PAIRS_OF_HIT * depth;
     vec2 to_light = random_pair(key, first_pair), choices = random_pair(key, first_pair + 1u);
     vec2 to_next = random_pair(key, first_pair + 2u), lobe = random_pair(key, first_pair + 3u);
-    segment = segment_to_light(
-        depth, vec3(to_light, choices.x), surface, material, hit.triangle_ix, to_viewer, throughput
-    );
-    BsdfSample next = sample_bsdf(material, surface, to_viewer, vec3(to_next, lobe.x));
+    segment = segment_to_light(depth, vec3(to_light, choices.x), surface, terms, hit.triangle_ix, throughput);
+    BsdfSample next = sample_bsdf(terms, surface, vec3(to_next, lobe.x));
     throughput *= next.weight;
     if (!any(greaterThan(throughput, vec3(0.0))) || !survives(depth, choices.y, throughput)) return false;
     ray = ray_from(surface, next.direction, hit.triangle_ix, ray, throughput);

@@ -3,7 +3,7 @@
 use glam::{Vec3, vec3};
 
 use super::{
-    bsdf::{is_smooth, sample_bsdf, value_at},
+    bsdf::{BsdfTerms, bsdf_terms, is_smooth, sample_bsdf, value_at},
     emitters::{
         ambient_radiance, emission_at, emission_density, environment_density, environment_radiance, pick_light,
         seen_light,
@@ -15,8 +15,8 @@ use super::{
     surface::Surface,
 };
 use crate::layout::{
-    Hit, LEAST_SURVIVAL, Material, NO_TRIANGLE, PathRay, PathState, ROULETTE_DEPTH, SEGMENT_NONE, SEGMENT_SHARE,
-    SEGMENT_WAITS, Segment,
+    Hit, LEAST_SURVIVAL, NO_TRIANGLE, PathRay, PathState, ROULETTE_DEPTH, SEGMENT_NONE, SEGMENT_SHARE, SEGMENT_WAITS,
+    Segment,
 };
 
 /// The number of pairs of random numbers that come before those of the first hit: in the pixel and in the lens.
@@ -65,23 +65,22 @@ const NO_SEGMENT: Segment = Segment {
 struct Vertex<'a> {
     depth: u32,
     surface: &'a Surface,
-    material: &'a Material,
+    terms: &'a BsdfTerms,
     triangle_ix: u32,
-    to_viewer: Vec3,
     throughput: Vec3,
 }
 
 /// The segment to a light that is picked at a hit.
 fn segment_to_light(inputs: &KernelInputs, u: Vec3, vertex: &Vertex) -> Segment {
-    let &Vertex { depth, surface, material, triangle_ix, to_viewer, throughput } = vertex;
-    if is_smooth(material) {
+    let &Vertex { depth, surface, terms, triangle_ix, throughput } = vertex;
+    if is_smooth(&terms.material) {
         return NO_SEGMENT;
     }
     let pick = pick_light(inputs, surface.point_world, u);
     if pick.light == Vec3::ZERO {
         return NO_SEGMENT;
     }
-    let scattered = value_at(material, surface, to_viewer, pick.direction);
+    let scattered = value_at(terms, surface, pick.direction);
     if !scattered.value.cmpgt(Vec3::ZERO).any() {
         return NO_SEGMENT;
     }
@@ -154,13 +153,12 @@ pub fn step_path(
     if is_unlit(&material) || depth + 1 >= inputs.frame().max_depth {
         return (false, NO_SEGMENT);
     }
-    let to_viewer = -ray.direction;
+    let terms = bsdf_terms(&material, &surface, -ray.direction);
     let first_pair = PAIRS_OF_CAMERA + PAIRS_OF_HIT * depth;
     let [to_light, choices, to_next, lobe] = [0, 1, 2, 3].map(|place| random_pair(key, first_pair + place));
-    let vertex =
-        Vertex { depth, surface: &surface, material: &material, triangle_ix: hit.triangle_ix, to_viewer, throughput };
+    let vertex = Vertex { depth, surface: &surface, terms: &terms, triangle_ix: hit.triangle_ix, throughput };
     let segment = segment_to_light(inputs, vec3(to_light.x, to_light.y, choices.x), &vertex);
-    let next = sample_bsdf(&material, &surface, to_viewer, vec3(to_next.x, to_next.y, lobe.x));
+    let next = sample_bsdf(&terms, &surface, vec3(to_next.x, to_next.y, lobe.x));
     throughput *= next.weight;
     if !throughput.cmpgt(Vec3::ZERO).any() || !survives(depth, choices.y, &mut throughput) {
         return (false, segment);

@@ -58,6 +58,8 @@ struct BsdfTerms {
     // Index of refraction on the viewer's side, divided by that of the other side. 1: light passes unbent.
     float eta;
     bool is_solid;
+    // Whether the interface reflects light or lets it pass. Without an interface, the base is Lambertian.
+    bool has_interface;
     // Share of the light that the layers above leave to the sheen, and to the interface.
     float sheen_share;
     float base_share;
@@ -175,9 +177,16 @@ float dielectric_albedo(vec3 dielectric, GgxAlbedo albedo) {
     return dielectric.x * at_normal + dielectric.y * albedo.grazing + dielectric.z * albedo.loss;
 }
 
+// The albedo of no interface.
+const GgxAlbedo NO_ALBEDO = GgxAlbedo(0.0, 0.0);
+
 // Sets the terms of the Lambertian lobe. albedo: of the interface, towards the viewer.
 void set_lambert(inout BsdfTerms terms, GgxAlbedo albedo, float roughness) {
     Material material = terms.material;
+    terms.between = vec3(0.0);
+    terms.dielectric = vec3(0.0);
+    terms.below = material.kd;
+    if (!terms.has_interface) return;
     GgxAlbedo mean = mean_ggx_albedo(roughness);
     vec3 at_normal = normal_reflectance(material);
     vec3 at_grazing = vec3(min(largest_of(material.ks), 1.0));
@@ -215,8 +224,12 @@ void set_layers(inout BsdfTerms terms, GgxAlbedo albedo) {
     sheen *= terms.sheen_bound;
     terms.sheen_share = 1.0 - coat;
     terms.base_share = terms.sheen_share * (1.0 - largest_of(material.sheen_colour) * sheen);
-    InterfaceSplit split = split_at(terms, cosine);
-    vec3 reflected = max(split.reflected, interface_albedo(terms, albedo));
+    InterfaceSplit split = InterfaceSplit(vec3(0.0), vec3(0.0));
+    vec3 reflected = vec3(0.0);
+    if (terms.has_interface) {
+        split = split_at(terms, cosine);
+        reflected = max(split.reflected, interface_albedo(terms, albedo));
+    }
     float left = max(1.0 - dielectric_albedo(terms.dielectric, albedo), 0.0);
     terms.choice = vec4(
         terms.base_share * (mean_of(reflected) + mean_of(split.transmitted)),
@@ -248,9 +261,10 @@ BsdfTerms bsdf_terms(Material material, Surface surface, vec3 to_viewer) {
     terms.is_solid = (material.flags & MATERIAL_SOLID) != 0u && passing_share(material) > 0.0;
     terms.eta = surface.from_inside ? material.ni : 1.0 / material.ni;
     if (!terms.is_solid || abs(material.ni - 1.0) < LEAST_INDEX_STEP) terms.eta = 1.0;
-    terms.between = vec3(0.0);
+    terms.has_interface = largest_of(material.ks) > 0.0 || material.metallic > 0.0 || material.transmission > 0.0;
     float roughness = sqrt(terms.width);
-    GgxAlbedo albedo = ggx_albedo(terms.to_viewer.z, roughness);
+    GgxAlbedo albedo = NO_ALBEDO;
+    if (terms.has_interface) albedo = ggx_albedo(terms.to_viewer.z, roughness);
     bool has_gain = (material.flags & MATERIAL_SINGLE_SCATTERING) == 0u && !terms.is_solid;
     terms.clear_gain = has_gain ? 1.0 / (1.0 - albedo.loss) : 1.0;
     set_lambert(terms, albedo, roughness);
@@ -261,7 +275,7 @@ BsdfTerms bsdf_terms(Material material, Surface surface, vec3 to_viewer) {
 
 // Adds the interface's reflection.
 void add_reflection(BsdfTerms terms, vec3 to_light, vec3 half_vector, inout BsdfValue sum) {
-    if (terms.width == 0.0) return;
+    if (terms.width == 0.0 || !terms.has_interface) return;
     float lobe = evaluate_reflection(terms.to_viewer, to_light, half_vector, terms.width);
     InterfaceSplit split = split_at(terms, dot(terms.to_viewer, half_vector));
     sum.value += terms.base_share * split.reflected * lobe;
@@ -281,7 +295,8 @@ void add_clearcoat(BsdfTerms terms, vec3 to_light, vec3 half_vector, inout BsdfV
 
 // Adds the Lambertian lobe.
 void add_lambert(BsdfTerms terms, vec3 to_light, inout BsdfValue sum) {
-    GgxAlbedo albedo = ggx_albedo(to_light.z, sqrt(terms.width));
+    GgxAlbedo albedo = NO_ALBEDO;
+    if (terms.has_interface) albedo = ggx_albedo(to_light.z, sqrt(terms.width));
     float left = max(1.0 - dielectric_albedo(terms.dielectric, albedo), 0.0);
     vec3 reflectance = terms.below * left + terms.between * albedo.loss;
     sum.value += terms.base_share * evaluate_lambert(reflectance, to_light);
@@ -337,22 +352,11 @@ bool is_consistent(Surface surface, vec3 direction, vec3 local) {
     return dot(surface.geometric, direction) * local.z > 0.0;
 }
 
-// The sum of all lobes but the delta lobes, at a surface: what `evaluate_bsdf` and `bsdf_density` return.
-BsdfValue value_at(Material material, Surface surface, vec3 to_viewer, vec3 to_light) {
-    BsdfTerms terms = bsdf_terms(material, surface, to_viewer);
+// The sum of all lobes but the delta lobes, at a surface.
+BsdfValue value_at(BsdfTerms terms, Surface surface, vec3 to_light) {
     vec3 local = to_local(terms.frame, to_light);
     if (terms.choice == vec4(0.0) || !is_consistent(surface, to_light, local)) return BsdfValue(vec3(0.0), 0.0);
     return value_of(terms, local);
-}
-
-// The scattered share of the light from a direction, times the cosine, without delta lobes.
-vec3 evaluate_bsdf(Material material, Surface surface, vec3 to_viewer, vec3 to_light) {
-    return value_at(material, surface, to_viewer, to_light).value;
-}
-
-// The density with which `sample_bsdf` samples a direction, per steradian, without delta lobes.
-float bsdf_density(Material material, Surface surface, vec3 to_viewer, vec3 to_light) {
-    return value_at(material, surface, to_viewer, to_light).density;
 }
 
 // A sample of a delta lobe. local: in the frame of the surface.
@@ -417,8 +421,7 @@ BsdfSample sample_clearcoat(BsdfTerms terms, Surface surface, vec2 u) {
 
 // A direction from which light is scattered to the viewer. u: random numbers in [0, 1). u.z selects the lobe, and
 // within the interface between reflection and transmission.
-BsdfSample sample_bsdf(Material material, Surface surface, vec3 to_viewer, vec3 u) {
-    BsdfTerms terms = bsdf_terms(material, surface, to_viewer);
+BsdfSample sample_bsdf(BsdfTerms terms, Surface surface, vec3 u) {
     vec4 choice = terms.choice;
     if (choice == vec4(0.0)) return BSDF_ABSORBED;
     if (u.z < choice.x) {

@@ -52,8 +52,8 @@ pub struct BsdfSample {
 
 /// What all lobes need that depends on the material and the viewer.
 #[derive(Clone, Copy, Debug)]
-struct BsdfTerms {
-    material: Material,
+pub struct BsdfTerms {
+    pub material: Material,
     frame: LocalFrame,
     to_viewer: Vec3,
     /// Width of the interface's distribution of normals. It is 0 if the interface is perfectly smooth.
@@ -64,6 +64,8 @@ struct BsdfTerms {
     /// Index of refraction on the viewer's side, divided by that of the other side. 1: light passes unbent.
     eta: f32,
     is_solid: bool,
+    /// Whether the interface reflects light or lets it pass. Without an interface, the base is Lambertian.
+    has_interface: bool,
     /// Share of the light that the layers above leave to the sheen.
     sheen_share: f32,
     /// Share of the light that the layers above leave to the interface.
@@ -201,9 +203,16 @@ fn dielectric_albedo(dielectric: Vec3, albedo: GgxAlbedo) -> f32 {
     dielectric.x * at_normal + dielectric.y * albedo.grazing + dielectric.z * albedo.loss
 }
 
+/// The albedo of no interface.
+const NO_ALBEDO: GgxAlbedo = GgxAlbedo { loss: 0.0, grazing: 0.0 };
+
 /// Sets the terms of the Lambertian lobe. `albedo`: of the interface, towards the viewer.
 fn set_lambert(terms: &mut BsdfTerms, albedo: GgxAlbedo, roughness: f32) {
     let material = &terms.material;
+    terms.below = material.kd;
+    if !terms.has_interface {
+        return;
+    }
     let mean = mean_ggx_albedo(roughness);
     let at_normal = normal_reflectance(material);
     let at_grazing = Vec3::splat(material.ks.max_element().min(1.0));
@@ -245,8 +254,11 @@ fn set_layers(terms: &mut BsdfTerms, albedo: GgxAlbedo) {
     let sheen = sheen * terms.sheen_bound;
     terms.sheen_share = 1.0 - coat;
     terms.base_share = terms.sheen_share * (1.0 - material.sheen_colour.max_element() * sheen);
-    let split = split_at(terms, cosine);
-    let reflected = split.reflected.max(interface_albedo(terms, albedo));
+    let (mut split, mut reflected) = (InterfaceSplit { reflected: Vec3::ZERO, transmitted: Vec3::ZERO }, Vec3::ZERO);
+    if terms.has_interface {
+        split = split_at(terms, cosine);
+        reflected = split.reflected.max(interface_albedo(terms, albedo));
+    }
     let left = (1.0 - dielectric_albedo(terms.dielectric, albedo)).max(0.0);
     let mut choice = Vec4::new(
         terms.base_share * (mean_of(reflected) + mean_of(split.transmitted)),
@@ -261,7 +273,7 @@ fn set_layers(terms: &mut BsdfTerms, albedo: GgxAlbedo) {
 }
 
 /// Returns the terms for a viewer.
-fn bsdf_terms(material: &Material, surface: &Surface, to_viewer: Vec3) -> BsdfTerms {
+pub fn bsdf_terms(material: &Material, surface: &Surface, to_viewer: Vec3) -> BsdfTerms {
     let mut material = *material;
     material.kd = material.kd.clamp(Vec3::ZERO, Vec3::ONE);
     material.sheen_colour = material.sheen_colour.clamp(Vec3::ZERO, Vec3::ONE);
@@ -274,7 +286,8 @@ fn bsdf_terms(material: &Material, surface: &Surface, to_viewer: Vec3) -> BsdfTe
     let bends = is_solid && !((material.ni - 1.0).abs() < LEAST_INDEX_STEP);
     let of_side = if surface.from_inside { material.ni } else { 1.0 / material.ni };
     let roughness = width.sqrt();
-    let albedo = ggx_albedo(to_viewer.z, roughness);
+    let has_interface = material.ks.max_element() > 0.0 || material.metallic > 0.0 || material.transmission > 0.0;
+    let albedo = if has_interface { ggx_albedo(to_viewer.z, roughness) } else { NO_ALBEDO };
     let has_gain = material.flags & MATERIAL_SINGLE_SCATTERING == 0 && !is_solid;
     let mut terms = BsdfTerms {
         material,
@@ -285,6 +298,7 @@ fn bsdf_terms(material: &Material, surface: &Surface, to_viewer: Vec3) -> BsdfTe
         sheen_roughness: material.sheen_roughness.clamp(LEAST_SHEEN_ROUGHNESS, 1.0),
         eta: if bends { of_side } else { 1.0 },
         is_solid,
+        has_interface,
         sheen_share: 1.0,
         base_share: 1.0,
         sheen_bound: 1.0,
@@ -304,7 +318,7 @@ fn bsdf_terms(material: &Material, surface: &Surface, to_viewer: Vec3) -> BsdfTe
 
 /// Adds the interface's reflection.
 fn add_reflection(terms: &BsdfTerms, to_light: Vec3, half_vector: Vec3, sum: &mut BsdfValue) {
-    if terms.width == 0.0 {
+    if terms.width == 0.0 || !terms.has_interface {
         return;
     }
     let lobe = evaluate_reflection(terms.to_viewer, to_light, half_vector, terms.width);
@@ -330,7 +344,7 @@ fn add_clearcoat(terms: &BsdfTerms, to_light: Vec3, half_vector: Vec3, sum: &mut
 
 /// Adds the Lambertian lobe.
 fn add_lambert(terms: &BsdfTerms, to_light: Vec3, sum: &mut BsdfValue) {
-    let albedo = ggx_albedo(to_light.z, terms.width.sqrt());
+    let albedo = if terms.has_interface { ggx_albedo(to_light.z, terms.width.sqrt()) } else { NO_ALBEDO };
     let left = (1.0 - dielectric_albedo(terms.dielectric, albedo)).max(0.0);
     let reflectance = terms.below * left + terms.between * albedo.loss;
     sum.value += terms.base_share * evaluate_lambert(reflectance, to_light);
@@ -396,24 +410,13 @@ fn is_consistent(surface: &Surface, direction: Vec3, local: Vec3) -> bool {
     surface.geometric.dot(direction) * local.z > 0.0
 }
 
-/// Returns the sum of all lobes but the delta lobes, at a surface: what [`evaluate_bsdf`] and [`bsdf_density`] return.
-pub fn value_at(material: &Material, surface: &Surface, to_viewer: Vec3, to_light: Vec3) -> BsdfValue {
-    let terms = bsdf_terms(material, surface, to_viewer);
+/// Returns the sum of all lobes but the delta lobes, at a surface.
+pub fn value_at(terms: &BsdfTerms, surface: &Surface, to_light: Vec3) -> BsdfValue {
     let local = to_local(&terms.frame, to_light);
     if terms.choice == Vec4::ZERO || !is_consistent(surface, to_light, local) {
         return BsdfValue { value: Vec3::ZERO, density: 0.0 };
     }
-    value_of(&terms, local)
-}
-
-/// Returns the scattered share of the light from a direction, times the cosine, without delta lobes.
-pub fn evaluate_bsdf(material: &Material, surface: &Surface, to_viewer: Vec3, to_light: Vec3) -> Vec3 {
-    value_at(material, surface, to_viewer, to_light).value
-}
-
-/// Returns the density with which [`sample_bsdf`] samples a direction, per steradian, without delta lobes.
-pub fn bsdf_density(material: &Material, surface: &Surface, to_viewer: Vec3, to_light: Vec3) -> f32 {
-    value_at(material, surface, to_viewer, to_light).density
+    value_of(terms, local)
 }
 
 /// Returns a sample of a delta lobe. `local`: in the frame of the surface.
@@ -491,23 +494,22 @@ fn sample_clearcoat(terms: &BsdfTerms, surface: &Surface, u: Vec2) -> BsdfSample
 
 /// Returns a direction from which light is scattered to the viewer. `u`: random numbers in [0, 1). `u.z` selects the
 /// lobe, and within the interface between reflection and transmission.
-pub fn sample_bsdf(material: &Material, surface: &Surface, to_viewer: Vec3, u: Vec3) -> BsdfSample {
-    let terms = bsdf_terms(material, surface, to_viewer);
+pub fn sample_bsdf(terms: &BsdfTerms, surface: &Surface, u: Vec3) -> BsdfSample {
     let choice = terms.choice;
     if choice == Vec4::ZERO {
         return BSDF_ABSORBED;
     }
     if u.z < choice.x {
-        return sample_interface(&terms, surface, u.xy().extend((u.z / choice.x).min(0.999_999_94)));
+        return sample_interface(terms, surface, u.xy().extend((u.z / choice.x).min(0.999_999_94)));
     }
     if u.z < choice.x + choice.y {
-        return rough_sample(&terms, surface, sample_lambert(u.xy()), true);
+        return rough_sample(terms, surface, sample_lambert(u.xy()), true);
     }
     if u.z < choice.x + choice.y + choice.z {
-        return sample_clearcoat(&terms, surface, u.xy());
+        return sample_clearcoat(terms, surface, u.xy());
     }
     if choice.w > 0.0 {
-        return rough_sample(&terms, surface, sample_sheen(u.xy()), true);
+        return rough_sample(terms, surface, sample_sheen(u.xy()), true);
     }
     BSDF_ABSORBED
 }

@@ -21,6 +21,18 @@ const VIEW_COSINES: [f32; 5] = [0.1, 0.3, 0.5, 0.8, 1.0];
 const SINGLE: u32 = MATERIAL_SINGLE_SCATTERING;
 const SOLID: u32 = MATERIAL_SOLID;
 
+fn sample_bsdf(material: &Material, surface: &Surface, to_viewer: Vec3, u: Vec3) -> BsdfSample {
+    super::sample_bsdf(&bsdf_terms(material, surface, to_viewer), surface, u)
+}
+
+fn evaluate_bsdf(material: &Material, surface: &Surface, to_viewer: Vec3, to_light: Vec3) -> Vec3 {
+    value_at(&bsdf_terms(material, surface, to_viewer), surface, to_light).value
+}
+
+fn bsdf_density(material: &Material, surface: &Surface, to_viewer: Vec3, to_light: Vec3) -> f32 {
+    value_at(&bsdf_terms(material, surface, to_viewer), surface, to_light).density
+}
+
 /// The triangle and the normals of the surface, with the normal z.
 fn flat(from_inside: bool) -> Surface {
     bent(Vec3::Z, from_inside)
@@ -463,6 +475,32 @@ fn extremes_give_finite_numbers() {
                     assert!(is_right && density.is_finite(), "{value} {density} {direction} {material:?}");
                 }
             }
+        }
+    }
+}
+
+/// Without an interface, its terms are left out. The result is what they give if the interface reflects next to nothing.
+#[test]
+fn a_surface_without_an_interface_is_the_limit_of_one_with_it() {
+    let surface = flat(false);
+    for (clearcoat, sheen) in [(0.0, 0.0), (0.7, 0.0), (0.0, 0.4)] {
+        let without = Material {
+            ks: Vec3::ZERO,
+            kd: vec3(0.7, 0.4, 0.1),
+            clearcoat,
+            sheen_colour: Vec3::splat(sheen),
+            ..white(0.5)
+        };
+        let with = Material { ks: Vec3::splat(1.0e-30), ..without };
+        assert_ne!(
+            bsdf_terms(&without, &surface, Vec3::Z).has_interface,
+            bsdf_terms(&with, &surface, Vec3::Z).has_interface
+        );
+        for i in 0..64 {
+            let (to_viewer, u) = (view(0.1 + 0.8 * point(i).x), point(i + 64));
+            let [a, b] = [&without, &with].map(|material| sample_bsdf(material, &surface, to_viewer, u));
+            assert!((a.weight - b.weight).abs().max_element() < 1.0e-6, "{a:?} {b:?}");
+            assert!((a.density - b.density).abs() < 1.0e-6 && (a.direction - b.direction).length() < 1.0e-6);
         }
     }
 }

@@ -5,7 +5,8 @@ import numpy as np
 
 from .description import ENVIRONMENT_HEIGHT, Diffuse, Emitting, Glass, Metal, environment_image
 
-mi.set_variant("llvm_ad_rgb", "scalar_rgb")
+if mi.variant() is None:
+    mi.set_variant("llvm_ad_rgb", "scalar_rgb")
 
 
 def rgb(colour):
