@@ -10,6 +10,7 @@
 //! difference between two pictures of equal noise is, on average, the error of their mean.
 
 use glam::UVec2;
+use rayon::prelude::*;
 
 use crate::{
     cpu,
@@ -68,23 +69,23 @@ pub struct NoisePicture {
 /// samples with those of their squared luminance, tile by tile.
 pub(super) type DrawTiles<'a> = dyn FnMut(&[TileSamples]) -> Result<(Drawn, Vec<[f32; 4]>), GpuError> + 'a;
 
-/// Number of tiles with which a device has enough to do. Their pixels have two million paths of 16 samples each, as many
-/// as a frame traces together.
+/// Number of tiles with which a device has enough to do: 16 samples of each of their pixels are two million paths, as
+/// many as a frame traces together.
 const ENOUGH_TILES: usize = 512;
 
 /// Returns into how many blocks the samples of each tile are divided, which are drawn together: a power of two.
-fn n_parts(n_tiles: usize, samples: SampleRange) -> u32 {
-    let wanted = (ENOUGH_TILES / n_tiles).max(1).ilog2();
+fn n_parts(n_tiles: usize, n_devices: usize, samples: SampleRange) -> u32 {
+    let wanted = (n_devices * ENOUGH_TILES / n_tiles).max(1).ilog2();
     let most = (samples.len() >> MOST_SAMPLES_LOG2).min(NoiseTiles::MOST_BLOCKS);
     most.min(1 << wanted)
 }
 
-/// Draws a picture of the options' crop until the goal is met. `progress` is called with the share of the work that is
+/// Draws a picture of the options' crop until the goal is met. `draw` shares the tiles among `n_devices`. `progress` is called with the share of the work that is
 /// done, as far as the noise tells it.
 pub(super) fn draw_until(
     goal: NoiseGoal,
     options: &RenderOptions,
-    draw: &mut DrawTiles,
+    (draw, n_devices): (&mut DrawTiles, usize),
     mut progress: impl FnMut(f32),
 ) -> Result<NoisePicture, GpuError> {
     let mut tiles: Vec<Tile> = NoiseTiles::places_of(&options.crop_or_whole()).into_iter().map(Tile::new).collect();
@@ -94,7 +95,7 @@ pub(super) fn draw_until(
         if noisy.is_empty() {
             break;
         }
-        let n_parts = n_parts(noisy.len(), block);
+        let n_parts = n_parts(noisy.len(), n_devices, block);
         let len = block.len() / n_parts;
         let part = |ix: u32| SampleRange { first: block.first + ix * len, end: block.first + (ix + 1) * len };
         let parts_of = |tile: &&mut Tile| {
@@ -103,18 +104,17 @@ pub(super) fn draw_until(
         };
         let (drawn, means) = draw(&noisy.iter().flat_map(parts_of).collect::<Vec<_>>())?;
         profile.add(&drawn.profile);
-        let layers: Vec<&[[f32; 4]]> = [&means[..]]
-            .into_iter()
-            .chain(drawn.light.0.iter().map(Vec::as_slice).filter(|it| !it.is_empty()))
-            .collect();
-        for (tile_ix, tile) in noisy.into_iter().enumerate() {
-            let pixels = tile_ix * n_parts as usize * N_PIXELS..(tile_ix + 1) * n_parts as usize * N_PIXELS;
+        let layers = drawn.light.0.iter().filter(|layer| !layer.is_empty()).map(Vec::as_slice);
+        let layers: Vec<&[[f32; 4]]> = [&means[..]].into_iter().chain(layers).collect();
+        let len_of_tile = n_parts as usize * N_PIXELS;
+        noisy.into_par_iter().enumerate().for_each(|(tile_ix, tile)| {
+            let pixels = tile_ix * len_of_tile..(tile_ix + 1) * len_of_tile;
             if block.first == 0 && options.features {
                 tile.features = drawn.features[pixels.clone()].to_vec();
             }
             let sums = layers.iter().flat_map(|layer| sum_of_parts(&layer[pixels.clone()], len as f32)).collect();
             tile.add(block, sums, options);
-        }
+        });
         let shares = tiles.iter().map(|tile| tile.share_of(goal)).sum::<f32>();
         progress(shares / tiles.len() as f32);
     }

@@ -120,7 +120,8 @@ impl Renderer {
         let options = self.options.clone();
         self.set_camera(camera);
         let progress = |share: f32| watcher.part(share);
-        let drawn = noise::draw_until(goal, &options, &mut |tiles| self.draw_tiles(tiles), progress);
+        let n_devices = if let Backend::Group(group) = &self.backend { group.n_devices() } else { 1 };
+        let drawn = noise::draw_until(goal, &options, (&mut |tiles| self.draw_tiles(tiles), n_devices), progress);
         // Also after an error, what is drawn next are rectangles.
         match &mut self.backend {
             Backend::Device(renderer) => {

@@ -22,7 +22,8 @@ impl BandedRenderer {
         let most_pixels = self.renderer.context.limits().storage_range / Pixels::bytes_per_pixel(&options);
         let most_tiles = (most_pixels as usize / NoiseTiles::N_PIXELS).clamp(1, NoiseTiles::MOST);
         let (mut all, mut means) = (Drawn::default(), Vec::with_capacity(tiles.len() * NoiseTiles::N_PIXELS));
-        for together in tiles.chunks(most_tiles) {
+        let n_chunks = tiles.len().div_ceil(most_tiles).max(1);
+        for together in tiles.chunks(tiles.len().div_ceil(n_chunks).max(1)) {
             let tiles = NoiseTiles::new(together);
             let (paths, n_samples) =
                 (PathOptions { first_sample: tiles.first_sample(), ..options.paths }, tiles.n_samples());

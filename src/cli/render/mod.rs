@@ -62,7 +62,7 @@ pub fn run(args: RenderArgs) -> Result<(), CliError> {
     }
     let (scene, load_ms) = load(args, &progress)?;
     if let Some(path) = path {
-        let path = path.from_origin(scene.origin);
+        let path = path.relative_to(scene.origin);
         for view in &mut views {
             view.camera = Some(path.camera_at(view.frame)?);
         }

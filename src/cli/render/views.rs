@@ -75,7 +75,7 @@ impl<'a> NamedPath<'a> {
     }
 
     /// Returns the path for a scene that was moved to the origin, as [`CameraPath::from_origin`] does.
-    pub fn from_origin(self, origin: DVec3) -> Self {
+    pub fn relative_to(self, origin: DVec3) -> Self {
         Self { path: self.path.from_origin(origin), ..self }
     }
 

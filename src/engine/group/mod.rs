@@ -138,6 +138,11 @@ impl RendererGroup {
         counted.into_iter().map(phrase).collect::<Vec<_>>().join(", ")
     }
 
+    /// Number of devices that have not failed.
+    pub fn n_devices(&self) -> usize {
+        self.members.len()
+    }
+
     /// Draws rectangles of the picture from now on, after noise tiles.
     ///
     /// # Errors

@@ -9,7 +9,7 @@ use crate::{
 };
 
 /// The fewest tiles that a GPU draws together. Fewer pixels leave parts of a large GPU idle.
-const FEWEST_TILES: u32 = 1 << 8;
+const FEWEST_TILES: u32 = 1 << 7;
 /// The same for a software driver.
 const FEWEST_SOFTWARE_TILES: u32 = 1;
 
