@@ -174,6 +174,26 @@ fn inspect_describes_the_scene_and_its_tree() {
     }
 }
 
+/// Inspection counts the lights of paths, and tells whether a tree picks them.
+#[test]
+fn inspect_tells_how_paths_pick_lights() {
+    let directory = TempDir::new().unwrap();
+    let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+    fs::write(directory.path().join("m.mtl"), "newmtl glow\nKe 1 1 1\n").unwrap();
+    for (n, expected) in [(255, "table"), (256, "tree")] {
+        let obj = format!("mtllib m.mtl\nusemtl glow\n{}", format!("{corners}f -3 -2 -1\n").repeat(n));
+        fs::write(directory.path().join("m.obj"), obj).unwrap();
+        fs::write(directory.path().join("s.toml"), "[[mesh]]\nfile = 'm.obj'\n").unwrap();
+        let text = stdout(&succeed(directory.path(), &["inspect", "s.toml"]));
+        let json = succeed(directory.path(), &["inspect", "s.toml", "--json"]).stdout;
+        let lights = serde_json::from_slice::<Value>(&json).unwrap()["path_lights"].clone();
+        // A scene without lights gets some, and a background.
+        let n_others = lights["lights"].as_u64().unwrap() - n as u64;
+        assert_eq!((n_others, lights["picked_by"].as_str()), (3, Some(expected)));
+        assert!(text.lines().any(|line| line.starts_with("picked by a") && line.ends_with(expected)), "{text}");
+    }
+}
+
 /// A scene file with three cameras, the last of which is orthographic, a spot light, and a mesh file with a map.
 fn write_scene(directory: &Path) {
     let write = |name: &str, content: &str| fs::write(directory.join(name), content).unwrap();

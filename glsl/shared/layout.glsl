@@ -439,13 +439,15 @@ struct Light {
     float outer_cos;
 };
 
-// What emits light and can be picked by the path tracer, 20 bytes: an entry of an alias table.
+// What emits light and can be picked by the path tracer, 20 bytes: an entry of an alias table. If there is a light
+// tree, its lights follow the table's entries. They have no threshold, `alias_ix` is the index of their leaf, and
+// `probability` is that of the tree.
 //
 // - `threshold`: the share of the entry's picks that stay with it, 0 to 1.
 // - `alias_ix`: the entry that gets the other picks.
 // - `probability`: with which the entry is picked in the end.
 // - `kind`: `EMITTER_LIGHT` and its like.
-// - `ix`: index of the light, the area light, the sun or the triangle; 0 for the environment.
+// - `ix`: index of the light, the area light, the sun or the triangle; 0 for the environment and for the tree.
 struct Emitter {
     float threshold;
     uint alias_ix;
@@ -465,6 +467,34 @@ struct Emitter {
 #define EMITTER_TRIANGLE 3u
 // What is seen beyond the scene.
 #define EMITTER_ENVIRONMENT 4u
+// The light tree: one of its lights is picked.
+#define EMITTER_TREE 5u
+
+// A node of the light tree, 48 bytes: what its lights send where. Nodes are in preorder: the left child of an inner
+// node follows it.
+//
+// - `centre`, `radius`: a sphere around the lights, world units.
+// - `axis`, `cos_spread`: a cone that holds the lights' own axes, as a unit vector and the cosine of the angle.
+//   -1: the lights shine in all directions.
+// - `intensity`: sum of what the lights emit along their axes, as a share of the whole tree.
+// - `cos_end`: cosine of the greatest angle to its own axis at which one of the lights shines.
+// - `next`: of an inner node the index of the right child, of a leaf the index of the `Emitter`.
+// - `flags`: `LIGHT_NODE_LEAF` and its like.
+struct LightNode {
+    vec3 centre;
+    float radius;
+    vec3 axis;
+    float cos_spread;
+    float intensity;
+    float cos_end;
+    uint next;
+    uint flags;
+};
+
+// The node is a leaf, which has one light.
+#define LIGHT_NODE_LEAF 1u
+// Some of the lights shine to both sides. `cos_spread` is then not negative.
+#define LIGHT_NODE_TWO_SIDED 2u
 
 // A light with an area or, for a sun, with a solid angle, 80 bytes. Only the path tracer knows such lights.
 //
@@ -476,7 +506,8 @@ struct Emitter {
 // - `area`: square world units. Of a sun, the disk's solid angle.
 // - `edge_u`, `edge_v`: from the centre of a rectangle to the middle of an edge. Of a disk and a sun, unit vectors.
 //   They are at right angles to one another and to the axis.
-// - `probability`: with which the light is picked.
+// - `probability`: with which the light is picked, or the light tree if the light is in it.
+// - `leaf_ix`: index of the light's node in the light tree. 0: the light is in no tree, or is alone in it.
 struct AreaLight {
     vec3 position;
     uint kind;
@@ -487,7 +518,7 @@ struct AreaLight {
     vec3 edge_u;
     float probability;
     vec3 edge_v;
-    uint reserved;
+    uint leaf_ix;
 };
 
 // The kinds of area lights.
@@ -829,13 +860,15 @@ struct Guide {
 // - `ambient`, `ground_ambient`: radiance that neither the camera nor mirrors see, from above and from below.
 //   `up_axis`: index of the coordinate that points up, 1 or 2.
 // - `environment_probability`: with which the environment is picked as a light.
-// - `n_emitters`, `emitters_begin`: number of entries of `Emitter`, and index in `texture_words` of the first one.
+// - `n_emitters`, `emitters_begin`: number of entries of the alias table of emitters, and index in `texture_words` of
+//   the first `Emitter`.
 // - `first_triangle_emitter`, `n_triangle_emitters`: index and number of the entries of triangles.
 // - `area_lights_begin`, `n_area_lights`, `n_suns`: index in `texture_words` of the first `AreaLight`, number of those
 //   that are no suns, and number of suns, which follow them.
 // - `environment_begin`: index in `texture_words` of the environment's map: pairs of a threshold and an alias, first
 //   for each row and then for each texel, and the texels. A texel is a linear colour, and the density with which its
 //   directions are picked if the environment is picked, per steradian. `NO_WORDS`: there is no map.
+// - `light_nodes_begin`: index in `texture_words` of the first `LightNode`. `NO_WORDS`: there is no light tree.
 // - `environment_width`, `environment_height`: size of the map, texels.
 // - `environment_turn`: by which the map is turned about +y, in turns, counter-clockwise as seen from above.
 // - The rest: the device address of each of the scene's arrays, low word first. 0 if kernels read the array by its
@@ -869,6 +902,8 @@ struct AccelConstants {
     uint environment_width;
     uint environment_height;
     float environment_turn;
+    uint light_nodes_begin;
+    uint reserved0;
 #define ARRAY(name, element, row, number) uvec2 name;
 #include "scene_arrays.glsl"
 #undef ARRAY

@@ -112,7 +112,7 @@ bool step_path(
     vec3 throughput = ray.throughput * unabsorbed(material, surface, hit.t);
     if (is_unlit(material) || any(greaterThan(material.ke, vec3(0.0)))) {
         vec3 light = is_unlit(material) ? emitted(material) : emission_at(hit.triangle_ix, hit.u, hit.v);
-        float share = share_of_met(state, emission_density(hit.triangle_ix, ray.direction, hit.t));
+        float share = share_of_met(state, emission_density(hit.triangle_ix, ray.origin, ray.direction, hit.t));
         state.radiance += added_light(throughput * light * share, depth);
     }
     // The last ray of a path only meets light.

@@ -201,6 +201,7 @@ impl AccelBuffers {
             textures_begin: NO_WORDS,
             emitters_begin: NO_WORDS,
             area_lights_begin: NO_WORDS,
+            light_nodes_begin: NO_WORDS,
             environment_begin: NO_WORDS,
             ..*constants
         };

@@ -8,10 +8,11 @@ use crate::{
     world::{Emitters, Textures},
 };
 
-const N_PARTS: usize = 10;
+const N_PARTS: usize = 11;
 
 /// The parts of the array, in their order: texels, textures, maps of materials, texture coordinates, corners; emitters,
-/// area lights; of the environment's map the alias tables of rows and of texels, and the texels.
+/// area lights, nodes of the light tree; of the environment's map the alias tables of rows and of texels, and the
+/// texels.
 pub struct TextureWords<'a> {
     parts: [&'a [u32]; N_PARTS],
     /// The constants of the emitters, without the indices at which their parts begin.
@@ -33,6 +34,7 @@ impl<'a> TextureWords<'a> {
             cast_slice(corners),
             cast_slice(&emitters.entries),
             cast_slice(&emitters.area_lights),
+            cast_slice(&emitters.light_nodes),
             rows,
             columns,
             map,
@@ -65,7 +67,7 @@ impl<'a> TextureWords<'a> {
             begin += part.len() as u32;
             here
         });
-        let [_, textures, maps, uvs, corners, emitters, area_lights, environment, _, _] = begins;
+        let [_, textures, maps, uvs, corners, emitters, area_lights, light_nodes, environment, _, _] = begins;
         let of_emitters = &self.emitters;
         *constants = AccelConstants {
             textures_begin: textures,
@@ -82,6 +84,7 @@ impl<'a> TextureWords<'a> {
             first_triangle_emitter: of_emitters.first_triangle_emitter,
             n_triangle_emitters: of_emitters.n_triangle_emitters,
             area_lights_begin: area_lights,
+            light_nodes_begin: light_nodes,
             n_area_lights: of_emitters.n_area_lights,
             n_suns: of_emitters.n_suns,
             environment_begin: environment,
@@ -99,13 +102,13 @@ mod tests {
 
     #[test]
     fn parts_follow_one_another() {
-        let parts: [&[u32]; N_PARTS] = [&[1, 2, 3], &[], &[4], &[5, 6], &[7], &[8], &[], &[9, 10], &[11], &[12]];
+        let parts: [&[u32]; N_PARTS] = [&[1, 2, 3], &[], &[4], &[5, 6], &[7], &[8], &[], &[9], &[10, 11], &[12], &[13]];
         let words = TextureWords { parts, emitters: AccelConstants { n_suns: 2, ..AccelConstants::default() } };
-        let mut whole = [0; 12];
+        let mut whole = [0; 13];
         words.write(0, &mut whole);
-        assert_eq!((words.len(), whole), (12, [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]));
-        for first in 0..12 {
-            for n in 0..=12 - first {
+        assert_eq!((words.len(), whole), (13, [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13]));
+        for first in 0..13 {
+            for n in 0..=13 - first {
                 let mut part = vec![0; n];
                 words.write(first, &mut part);
                 assert_eq!(part, whole[first..first + n]);
@@ -116,6 +119,7 @@ mod tests {
         let begins = [constants.textures_begin, constants.material_maps_begin, constants.uvs_begin];
         assert_eq!((begins, constants.corners_begin), ([NO_WORDS, 3, 4], 6));
         let begins = [constants.emitters_begin, constants.area_lights_begin, constants.environment_begin];
-        assert_eq!((begins, constants.n_suns), ([7, NO_WORDS, 8], 2));
+        assert_eq!((begins, constants.n_suns), ([7, NO_WORDS, 9], 2));
+        assert_eq!(constants.light_nodes_begin, 8);
     }
 }

@@ -65,9 +65,16 @@ pub fn chi_square(
         counts[sample().map_or(expected.len(), cell_of)] += 1.0;
     }
     let rest = (1.0 - expected.iter().sum::<f64>()).max(0.0);
+    let expected: Vec<f64> = expected.into_iter().chain([rest]).collect();
+    deviations(&counts, &expected)
+}
+
+/// Compares counts of picks with the probabilities of what was picked, as [`chi_square`] does.
+pub fn deviations(counts: &[f64], probabilities: &[f64]) -> f64 {
+    let n: f64 = counts.iter().sum();
     let (mut chi, mut n_cells, mut few) = (0.0, 0.0, (0.0, 0.0));
-    for (count, expected) in counts.iter().zip(expected.iter().copied().chain([rest])) {
-        let expected = expected * n as f64;
+    for (count, probability) in counts.iter().zip(probabilities) {
+        let expected = probability * n;
         if expected < 10.0 {
             few = (few.0 + count, few.1 + expected);
         } else {

@@ -29,7 +29,7 @@ pub mod camera;
 pub mod candidate;
 pub mod cast;
 #[cfg(test)]
-mod chi_square;
+pub(crate) mod chi_square;
 pub mod children;
 pub mod compact;
 pub mod counting;

@@ -146,7 +146,7 @@ pub fn step_path(
     if is_unlit(&material) || material.ke.cmpgt(Vec3::ZERO).any() {
         let light =
             if is_unlit(&material) { emitted(&material) } else { emission_at(inputs, hit.triangle_ix, hit.u, hit.v) };
-        let share = share_of_met(state, emission_density(inputs, hit.triangle_ix, ray.direction, hit.t));
+        let share = share_of_met(state, emission_density(inputs, hit.triangle_ix, ray.origin, ray.direction, hit.t));
         state.radiance += added_light(inputs, throughput * light * share, depth);
     }
     // The last ray of a path only meets light.

@@ -3,32 +3,38 @@
 use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 
 use super::{
     FlatScene,
     alias::{AliasEntry, alias_table, probabilities},
+    emissive::emissive_triangles,
     environment_map::EnvironmentMap,
+    light_bounds::LightBounds,
+    light_tree::{TreeLight, light_tree},
 };
 use crate::{
     layout::{
         AREA_SUN, AccelConstants, AreaLight, EMITTER_AREA, EMITTER_ENVIRONMENT, EMITTER_LIGHT, EMITTER_SUN,
-        EMITTER_TRIANGLE, Emitter, LIGHT_DIRECTIONAL, LIGHT_SPOT, Light, MATERIAL_UNLIT, Material, NO_TEXTURE,
-        Triangle,
+        EMITTER_TREE, EMITTER_TRIANGLE, Emitter, LIGHT_DIRECTIONAL, LIGHT_NODE_LEAF, LIGHT_SPOT, Light, LightNode,
     },
-    reference::texture::{sample_texture, uv_set_of},
     scene::{Ground, Up},
 };
 
-/// The number of parts of each edge of a triangle over whose cells the mean of its emission is taken.
-const EMISSION_CELLS: usize = 8;
+/// The number of lights from which on they are picked by a tree. The environment, directional lights and suns do not
+/// count.
+const LEAST_TREE_LIGHTS: usize = 256;
 
 /// Everything that emits light, as the path tracer picks it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Emitters {
-    /// An alias table: point, spot and directional lights, area lights, suns, triangles in their order, and the
-    /// environment. What has no power has no entry.
+    /// An alias table, and the lights of the tree. Without a tree: point, spot and directional lights, area lights,
+    /// suns, triangles in their order, and the environment. What has no power has no entry.
     pub entries: Vec<Emitter>,
+    /// The number of entries of the alias table. With a tree, these are directional lights, suns, the environment and,
+    /// as the last entry, the tree.
+    pub n_picked: usize,
+    /// The light tree; empty if the scene has few lights.
+    pub light_nodes: Vec<LightNode>,
     /// Rectangles, disks and spheres. The suns follow.
     pub area_lights: Vec<AreaLight>,
     /// The number of suns.
@@ -79,7 +85,8 @@ impl Emitters {
         }));
         let n_suns = suns.len();
         area_lights.extend(suns);
-        weighed.extend(triangles(scene));
+        let triangle = |(ix, power)| Weighed { kind: EMITTER_TRIANGLE, ix, power };
+        weighed.extend(emissive_triangles(scene).into_iter().map(triangle));
         let mean = environment.as_ref().map_or(luminance(scene.background), EnvironmentMap::mean_luminance);
         let power = (mean + luminance(ambient)) * 4.0 * PI * disk;
         weighed.push(Weighed { kind: EMITTER_ENVIRONMENT, ix: 0, power });
@@ -93,25 +100,27 @@ impl Emitters {
             up_axis: if ground.up == Up::Z { 2 } else { 1 },
             ..Self::default()
         };
-        made.set_entries(weighed);
+        made.set_entries(scene, weighed);
         made
     }
 
-    /// Makes the alias table, and notes the probabilities of area lights, suns and the environment.
-    fn set_entries(&mut self, mut weighed: Vec<Weighed>) {
+    /// Makes the alias table and the tree, and notes the probabilities of area lights, suns and the environment.
+    fn set_entries(&mut self, scene: &FlatScene, mut weighed: Vec<Weighed>) {
         // Infinite powers would leave no room for others.
         weighed.retain(|emitter| emitter.power > 0.0 && emitter.power.is_finite());
-        let powers: Vec<f64> = weighed.iter().map(|emitter| emitter.power).collect();
-        let table = alias_table(&powers);
-        let entry = |((emitter, entry), probability): ((&Weighed, AliasEntry), f64)| Emitter {
-            threshold: entry.threshold,
-            alias_ix: entry.alias_ix,
-            probability: probability as f32,
-            kind: emitter.kind,
-            ix: emitter.ix as u32,
+        let is_in_tree = |emitter: &Weighed| match emitter.kind {
+            EMITTER_LIGHT => scene.lights[emitter.ix].kind != LIGHT_DIRECTIONAL,
+            kind => kind == EMITTER_AREA || kind == EMITTER_TRIANGLE,
         };
-        let found = probabilities(&table);
-        self.entries = weighed.iter().zip(table).zip(found).map(entry).collect();
+        let n_in_tree = weighed.iter().filter(|emitter| is_in_tree(emitter)).count();
+        if n_in_tree >= LEAST_TREE_LIGHTS {
+            let (lights, others) = weighed.into_iter().partition(is_in_tree);
+            self.set_table_with_tree(others, &lights);
+            self.set_tree(scene, &lights);
+        } else {
+            self.entries = table_of(&weighed);
+            self.n_picked = self.entries.len();
+        }
         let n_shapes = self.area_lights.len() - self.n_suns;
         for emitter in &self.entries {
             match emitter.kind {
@@ -121,9 +130,44 @@ impl Emitters {
                 _ => {}
             }
         }
-        let first = self.entries.partition_point(|emitter| emitter.kind < EMITTER_TRIANGLE);
-        let end = self.entries.partition_point(|emitter| emitter.kind <= EMITTER_TRIANGLE);
-        self.triangle_entries = (first, end - first);
+        let all = &self.entries;
+        let triangle = all.iter().position(|emitter| emitter.kind == EMITTER_TRIANGLE);
+        let n_triangles = all.iter().filter(|emitter| emitter.kind == EMITTER_TRIANGLE).count();
+        self.triangle_entries = (triangle.unwrap_or(0), n_triangles);
+    }
+
+    /// Makes the alias table of a tree and of the emitters that are in none, and the entries of the tree's lights.
+    fn set_table_with_tree(&mut self, mut others: Vec<Weighed>, lights: &[Weighed]) {
+        let power = lights.iter().map(|light| light.power).sum();
+        others.push(Weighed { kind: EMITTER_TREE, ix: 0, power });
+        self.entries = table_of(&others);
+        self.n_picked = self.entries.len();
+        let probability = self.entries[self.n_picked - 1].probability;
+        let entry =
+            |light: &Weighed| Emitter { probability, kind: light.kind, ix: light.ix as u32, ..Emitter::default() };
+        self.entries.extend(lights.iter().map(entry));
+    }
+
+    /// Builds the tree, and notes the leaf of each light.
+    fn set_tree(&mut self, scene: &FlatScene, lights: &[Weighed]) {
+        let of_light = |(ix, light): (usize, &Weighed)| TreeLight {
+            bounds: match light.kind {
+                EMITTER_LIGHT => LightBounds::of_light(&scene.lights[light.ix]),
+                EMITTER_AREA => LightBounds::of_area_light(&scene.area_lights[light.ix]),
+                _ => LightBounds::of_triangle(&scene.triangles[light.ix], light.power / (2.0 * PI)),
+            },
+            emitter_ix: (self.n_picked + ix) as u32,
+        };
+        self.light_nodes = light_tree(lights.iter().enumerate().map(of_light).collect());
+        for (leaf_ix, node) in self.light_nodes.iter().enumerate() {
+            if node.flags & LIGHT_NODE_LEAF != 0 {
+                let emitter = &mut self.entries[node.next as usize];
+                emitter.alias_ix = leaf_ix as u32;
+                if emitter.kind == EMITTER_AREA {
+                    self.area_lights[emitter.ix as usize].leaf_ix = leaf_ix as u32;
+                }
+            }
+        }
     }
 
     /// Returns the rectangles, disks and spheres.
@@ -134,6 +178,17 @@ impl Emitters {
     /// Returns the suns.
     pub fn suns(&self) -> &[AreaLight] {
         &self.area_lights[self.area_lights.len() - self.n_suns..]
+    }
+
+    /// Returns whether a tree picks the lights, and not the alias table alone.
+    pub fn has_tree(&self) -> bool {
+        !self.light_nodes.is_empty()
+    }
+
+    /// Returns the number of all that can be picked: lights, emitting triangles, suns and the environment.
+    pub fn n_lights(&self) -> usize {
+        // The tree has an entry, too.
+        self.entries.len() - usize::from(self.has_tree())
     }
 
     /// Returns the entries of triangles.
@@ -152,7 +207,7 @@ impl Emitters {
             ambient: self.ambient,
             ground_ambient: self.ground_ambient,
             up_axis: self.up_axis as u32,
-            n_emitters: self.entries.len() as u32,
+            n_emitters: self.n_picked as u32,
             first_triangle_emitter: self.triangle_entries.0 as u32,
             n_triangle_emitters: self.triangle_entries.1 as u32,
             n_area_lights: self.shapes().len() as u32,
@@ -163,6 +218,21 @@ impl Emitters {
             ..AccelConstants::default()
         }
     }
+}
+
+/// Returns the alias table of emitters.
+fn table_of(weighed: &[Weighed]) -> Vec<Emitter> {
+    let powers: Vec<f64> = weighed.iter().map(|emitter| emitter.power).collect();
+    let table = alias_table(&powers);
+    let found = probabilities(&table);
+    let entry = |((emitter, entry), probability): ((&Weighed, AliasEntry), f64)| Emitter {
+        threshold: entry.threshold,
+        alias_ix: entry.alias_ix,
+        probability: probability as f32,
+        kind: emitter.kind,
+        ix: emitter.ix as u32,
+    };
+    weighed.iter().zip(table).zip(found).map(entry).collect()
 }
 
 /// Returns the luminance of linear RGB.
@@ -218,57 +288,4 @@ fn sun(light: &Light) -> AreaLight {
         edge_v,
         ..AreaLight::default()
     }
-}
-
-/// Returns whether a material emits light that reaches other surfaces.
-pub(super) fn is_emissive(material: &Material) -> bool {
-    material.ke != Vec3::ZERO && material.flags & MATERIAL_UNLIT == 0
-}
-
-/// Returns the triangles that emit light.
-fn triangles(scene: &FlatScene) -> Vec<Weighed> {
-    let emissive: Vec<bool> = scene.materials.iter().map(is_emissive).collect();
-    if !emissive.contains(&true) {
-        return Vec::new();
-    }
-    let of_triangle = |(ix, material_ix): (usize, &u32)| {
-        if !emissive[*material_ix as usize] {
-            return None;
-        }
-        let area = area_of(&scene.triangles[ix]);
-        let emission = mean_emission(scene, ix, *material_ix as usize);
-        Some(Weighed { kind: EMITTER_TRIANGLE, ix, power: 2.0 * PI * area * luminance(emission) })
-    };
-    scene.triangle_materials.par_iter().enumerate().filter_map(of_triangle).collect()
-}
-
-/// Returns the area as kernels see it: 0 if its square underflows.
-fn area_of(t: &Triangle) -> f64 {
-    f64::from((t.v1 - t.v0).cross(t.v2 - t.v0).length()) / 2.0
-}
-
-/// Returns the mean radiance that a triangle emits.
-fn mean_emission(scene: &FlatScene, triangle_ix: usize, material_ix: usize) -> Vec3 {
-    let (textures, ke) = (&scene.textures, scene.materials[material_ix].ke);
-    let texture_ix = textures.material_maps.get(material_ix).map_or(NO_TEXTURE, |maps| maps.emission);
-    let Some(map) = textures.textures.get(texture_ix as usize) else { return ke };
-    let sum: Vec3 = middles_of_cells()
-        .map(|[u, v]| {
-            let uv = textures.uv_at(triangle_ix as u32, uv_set_of(map), u, v);
-            sample_texture(&textures.texels, map, uv, 0.0).truncate().max(Vec3::ZERO)
-        })
-        .sum();
-    ke * sum / (EMISSION_CELLS * EMISSION_CELLS) as f32
-}
-
-/// Returns the barycentric weights of the middles of the equal cells into which lines parallel to the edges cut a
-/// triangle.
-fn middles_of_cells() -> impl Iterator<Item = [f32; 2]> {
-    const N: usize = EMISSION_CELLS;
-    let cells = (0..N).flat_map(|i| (0..N - i).map(move |j| (i, j)));
-    cells.flat_map(|(i, j)| {
-        let place = |offset: f32| [i, j].map(|cell| (cell as f32 + offset) / N as f32);
-        // The second cell, which is turned round, does not exist at the long edge.
-        [Some(place(1.0 / 3.0)), (i + j + 1 < N).then(|| place(2.0 / 3.0))].into_iter().flatten()
-    })
 }

@@ -3,12 +3,17 @@
 
 mod alias;
 mod corners;
+mod emissive;
 mod emitters;
 mod environment_map;
 mod flat;
 mod frame_constants;
 mod geometry;
 mod levels;
+mod light_bounds;
+mod light_tree;
+#[cfg(test)]
+mod light_tree_tests;
 mod mismatch;
 mod path_materials;
 mod scene_hash;

@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{FlatScene, emitters::is_emissive};
+use super::{FlatScene, emissive::is_emissive};
 use crate::scene::{Environment, Up};
 
 /// Factor on the light of surfaces and lights with an area: others reflect half of it again and again.

@@ -16,14 +16,14 @@ use super::studio::{assert_silent, device, world_of};
 use crate::support::{meshes, scenes};
 
 /// The reflectance of the floor, which is the plane y = 0.
-const REFLECTANCE: f32 = 0.8;
+pub const REFLECTANCE: f32 = 0.8;
 /// The height of the lamps, world units.
-const LAMP_HEIGHT: f32 = 3.0;
+pub const LAMP_HEIGHT: f32 = 3.0;
 /// Rows of a picture, which all show the same within the tolerance of the tests.
 const N_ROWS: u32 = 4;
 
 /// Returns the floor, of which a camera below the lamp shows a strip that is `width` wide, along x.
-fn floor(width: f32, n_columns: u32) -> FlatScene {
+pub fn floor(width: f32, n_columns: u32) -> FlatScene {
     let mut scene = scenes::empty();
     let corner = |x: f32, z: f32| vec3(x, 0.0, z);
     let floor = [
@@ -67,7 +67,7 @@ fn columns(picture: &Picture) -> Vec<f32> {
     (0..width).map(|x| column(x) / N_ROWS as f32).collect()
 }
 
-fn on_device(scene: &FlatScene, n_columns: u32, n_samples: u32) -> Vec<f32> {
+pub fn on_device(scene: &FlatScene, n_columns: u32, n_samples: u32) -> Vec<f32> {
     let context = device();
     let mut renderer = Renderer::new(context.clone(), &world_of(scene), &options(n_columns)).expect("a renderer");
     while renderer.n_samples() < n_samples {
@@ -78,7 +78,7 @@ fn on_device(scene: &FlatScene, n_columns: u32, n_samples: u32) -> Vec<f32> {
     columns(&renderer.picture().expect("a picture"))
 }
 
-fn on_cpu(scene: &FlatScene, n_columns: u32, n_samples: u32) -> Vec<f32> {
+pub fn on_cpu(scene: &FlatScene, n_columns: u32, n_samples: u32) -> Vec<f32> {
     let mut renderer = cpu::Renderer::new(&world_of(scene), &options(n_columns), Batching::default());
     while renderer.n_samples() < n_samples {
         renderer.set_samples_per_frame(samples_log2(renderer.n_samples(), n_samples));
@@ -88,7 +88,7 @@ fn on_cpu(scene: &FlatScene, n_columns: u32, n_samples: u32) -> Vec<f32> {
 }
 
 /// Returns the places of the columns' middles on the floor.
-fn places(width: f32, n_columns: u32) -> impl Iterator<Item = f32> {
+pub fn places(width: f32, n_columns: u32) -> impl Iterator<Item = f32> {
     (0..n_columns).map(move |column| ((column as f32 + 0.5) / n_columns as f32 - 0.5) * width)
 }
 
@@ -106,7 +106,7 @@ const LAMP: AreaLight = AreaLight {
     edge_u: Vec3::X,
     probability: 1.0,
     edge_v: Vec3::Z,
-    reserved: 0,
+    leaf_ix: 0,
 };
 
 fn rectangle((half_width, half_length): (f32, f32)) -> AreaLight {

@@ -18,6 +18,7 @@ mod lanes;
 mod large;
 mod light_layers;
 mod living;
+mod many_lamps;
 mod mismatch;
 mod orthographic;
 mod parts;

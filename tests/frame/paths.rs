@@ -59,7 +59,18 @@ fn all_kinds() -> Vec<(&'static str, FlatScene)> {
         scenes::add(&mut scene, meshes::torus(6, 5), scenes::emissive(vec3(3.0, 2.0, 1.0)));
         scene
     };
+    let many_lamps = |mut scene: FlatScene| {
+        let mut triangles = Vec::new();
+        for ix in 0..130 {
+            let corner = vec3((ix % 8) as f32 - 4.0, 3.0, (ix / 8) as f32 - 8.0);
+            triangles.push(meshes::triangle(corner, corner + 0.1 * Vec3::X, corner + 0.1 * Vec3::Z));
+            scene.lights.push(scenes::point_light(corner + 0.5, Vec3::splat(0.1)));
+        }
+        scenes::add(&mut scene, triangles, scenes::emissive(Vec3::splat(30.0)));
+        scene
+    };
     vec![
+        ("with many lamps", many_lamps(scenes::mixed_outdoors())),
         ("indoors", scenes::mixed()),
         ("outdoors", scenes::mixed_outdoors()),
         ("with a lamp", lamp(scenes::mixed())),

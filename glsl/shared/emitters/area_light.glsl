@@ -11,6 +11,7 @@
 #include "emitters/rectangle.glsl"
 #include "emitters/disk.glsl"
 #include "emitters/sphere.glsl"
+#include "emitters/tree.glsl"
 
 // What a ray sees of the area lights. t: distance of the nearest one, infinity if it meets none. density: with which
 // pick_light picks the direction, per steradian.
@@ -30,7 +31,7 @@ AreaLight area_light_at(uint light_ix) {
     return AreaLight(
         load_vector(at), load_texture_words(at + 3u), load_vector(at + 4u), load_float(at + 7u),
         load_vector(at + 8u), load_float(at + 11u), load_vector(at + 12u), load_float(at + 15u),
-        load_vector(at + 16u), 0u
+        load_vector(at + 16u), load_texture_words(at + 19u)
     );
 }
 
@@ -59,11 +60,14 @@ SeenLight seen_light(vec3 origin, vec3 direction, float t_max) {
     if (light.kind == AREA_RECTANGLE) density = rectangle_density(light, origin, direction, nearest);
     else if (light.kind == AREA_DISK) density = flat_density(light, direction, nearest);
     else density = sphere_density(light, origin);
-    return SeenLight(nearest, light.radiance, light.probability * density);
+    float probability = light.probability * tree_probability(origin, light.leaf_ix);
+    return SeenLight(nearest, light.radiance, probability * density);
 }
 
-LightPick pick_area_light(uint light_ix, vec3 point_world, vec2 u) {
+// probability: with which this light is picked.
+LightPick pick_area_light(uint light_ix, vec3 point_world, vec2 u, float probability) {
     AreaLight light = area_light_at(light_ix);
+    light.probability = probability;
     if (light.kind == AREA_RECTANGLE) return pick_rectangle(light, point_world, u);
     if (light.kind == AREA_DISK) return pick_disk(light, point_world, u);
     return pick_sphere(light, point_world, u);

@@ -1,5 +1,6 @@
 // The emitters of the path tracer: what a point of a surface may get light from. One emitter is picked with a
-// probability by its power, and then a direction towards it. Twin of src/reference/emitters/mod.rs.
+// probability by its power or, where there are many, by what it may send to the point. Then a direction towards it is
+// picked. Twin of src/reference/emitters/mod.rs.
 //
 // Needs the bindings `lights` and `materials` (material.glsl), and the words of textures.
 #ifndef KDRAY_EMITTERS
@@ -13,6 +14,7 @@
 #include "emitters/environment.glsl"
 #include "emitters/pick.glsl"
 #include "emitters/punctual.glsl"
+#include "emitters/tree.glsl"
 #include "emitters/triangle.glsl"
 
 // The share of the way to a light within which another light hides it. What is beyond counts as the light itself.
@@ -32,12 +34,18 @@ LightPick pick_light(vec3 point_world, vec3 u) {
     if (accel.n_emitters == 0u) return no_pick();
     // Tables of many entries need more bits than u.x has. The lowest bits of u.y hardly move the point that is picked.
     float more = fract(u.y * 4096.0);
-    Emitter emitter = emitter_at(pick_alias(accel.emitters_begin, 5u, accel.n_emitters, u.x, more).ix);
+    AliasPick picked = pick_alias(accel.emitters_begin, 5u, accel.n_emitters, u.x, more);
+    Emitter emitter = emitter_at(picked.ix);
+    if (emitter.kind == EMITTER_TREE) {
+        TreePick light = pick_in_tree(point_world, picked.rest, more);
+        emitter = emitter_at(light.emitter_ix);
+        emitter.probability *= light.probability;
+    }
     LightPick pick = no_pick();
     if (emitter.kind == EMITTER_LIGHT) {
         pick = pick_punctual(lights[emitter.ix], point_world, emitter.probability);
     } else if (emitter.kind == EMITTER_AREA) {
-        pick = pick_area_light(emitter.ix, point_world, u.yz);
+        pick = pick_area_light(emitter.ix, point_world, u.yz, emitter.probability);
     } else if (emitter.kind == EMITTER_SUN) {
         pick = pick_sun(emitter.ix, u.yz);
     } else if (emitter.kind == EMITTER_TRIANGLE) {
@@ -51,9 +59,9 @@ LightPick pick_light(vec3 point_world, vec3 u) {
     return pick;
 }
 
-// The density with which pick_light picks the point of a triangle that is seen in a direction at a distance, per
-// steradian; 0 for a triangle that is never picked. direction: a unit vector.
-float emission_density(uint triangle_ix, vec3 direction, float distance) {
+// The density with which pick_light picks the point of a triangle that is seen from a point in a direction at a
+// distance, per steradian; 0 for a triangle that is never picked. direction: a unit vector.
+float emission_density(uint triangle_ix, vec3 point_world, vec3 direction, float distance) {
     uint low = accel.first_triangle_emitter, end = low + accel.n_triangle_emitters;
     // The first entry whose triangle has this index or a larger one.
     uint high = end;
@@ -68,6 +76,7 @@ float emission_density(uint triangle_ix, vec3 direction, float distance) {
     if (low == end) return 0.0;
     Emitter emitter = emitter_at(low);
     if (emitter.ix != triangle_ix) return 0.0;
+    if (accel.light_nodes_begin != NO_WORDS) emitter.probability *= tree_probability(point_world, emitter.alias_ix);
     return emitter.probability * area_density(triangle_at(triangle_ix), direction, distance);
 }
 

@@ -11,7 +11,7 @@ use kdray::{
     gpu::GpuError,
     layout::{LIGHT_DIRECTIONAL, LIGHT_SPOT, Light},
     scene::Scene,
-    world::{FlatScene, Mismatch, World},
+    world::{Emitters, FlatScene, Mismatch, World},
 };
 use serde::Serialize;
 
@@ -57,6 +57,7 @@ pub fn run(args: &InspectArgs) -> Result<(), CliError> {
         lights: scene.lights.iter().map(LightUse::from).collect(),
         contents,
         texture_memory: TextureMemory::from(&scene.textures),
+        path_lights: PathLights::from(world.emitters()),
         path_memory: PathMemory::of_samples(scene.defaults.of_paths.samples),
         accel: statistics,
         load_ms,
@@ -86,12 +87,33 @@ struct Inspection {
     #[serde(flatten)]
     contents: Contents,
     texture_memory: TextureMemory,
+    path_lights: PathLights,
     path_memory: PathMemory,
     /// Statistics of the acceleration structure, serialized under the key `tree` or `grid`.
     #[serde(flatten)]
     accel: Statistics,
     load_ms: f64,
     build_ms: f64,
+}
+
+/// The lights from which `--integrator path` picks: those above, lamps, emitting triangles and the environment.
+#[derive(Serialize)]
+struct PathLights {
+    lights: usize,
+    picked_by: &'static str,
+}
+
+impl From<&Emitters> for PathLights {
+    fn from(emitters: &Emitters) -> Self {
+        Self { lights: emitters.n_lights(), picked_by: if emitters.has_tree() { "tree" } else { "table" } }
+    }
+}
+
+impl PathLights {
+    fn text(&self) -> String {
+        let rows = [["lights", &self.lights.to_string()], ["picked by a", self.picked_by]];
+        table(["path tracing", ""], &rows.map(|row| row.map(str::to_owned)))
+    }
 }
 
 /// The memory on a device that `--integrator path` takes beside the scene.
@@ -192,6 +214,8 @@ impl Inspection {
         text += &self.accel_text();
         text.push('\n');
         text += &text::contents(&self.contents, &self.materials, &self.lights, &self.texture_memory);
+        text.push('\n');
+        text += &self.path_lights.text();
         text.push('\n');
         text + &self.path_memory.text()
     }

@@ -8,6 +8,7 @@ use super::{
     pick::LightPick,
     rectangle::{flat_density, hit_rectangle, pick_rectangle, rectangle_density},
     sphere::{hit_sphere, pick_sphere, sphere_density},
+    tree::tree_probability,
 };
 use crate::{
     layout::{AREA_DISK, AREA_RECTANGLE, AreaLight},
@@ -38,7 +39,8 @@ fn hit_area_light(light: &AreaLight, origin: Vec3, direction: Vec3) -> f32 {
 /// backs of rectangles and disks and the insides of spheres are not seen.
 pub fn seen_light(inputs: &KernelInputs, origin: Vec3, direction: Vec3, t_max: f32) -> SeenLight {
     let (mut nearest, mut seen) = (f32::INFINITY, None);
-    for light in inputs.emitters.into_iter().flat_map(|emitters| emitters.shapes()) {
+    let (shapes, nodes) = inputs.emitters.map_or((&[][..], &[][..]), |it| (it.shapes(), &it.light_nodes));
+    for light in shapes {
         let t = hit_area_light(light, origin, direction);
         if t < nearest && t < t_max {
             (nearest, seen) = (t, Some(light));
@@ -50,13 +52,16 @@ pub fn seen_light(inputs: &KernelInputs, origin: Vec3, direction: Vec3, t_max: f
         AREA_DISK => flat_density(light, direction, nearest),
         _ => sphere_density(light, origin),
     };
-    SeenLight { t: nearest, radiance: light.radiance, density: light.probability * density }
+    let probability = light.probability * tree_probability(nodes, origin, light.leaf_ix);
+    SeenLight { t: nearest, radiance: light.radiance, density: probability * density }
 }
 
-pub(super) fn pick_area_light(light: &AreaLight, point_world: Vec3, u: Vec2) -> LightPick {
+/// `probability`: with which this light is picked.
+pub(super) fn pick_area_light(light: AreaLight, point_world: Vec3, u: Vec2, probability: f32) -> LightPick {
+    let light = AreaLight { probability, ..light };
     match light.kind {
-        AREA_RECTANGLE => pick_rectangle(light, point_world, u),
-        AREA_DISK => pick_disk(light, point_world, u),
-        _ => pick_sphere(light, point_world, u),
+        AREA_RECTANGLE => pick_rectangle(&light, point_world, u),
+        AREA_DISK => pick_disk(&light, point_world, u),
+        _ => pick_sphere(&light, point_world, u),
     }
 }

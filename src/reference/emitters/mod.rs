@@ -11,6 +11,9 @@ mod sphere;
 mod sun;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tests_of_many;
+pub mod tree;
 pub mod triangle;
 
 use glam::{Vec2, Vec3};
@@ -20,6 +23,7 @@ use self::{
     area_light::pick_area_light,
     environment::{pick_environment, pick_sun},
     punctual::pick_punctual,
+    tree::{pick_in_tree, tree_probability},
     triangle::{area_density, pick_triangle},
 };
 pub use self::{
@@ -29,7 +33,7 @@ pub use self::{
     triangle::emission_at,
 };
 use super::inputs::KernelInputs;
-use crate::layout::{EMITTER_AREA, EMITTER_LIGHT, EMITTER_SUN, EMITTER_TRIANGLE};
+use crate::layout::{EMITTER_AREA, EMITTER_LIGHT, EMITTER_SUN, EMITTER_TREE, EMITTER_TRIANGLE, Emitter};
 
 /// The share of the way to a light within which another light hides it. What is beyond counts as the light itself.
 const LIGHT_HIDES_UP_TO: f32 = 0.9999;
@@ -43,11 +47,17 @@ pub fn pick_light(inputs: &KernelInputs, point_world: Vec3, u: Vec3) -> LightPic
     // Tables of many entries need more bits than u.x has. The lowest bits of u.y hardly move the point that is picked.
     let more = (u.y * 4096.0).fract();
     let entry = |ix: u32| (emitters.entries[ix as usize].threshold, emitters.entries[ix as usize].alias_ix);
-    let emitter = &emitters.entries[pick_alias(emitters.entries.len() as u32, entry, u.x, more).ix as usize];
+    let picked = pick_alias(emitters.n_picked as u32, entry, u.x, more);
+    let mut emitter = emitters.entries[picked.ix as usize];
+    if emitter.kind == EMITTER_TREE {
+        let light = pick_in_tree(&emitters.light_nodes, point_world, picked.rest, more);
+        emitter = emitters.entries[light.emitter_ix as usize];
+        emitter.probability *= light.probability;
+    }
     let (ix, rest) = (emitter.ix as usize, Vec2::new(u.y, u.z));
     let pick = match emitter.kind {
         EMITTER_LIGHT => pick_punctual(&inputs.lights[ix], point_world, emitter.probability),
-        EMITTER_AREA => pick_area_light(&emitters.shapes()[ix], point_world, rest),
+        EMITTER_AREA => pick_area_light(emitters.shapes()[ix], point_world, rest, emitter.probability),
         EMITTER_SUN => pick_sun(emitters, &emitters.suns()[ix], rest),
         EMITTER_TRIANGLE => pick_triangle(inputs, emitter.ix, point_world, rest, emitter.probability),
         _ => pick_environment(emitters, rest),
@@ -56,10 +66,21 @@ pub fn pick_light(inputs: &KernelInputs, point_world: Vec3, u: Vec3) -> LightPic
     if before.t.is_infinite() { pick } else { LightPick::NONE }
 }
 
-/// The density with which [`pick_light`] picks the point of a triangle that is seen in a direction at a distance, per
-/// steradian; 0 for a triangle that is never picked. `direction`: a unit vector.
-pub fn emission_density(inputs: &KernelInputs, triangle_ix: u32, direction: Vec3, distance: f32) -> f32 {
-    let triangles = inputs.emitters.map_or(&[][..], |emitters| emitters.triangles());
+/// The density with which [`pick_light`] picks the point of a triangle that is seen from a point in a direction at a
+/// distance, per steradian; 0 for a triangle that is never picked. `direction`: a unit vector.
+pub fn emission_density(
+    inputs: &KernelInputs,
+    triangle_ix: u32,
+    point_world: Vec3,
+    direction: Vec3,
+    distance: f32,
+) -> f32 {
+    let Some(emitters) = inputs.emitters else { return 0.0 };
+    let triangles = emitters.triangles();
     let Ok(ix) = triangles.binary_search_by_key(&triangle_ix, |emitter| emitter.ix) else { return 0.0 };
-    triangles[ix].probability * area_density(&inputs.triangles[triangle_ix as usize], direction, distance)
+    let Emitter { mut probability, alias_ix, .. } = triangles[ix];
+    if emitters.has_tree() {
+        probability *= tree_probability(&emitters.light_nodes, point_world, alias_ix);
+    }
+    probability * area_density(&inputs.triangles[triangle_ix as usize], direction, distance)
 }

@@ -20,28 +20,28 @@ use crate::{
     world::{Emitters, FlatScene, World},
 };
 
-fn world_with(lights: Vec<Light>, change: impl FnOnce(&mut FlatScene)) -> World {
+pub(super) fn world_with(lights: Vec<Light>, change: impl FnOnce(&mut FlatScene)) -> World {
     let scene = Scene { lights, ..Scene::empty(Path::new("scene")) };
     let mut flat = FlatScene::new(&scene).unwrap();
     change(&mut flat);
     World::of_flat(flat, &BuildOptions::default()).unwrap()
 }
 
-fn world(lights: Vec<Light>) -> World {
+pub(super) fn world(lights: Vec<Light>) -> World {
     world_with(lights, |_| {})
 }
 
 /// The inputs of kernels of paths.
-fn inputs_of<'a>(world: &'a World, frame: &'a Frame) -> KernelInputs<'a> {
+pub(super) fn inputs_of<'a>(world: &'a World, frame: &'a Frame) -> KernelInputs<'a> {
     KernelInputs::new(world, frame).of_paths(&world.scene().materials, world.emitters())
 }
 
-fn frame(world: &World) -> Frame {
+pub(super) fn frame(world: &World) -> Frame {
     world.frame_constants(&RenderOptions::default())
 }
 
 /// Two triangles in the plane z = 2 that emit light, as a square with edges of 2.
-fn emitting_square(scene: &mut FlatScene) {
+pub(super) fn emitting_square(scene: &mut FlatScene) {
     let corners = [vec3(-1.0, -1.0, 2.0), vec3(1.0, -1.0, 2.0), vec3(1.0, 1.0, 2.0), vec3(-1.0, 1.0, 2.0)];
     let triangle =
         |[a, b, c]: [usize; 3]| Triangle { v0: corners[a], v1: corners[b], v2: corners[c], ..Triangle::default() };
@@ -54,13 +54,13 @@ fn emitting_square(scene: &mut FlatScene) {
 }
 
 /// The random numbers of `n` picks: points of a sequence that fills the cube evenly.
-fn numbers(n: usize) -> impl Iterator<Item = Vec3> {
+pub(super) fn numbers(n: usize) -> impl Iterator<Item = Vec3> {
     const STEPS: DVec3 = DVec3::new(0.819_172_513_4, 0.671_043_606_7, 0.549_700_477_9);
     (0..n).map(|i| (STEPS * i as f64 + 0.5).fract().as_vec3().min(Vec3::splat(0.999_999)))
 }
 
 /// The irradiance that picks estimate at a point of a surface.
-fn irradiance(inputs: &KernelInputs, point: Vec3, normal: Vec3) -> Vec3 {
+pub(super) fn irradiance(inputs: &KernelInputs, point: Vec3, normal: Vec3) -> Vec3 {
     const N: usize = 100_000;
     let sum: DVec3 = numbers(N)
         .map(|u| {
@@ -71,7 +71,7 @@ fn irradiance(inputs: &KernelInputs, point: Vec3, normal: Vec3) -> Vec3 {
     (sum / N as f64).as_vec3()
 }
 
-fn assert_near(found: f32, expected: f32, tolerance: f32) {
+pub(super) fn assert_near(found: f32, expected: f32, tolerance: f32) {
     assert!((found - expected).abs() <= tolerance * expected.abs(), "{found}, expected {expected}");
 }
 
@@ -109,7 +109,7 @@ fn sphere() -> Light {
     Light::Sphere { position: vec3(0.0, 0.0, 3.0), radius: 1.0, radiance: Vec3::splat(4.0) }
 }
 
-fn sun() -> Light {
+pub(super) fn sun() -> Light {
     Light::Sun { towards: vec3(0.0, 0.6, 0.8), irradiance: Vec3::splat(2.0), angle_degrees: 20.0 }
 }
 
@@ -251,7 +251,7 @@ fn picks_have_the_stated_density() {
 }
 
 /// An image with a bright texel, dark ones and a NaN.
-fn map(rotation: f32) -> Environment {
+pub(super) fn map(rotation: f32) -> Environment {
     let mut colours: Vec<Vec3> = (0..32 * 17).map(|ix| Vec3::splat((ix % 5) as f32 * 0.1)).collect();
     colours[4 * 32 + 24] = Vec3::splat(50.0);
     colours[0] = vec3(f32::NAN, 1.0, 1.0);
@@ -310,7 +310,7 @@ fn picks_have_the_density_of_what_is_seen() {
             seen.density
         } else {
             n_triangles += 1;
-            let densities = [0, 1, 2].map(|ix| emission_density(&inputs, ix, pick.direction, pick.distance));
+            let densities = [0, 1, 2].map(|ix| emission_density(&inputs, ix, point, pick.direction, pick.distance));
             assert_eq!(densities[0], 0.0);
             // Both triangles are in one plane and have the same size.
             densities[1]

@@ -1,0 +1,120 @@
+//! Tests of scenes with so many lights that a tree picks them.
+
+use std::f32::consts::PI;
+
+use glam::{Vec3, vec3};
+
+use super::{
+    LightPick, emission_density, environment_density, pick_light, seen_light,
+    tests::{assert_near, emitting_square, frame, inputs_of, irradiance, map, numbers, sun, world, world_with},
+};
+use crate::{
+    layout::{EMITTER_ENVIRONMENT, EMITTER_SUN, EMITTER_TREE, EMITTER_TRIANGLE},
+    reference::chi_square::Uniform,
+    scene::Light,
+    world::World,
+};
+
+/// Point lights at places that are spread over a long row.
+fn points(n: usize) -> Vec<Light> {
+    let mut random = Uniform(1);
+    let place = |_| random.point() * vec3(60.0, 5.0, 5.0) + vec3(-30.0, 0.0, 1.0);
+    (0..n).map(place).map(|position| Light::Point { position, intensity: vec3(2.0, 1.0, 0.5) }).collect()
+}
+
+/// A scene with lights of all kinds, of which a tree has those with a place.
+fn all_kinds() -> World {
+    let radiance = Vec3::splat(3.0);
+    let mut lights = points(230);
+    let mut random = Uniform(2);
+    for ix in 0..60 {
+        let position = random.point() * vec3(60.0, 9.0, 1.0) + vec3(-30.0, -4.0, 6.0);
+        lights.push(match ix % 4 {
+            0 => Light::Rectangle { position, edge_u: 0.2 * Vec3::Y, edge_v: 0.3 * Vec3::X, radiance },
+            1 => Light::Disk { position, towards: Vec3::NEG_Z, radius: 0.1, radiance },
+            2 => Light::Sphere { position, radius: 0.1, radiance },
+            _ => Light::Point { position, intensity: Vec3::ZERO },
+        });
+    }
+    lights.push(sun());
+    lights.push(Light::Directional { towards: Vec3::Z, irradiance: Vec3::ONE });
+    world_with(lights, |scene| {
+        emitting_square(scene);
+        scene.environment = Some(map(0.0));
+    })
+}
+
+#[test]
+fn a_tree_picks_where_there_are_many_lights() {
+    let few = world(points(255));
+    assert!(few.emitters().light_nodes.is_empty() && few.emitters().n_picked == 255);
+    let mut lights = points(255);
+    lights.push(Light::Point { position: Vec3::ONE, intensity: Vec3::ZERO });
+    lights.push(sun());
+    assert!(world(lights).emitters().light_nodes.is_empty(), "lights without power and suns do not count");
+    let many = world(points(256));
+    assert_eq!((many.emitters().light_nodes.len(), many.emitters().n_picked), (511, 1));
+    let emitters = all_kinds();
+    let emitters = emitters.emitters();
+    let kinds: Vec<u32> = emitters.entries[..emitters.n_picked].iter().map(|emitter| emitter.kind).collect();
+    assert_eq!(kinds, [0, EMITTER_SUN, EMITTER_ENVIRONMENT, EMITTER_TREE]);
+    assert_eq!(emitters.light_nodes.len(), 2 * (230 + 45 + 2) - 1);
+    assert!(emitters.triangles().len() == 2 && emitters.triangles().iter().all(|it| it.kind == EMITTER_TRIANGLE));
+}
+
+/// The irradiance that picks find is the sum over all lights.
+#[test]
+fn many_lights_add_up() {
+    let lights = points(300);
+    let expected: f32 = lights
+        .iter()
+        .map(|light| {
+            let Light::Point { position, intensity } = *light else { panic!("{light:?}") };
+            PI * intensity.x * position.normalize().z / position.length_squared()
+        })
+        .sum();
+    let world = world(lights);
+    let frame = frame(&world);
+    assert_near(irradiance(&inputs_of(&world, &frame), Vec3::ZERO, Vec3::Z).x, expected, 5e-3);
+}
+
+/// Returns the density of a pick's direction, as a ray that meets the light computes it.
+fn density_of_seen(world: &World, point: Vec3, pick: &LightPick) -> f32 {
+    let frame = frame(world);
+    let inputs = inputs_of(world, &frame);
+    if pick.distance.is_infinite() {
+        return environment_density(&inputs, pick.direction);
+    }
+    let seen = seen_light(&inputs, point, pick.direction, f32::INFINITY);
+    if (seen.t - pick.distance).abs() < 1e-3 * pick.distance {
+        return seen.density;
+    }
+    // The triangle on whose side of the diagonal the point is.
+    let at = point + pick.distance * pick.direction;
+    let triangle_ix = if at.x > at.y { 1 } else { 2 };
+    emission_density(&inputs, triangle_ix, point, pick.direction, pick.distance)
+}
+
+#[test]
+fn picks_of_many_have_the_density_of_what_is_seen() {
+    let world = all_kinds();
+    let frame = frame(&world);
+    let inputs = inputs_of(&world, &frame);
+    let (mut n_beyond, mut n_near, mut n_borders) = (0, 0, 0);
+    for point in [vec3(6.0, 0.2, -4.0), vec3(-0.3, 0.1, 1.5), vec3(3.0, 0.1, 2.1)] {
+        for u in numbers(10_000) {
+            let pick = pick_light(&inputs, point, u);
+            if pick.density == 0.0 {
+                continue; // a light without a size, or none
+            }
+            let density = density_of_seen(&world, point, &pick);
+            let is_other = (density - pick.density).abs() > 1e-2 * pick.density;
+            // At the border of two texels, of two triangles and of the sun, rounding decides.
+            n_borders += usize::from(is_other);
+            n_beyond += usize::from(pick.distance.is_infinite());
+            n_near += usize::from(pick.distance.is_finite());
+        }
+    }
+    assert!(n_beyond > 500 && n_near > 500, "{n_beyond} {n_near}");
+    assert!(n_borders * 500 <= n_beyond + n_near, "{n_borders} of {n_beyond} and {n_near}");
+}
