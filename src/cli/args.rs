@@ -340,8 +340,8 @@ impl RenderArgs {
         })
     }
 
-    /// Returns the goal of `--noise`. Refuses it for pictures whose noise is not known, and a number of samples at which
-    /// nothing is decided.
+    /// Returns the goal of `--noise`. Refuses it for pictures whose noise is not known, and a number of samples at
+    /// which nothing is decided.
     pub fn noise_goal(&self, scene: &Scene, options: &RenderOptions) -> Result<Option<NoiseGoal>, CliError> {
         let Some(noise) = self.noise else { return Ok(None) };
         let refused = |what: &str| Err(CliError::Usage(what.to_owned()));

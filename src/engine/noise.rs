@@ -80,8 +80,8 @@ fn n_parts(n_tiles: usize, n_devices: usize, samples: SampleRange) -> u32 {
     most.min(1 << wanted)
 }
 
-/// Draws a picture of the options' crop until the goal is met. `draw` shares the tiles among `n_devices`. `progress` is called with the share of the work that is
-/// done, as far as the noise tells it.
+/// Draws a picture of the options' crop until the goal is met. `draw` shares the tiles among `n_devices`. `progress` is
+/// called with the share of the work that is done, as far as the noise tells it.
 pub(super) fn draw_until(
     goal: NoiseGoal,
     options: &RenderOptions,
@@ -187,8 +187,9 @@ fn appearance(light: f64) -> f64 {
     if light < 1.0 { light.max(0.0).sqrt() } else { 1.0 + 0.5 * light.ln() }
 }
 
-/// Returns the sums of a tile's pixels over all blocks of samples, whose means the parts are: 2^n parts of `len` samples.
-/// They are added as a binary tree. A power of two multiplies without rounding, so the sums have the bits of one block.
+/// Returns the sums of a tile's pixels over all blocks of samples, whose means the parts are: 2^n parts of `len`
+/// samples. They are added as a binary tree. A power of two multiplies without rounding, so the sums have the bits of
+/// one block.
 fn sum_of_parts(parts: &[[f32; 4]], len: f32) -> Vec<[f32; 4]> {
     if parts.len() == N_PIXELS {
         return parts.iter().map(|pixel| pixel.map(|mean| mean * len)).collect();

@@ -104,7 +104,8 @@ impl Renderer {
     }
 
     /// Draws what a camera sees until the noise of each tile of the picture is low, or the tile has the most samples.
-    /// The watcher is notified by [`Watcher::part`] of the share of the work that is done, and of one sample at the end.
+    /// The watcher is notified by [`Watcher::part`] of the share of the work that is done, and of one sample at the
+    /// end.
     ///
     /// # Panics
     /// The options do not ask for paths, have a noise filter or another first sample than 0.

@@ -63,7 +63,8 @@ impl BandedRenderer {
         self.renderer.set_camera(camera);
     }
 
-    /// Sets the part of the picture that is drawn next, a rectangle. Buffers are kept as [`Renderer::set_crop`] keeps them.
+    /// Sets the part of the picture that is drawn next, a rectangle. Buffers are kept as [`Renderer::set_crop`] keeps
+    /// them.
     ///
     /// # Panics
     /// The crop exceeds the picture.

@@ -24,8 +24,8 @@ pub(super) struct TreeLight {
     pub emitter_ix: u32,
 }
 
-/// Builds the tree on the current rayon pool. It depends on the lights and their order alone. Its nodes are in preorder,
-/// and every leaf has one light. `lights`: at least one, with intensities above 0.
+/// Builds the tree on the current rayon pool. It depends on the lights and their order alone. Its nodes are in
+/// preorder, and every leaf has one light. `lights`: at least one, with intensities above 0.
 pub(super) fn light_tree(mut lights: Vec<TreeLight>) -> Vec<LightNode> {
     let mut nodes = vec![LightNode::default(); 2 * lights.len() - 1];
     let whole = lights.iter().map(|light| light.bounds.intensity).sum();

@@ -41,7 +41,8 @@ pub struct Common<'a> {
     pub goal: Goal,
     /// The noise at which pictures end, if the user wants that.
     pub noise_goal: Option<NoiseGoal>,
-    /// Number of samples of each pixel that are drawn, if they have a number. The most samples if pictures end at a noise.
+    /// Number of samples of each pixel that are drawn, if they have a number. The most samples if pictures end at a
+    /// noise.
     pub n_drawn: u32,
     /// The samples that are drawn, if they are not all samples of the pictures.
     pub some_samples: Option<SampleRange>,

@@ -479,7 +479,8 @@ fn extremes_give_finite_numbers() {
     }
 }
 
-/// Without an interface, its terms are left out. The result is what they give if the interface reflects next to nothing.
+/// Without an interface, its terms are left out. The result is what they give if the interface reflects next to
+/// nothing.
 #[test]
 fn a_surface_without_an_interface_is_the_limit_of_one_with_it() {
     let surface = flat(false);
