@@ -32,8 +32,8 @@ impl Scene {
         self.materials.iter().any(|material| material.ke.max_element() > 1.0)
     }
 
-    /// Returns whether some surfaces mirror what is beyond the scene, or show it through them: metals and glass that are
-    /// not rough.
+    /// Returns whether some surfaces mirror what is beyond the scene, or show it through them: metals and glass that
+    /// are not rough.
     pub(super) fn has_mirrors(&self) -> bool {
         let mirrors = |material: &Material| {
             let Some(it) = material.microfacet else {

@@ -501,7 +501,8 @@ fn bare_files_with_metals_or_glass_get_a_studio() {
     for mtl in ["Kd 0.5 0.5 0.5", "Pm 1\nPr 0.9", "Pm 0\nPr 0.1", "illum 2\nKs 1 1 1", "illum 5\nKs 0.2 0.2 0.2"] {
         assert_eq!(studio(mtl, Look::default()), None, "{mtl}");
     }
-    let toml = "[materials]\na = { metallic = 1, roughness = 0.1 }\n[[mesh]]\ngenerator = 'box'\nsize = [1, 1, 1]\nmaterials = ['a']\n";
+    let toml = "[materials]\na = { metallic = 1, roughness = 0.1 }\n\
+                [[mesh]]\ngenerator = 'box'\nsize = [1, 1, 1]\nmaterials = ['a']\n";
     assert!(load_toml(toml).studio.is_some());
     assert_eq!(load_toml(&format!("ambient = [1, 1, 1]\n{toml}")).studio, None);
     assert_eq!(load_toml(&format!("ambient = [1, 1, 1]\nstudio = [0, 0, 2]\n{toml}")).studio, Some(Vec3::Z));
