@@ -57,6 +57,7 @@ fn scene(triangles: &[Triangle]) -> FlatScene {
         background: Vec3::ZERO,
         area_lights: Vec::new(),
         environment: None,
+        studio: None,
         defaults: RenderDefaults::default(),
     }
 }

@@ -13,6 +13,7 @@
 #include "material.glsl"
 #include "maps.glsl"
 #include "counters.glsl"
+#include "studio.glsl"
 
 // Whether shadow rays are counted.
 layout(constant_id = CONSTANT_COUNTS) const bool COUNTS = true;
@@ -51,7 +52,12 @@ vec3 local_radiance(PathRay ray, uint ray_ix, Surface surface, Material material
 // The radiance that a ray adds to its pixel, its throughput included.
 vec3 radiance_of(PathRay ray, uint ray_ix) {
     Hit hit = hits[ray_ix];
-    if (hit.triangle_ix == NO_TRIANGLE) return ray.throughput * frame.background;
+    if (hit.triangle_ix == NO_TRIANGLE) {
+        // Of a batch, the camera's rays come first.
+        bool is_of_camera = ray_ix < bounces[batch.bounce_ix].first_ray + bounces[batch.bounce_ix].n_rays;
+        if (is_of_camera) return ray.throughput * frame.background;
+        return ray.throughput * (frame.background + studio_radiance(ray.direction));
+    }
     Surface surface;
     Material material;
     shaded_at(ray, hit, surface, material);

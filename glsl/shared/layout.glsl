@@ -665,7 +665,7 @@ struct Hit {
     float v;
 };
 
-// The frame's constants, 256 bytes (a uniform buffer, std140-compatible). The window is the part of the picture that
+// The frame's constants, 272 bytes (a uniform buffer, std140-compatible). The window is the part of the picture that
 // is rendered. The point of the window's pixel (x, y) in the image plane is
 //
 // ```text
@@ -705,6 +705,8 @@ struct Hit {
 //   `aperture`: radius of the lens (world units; 0: everything is sharp). `focus`: distance of what is sharp from the
 //   eye, along `forward` (world units). `focuses_on_target`: 1 if that is the distance of the camera's target.
 //   `samples_reciprocal`: 1 / `n_samples`. The host divides, because devices round quotients in different ways.
+// - `has_studio`: 1 if metals and glass mirror a studio (studio.glsl). `to_viewer`: horizontal unit vector towards the
+//   viewer for whom it was set up, world space.
 struct Frame {
     mat4 clip_from_world;
     vec3 eye;
@@ -741,6 +743,8 @@ struct Frame {
     uint focuses_on_target;
     uint range_begin;
     float samples_reciprocal;
+    vec3 to_viewer;
+    uint has_studio;
 };
 
 // The rays of one bounce of one batch, 80 bytes. The host writes the row of a batch's first bounce, and in all rows

@@ -11,6 +11,7 @@
 #include "layout.glsl"
 #include "frame.glsl"
 #include "sampler.glsl"
+#include "studio.glsl"
 #include "scene.glsl"
 #include "surface.glsl"
 #include "material.glsl"
@@ -47,10 +48,12 @@ vec3 added_light(vec3 light, uint depth) {
 }
 
 // The light of an environment that a ray meets. The camera and perfectly smooth surfaces do not see the ambient light.
-vec3 met_environment(PathRay ray, PathState state) {
+// The studio is no light that is sampled, so that all of it is met.
+vec3 met_environment(PathRay ray, PathState state, uint depth) {
     vec3 radiance = environment_radiance(ray.direction);
     if (state.density > 0.0) radiance += ambient_radiance(ray.direction);
-    return radiance * share_of_met(state, environment_density(ray.direction));
+    vec3 met = radiance * share_of_met(state, environment_density(ray.direction));
+    return depth > 0u ? met + studio_radiance(ray.direction) : met;
 }
 
 // The segment to a light that is picked at a hit.
@@ -103,7 +106,7 @@ bool step_path(
         return false;
     }
     if (is_miss) {
-        state.radiance += added_light(ray.throughput * met_environment(ray, state), depth);
+        state.radiance += added_light(ray.throughput * met_environment(ray, state, depth), depth);
         return false;
     }
     Surface surface;

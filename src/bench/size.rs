@@ -68,6 +68,7 @@ pub fn knot(n_triangles: u32) -> Scene {
         background: Vec3::ZERO,
         environment: None,
         sky: None,
+        studio: None,
         defaults: RenderDefaults::default(),
     }
 }

@@ -540,9 +540,10 @@ impl Renderer {
     fn shade(&mut self) {
         self.frame.queue_capacity = self.queue.rays.len() as u32;
         let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
-        let Queue { rays, hits, ray_radiance, light_visibility, .. } = &mut self.queue;
+        let Queue { rays, bounces, hits, ray_radiance, light_visibility, .. } = &mut self.queue;
         ray_radiance.resize(rays.len(), [0.0; 4]);
-        let lit = LitRays { rays, hits, light_visibility };
+        let n_of_camera = bounces[0].rays().end;
+        let lit = LitRays { rays, hits, n_of_camera, light_visibility };
         self.clock.time(Pass::Shade, None, || shade::shade(&inputs, lit, ray_radiance));
     }
 

@@ -80,6 +80,7 @@ pub mod search_ray;
 pub mod shade;
 pub mod shadow;
 pub mod slab;
+pub mod studio;
 pub mod surface;
 pub mod texture;
 pub mod tone_curves;

@@ -12,6 +12,7 @@ use super::{
     maps::shaded_at,
     material::{emitted, is_unlit, unabsorbed},
     sampler::{SampleKey, random_pair},
+    studio::studio_radiance,
     surface::Surface,
 };
 use crate::layout::{
@@ -44,12 +45,14 @@ fn added_light(inputs: &KernelInputs, light: Vec3, depth: u32) -> Vec3 {
 }
 
 /// The light of an environment that a ray meets.
-fn met_environment(inputs: &KernelInputs, ray: &PathRay, state: &PathState) -> Vec3 {
+/// The studio is no light that is sampled, so that all of it is met.
+fn met_environment(inputs: &KernelInputs, ray: &PathRay, state: &PathState, depth: u32) -> Vec3 {
     let mut radiance = environment_radiance(inputs, ray.direction);
     if state.density > 0.0 {
         radiance += ambient_radiance(inputs, ray.direction);
     }
-    radiance * share_of_met(state, environment_density(inputs, ray.direction))
+    let met = radiance * share_of_met(state, environment_density(inputs, ray.direction));
+    if depth > 0 { met + studio_radiance(inputs.frame(), ray.direction) } else { met }
 }
 
 const NO_SEGMENT: Segment = Segment {
@@ -138,7 +141,7 @@ pub fn step_path(
         return (false, NO_SEGMENT);
     }
     if is_miss {
-        state.radiance += added_light(inputs, ray.throughput * met_environment(inputs, ray, state), depth);
+        state.radiance += added_light(inputs, ray.throughput * met_environment(inputs, ray, state, depth), depth);
         return (false, NO_SEGMENT);
     }
     let (surface, material) = shaded_at(inputs, ray, hit);

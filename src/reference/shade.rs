@@ -9,6 +9,7 @@ use super::{
     light::sample_light,
     maps::{bump_shadowing, shaded_at},
     material::{ambient_share, emitted, local_weight, reflectance_of, unabsorbed},
+    studio::studio_radiance,
     surface::Surface,
 };
 use crate::layout::{Frame, Hit, LIGHT_LIT, Material, NO_TRIANGLE, PathRay};
@@ -19,6 +20,8 @@ pub struct LitRays<'a> {
     pub rays: &'a [PathRay],
     /// One for each ray.
     pub hits: &'a [Hit],
+    /// The number of the camera's rays, which come first.
+    pub n_of_camera: usize,
     /// One of `LIGHT_*` at each `[light * queue_capacity + ray]`.
     pub light_visibility: &'a [u32],
 }
@@ -54,9 +57,17 @@ fn local_radiance(
 }
 
 /// The radiance that a ray adds to its pixel, its throughput included.
-fn radiance_of(inputs: &KernelInputs, (ray, hit): (&PathRay, &Hit), is_lit: impl Fn(usize) -> bool) -> Vec3 {
+fn radiance_of(
+    inputs: &KernelInputs,
+    (ray, hit, is_of_camera): (&PathRay, &Hit, bool),
+    is_lit: impl Fn(usize) -> bool,
+) -> Vec3 {
     if hit.triangle_ix == NO_TRIANGLE {
-        return ray.throughput * inputs.frame().background;
+        let background = inputs.frame().background;
+        if is_of_camera {
+            return ray.throughput * background;
+        }
+        return ray.throughput * (background + studio_radiance(inputs.frame(), ray.direction));
     }
     let (surface, material) = shaded_at(inputs, ray, hit);
     let throughput = ray.throughput * unabsorbed(&material, &surface, hit.t);
@@ -69,7 +80,7 @@ pub fn shade(inputs: &KernelInputs, lit: LitRays, ray_radiance: &mut [[f32; 4]])
     ray_radiance.par_chunks_mut(RAYS_PER_TASK).enumerate().for_each(|(task, radiance)| {
         for (ray_ix, radiance) in (task * RAYS_PER_TASK..).zip(radiance) {
             let is_lit = |light_ix: usize| lit.light_visibility[light_ix * stride + ray_ix] == LIGHT_LIT;
-            let ray = (&lit.rays[ray_ix], &lit.hits[ray_ix]);
+            let ray = (&lit.rays[ray_ix], &lit.hits[ray_ix], ray_ix < lit.n_of_camera);
             *radiance = radiance_of(inputs, ray, is_lit).extend(0.0).to_array();
         }
     });

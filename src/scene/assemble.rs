@@ -115,6 +115,9 @@ fn assemble(file: &File, description: Description, options: &LoadOptions) -> Res
     if let Some(spec) = &description.background {
         scene.background = file.check("background", spec, |rgb| colour("background", Some(*rgb), Vec3::ZERO))?;
     }
+    if let Some(spec) = &description.studio {
+        scene.studio = Some(file.check("studio", spec, |it| unit("studio", *it))?);
+    }
     if let Some(spec) = &description.environment {
         scene.environment = Some(file.check("environment", spec, |spec| environment(file, spec))?);
     }

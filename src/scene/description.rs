@@ -28,6 +28,8 @@ pub(super) struct Description {
     pub ambient: Option<Spanned<AmbientSpec>>,
     /// Radiance of rays that leave the scene; black where absent.
     pub background: Option<Spanned<[f32; 3]>>,
+    /// Studio that surfaces mirror, by the direction towards its viewer.
+    pub studio: Option<Spanned<[f32; 3]>>,
     /// Image of what rays see that leave the scene, for `path`.
     pub environment: Option<Spanned<EnvironmentSpec>>,
     /// The sky and its sun, for `path`, in place of `environment`.

@@ -4,8 +4,11 @@ use std::path::Path;
 
 use glam::Vec3;
 
-use super::{Light, Scene};
+use super::{Light, Scene, material::Material};
 use crate::frame::Integrator;
+
+/// Roughness of a surface that still shows shapes of what it mirrors.
+const ROUGHEST_MIRROR: f32 = 0.5;
 
 impl Scene {
     /// Returns whether the scene has light that only paths show: surfaces that shine, lights with an area, an
@@ -27,6 +30,21 @@ impl Scene {
     /// Returns whether some surfaces are brighter than white paper in full light, as lamps are.
     pub(super) fn has_bright_surfaces(&self) -> bool {
         self.materials.iter().any(|material| material.ke.max_element() > 1.0)
+    }
+
+    /// Returns whether some surfaces mirror what is beyond the scene, or show it through them: metals and glass that
+    /// are not rough.
+    pub(super) fn has_mirrors(&self) -> bool {
+        let mirrors = |material: &Material| {
+            let Some(it) = material.microfacet else {
+                let is_mirror =
+                    material.lobes.reflection && !material.lobes.fresnel && material.ks.max_element() >= 0.5;
+                return is_mirror || material.lobes.refraction;
+            };
+            let is_metal = it.metallic >= 0.5 || it.conductor.is_some();
+            it.roughness <= ROUGHEST_MIRROR && (is_metal || it.transmission >= 0.5)
+        };
+        self.materials.iter().any(mirrors)
     }
 
     /// Warns of light that the integrator does not show, and if nothing illuminates the scene, how to add a light.

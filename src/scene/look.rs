@@ -134,6 +134,7 @@ impl Look {
         scene.lights = Vec::new();
         (scene.ambient, scene.ground, scene.background) = (Vec3::ZERO, None, Vec3::ZERO);
         scene.environment = None;
+        scene.studio = None;
         scene.defaults.is_metered = false;
         Ok(())
     }

@@ -108,6 +108,9 @@ pub struct Scene {
     pub environment: Option<Environment>,
     /// The sky and its sun. The path tracer knows both, in place of `environment`, and otherwise only the sun is known.
     pub sky: Option<Sky>,
+    /// The studio that surfaces mirror where rays leave the scene, by the horizontal unit vector towards the viewer for
+    /// whom it is set up: a bright ceiling and three soft boxes. Camera rays do not see it.
+    pub studio: Option<Vec3>,
     /// The camera that renders the scene unless another one is set.
     pub camera: Camera,
     /// The cameras of the scene's file with their names, possibly none.
@@ -302,6 +305,7 @@ impl Scene {
             background: Vec3::ZERO,
             environment: None,
             sky: None,
+            studio: None,
             defaults: RenderDefaults::default(),
         }
     }

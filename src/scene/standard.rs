@@ -83,6 +83,10 @@ pub(super) fn fill_in(scene: &mut Scene, lacks: Lacks, options: &LoadOptions) ->
         if lacks.background {
             scene.background = BACKGROUND;
         }
+        if !is_interior && scene.has_mirrors() {
+            let level = Lamp { azimuth: 0.0, elevation: 0.0, irradiance: 0.0 };
+            scene.studio = Some(lamp_towards(scene, &axes, &level));
+        }
     }
     look.set_light(scene);
     Ok(())

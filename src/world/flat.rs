@@ -43,6 +43,8 @@ pub struct FlatScene {
     pub area_lights: Vec<AreaLight>,
     /// The image of what is beyond the scene, or of its sky. Only the path tracer knows it.
     pub environment: Option<Environment>,
+    /// The studio that metals and glass mirror ([`Scene::studio`]).
+    pub studio: Option<Vec3>,
     /// The camera that renders the scene unless another one is set.
     pub camera: Camera,
     /// The irradiance that every point receives, which is weighted by the point's Ka.
@@ -86,6 +88,7 @@ impl FlatScene {
             lights: scene.lights.iter().chain(&sun).filter_map(flat_light).collect(),
             area_lights: scene.lights.iter().filter_map(area_light).collect(),
             environment: sky.or_else(|| scene.environment.clone()),
+            studio: scene.studio,
             camera: scene.camera,
             ambient: scene.ambient,
             ground: scene.ground,

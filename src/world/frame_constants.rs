@@ -26,6 +26,8 @@ impl World {
             ambient_tilt: (sky - ground_ambient) / 2.0,
             up_axis: if ground.up == Up::Z { 2 } else { 1 },
             background: stand_in.background.unwrap_or(scene.background),
+            to_viewer: scene.studio.unwrap_or_default(),
+            has_studio: scene.studio.is_some().into(),
             ..Frame::default()
         };
         frame.set_options(options);

@@ -20,6 +20,7 @@ impl FlatScene {
             lights,
             area_lights,
             environment,
+            studio,
             camera: _,
             ambient,
             ground,
@@ -52,6 +53,9 @@ impl FlatScene {
         if let Some(ground) = ground {
             add(&mut hasher, &[ground.ambient]);
             add(&mut hasher, format!("{:?}", ground.up).as_bytes());
+        }
+        if let Some(to_viewer) = studio {
+            add(&mut hasher, &[*to_viewer]);
         }
         hasher.finalize().to_hex()[..32].to_owned()
     }

@@ -19,7 +19,8 @@ fn check(stage: &Stage, batch: &Batch, n_rays: u32) {
     let mut random = Random(3);
     let light_visibility: Vec<u32> = (0..queue.light_visibility.len()).map(|_| random.below(3) as u32).collect();
     let mut expected = vec![UNTOUCHED_PIXEL; rays.len()];
-    let lit = LitRays { rays: &rays, hits: &hits, light_visibility: &light_visibility };
+    let lit =
+        LitRays { rays: &rays, hits: &hits, n_of_camera: (n_rays / 3) as usize, light_visibility: &light_visibility };
     reference::shade::shade(&stage.inputs(), lit, &mut expected);
     expected.resize(queue.hits.len(), UNTOUCHED_PIXEL);
 
@@ -64,6 +65,17 @@ fn agrees_below_a_sky() {
         scene.lights.clear();
         scene.ambient = vec3(0.5, 0.7, 1.0);
         scene.ground = Some(Ground { ambient: vec3(0.4, 0.1, 0.0), up });
+        check(&Stage::new(scene, options(50, 50), 500), &FIRST, 500);
+    }
+}
+
+/// The camera's rays do not see the studio, and all others do.
+#[test]
+fn agrees_in_a_studio() {
+    for (up, to_viewer) in [(Up::Y, vec3(0.6, 0.0, 0.8)), (Up::Z, vec3(0.8, -0.6, 0.0))] {
+        let mut scene = scenes::mixed();
+        scene.ground = Some(Ground { ambient: vec3(0.4, 0.1, 0.0), up });
+        scene.studio = Some(to_viewer);
         check(&Stage::new(scene, options(50, 50), 500), &FIRST, 500);
     }
 }

@@ -85,7 +85,7 @@ fn lights_that_are_not_asked_for_could_not_be_seen() {
     reference::shadow::shadow(&stage.inputs(), traversal, &(0..n), (rays.as_slice(), hits.as_slice()), &mut asked_for);
     let shaded = |light_visibility: &[u32]| {
         let mut radiance = vec![[0.0; 4]; n];
-        let lit = LitRays { rays: &rays, hits: &hits, light_visibility };
+        let lit = LitRays { rays: &rays, hits: &hits, n_of_camera: rays.len(), light_visibility };
         reference::shade::shade(&stage.inputs(), lit, &mut radiance);
         radiance
     };

@@ -51,6 +51,7 @@ fn scene(instances: Vec<Instance>) -> Scene {
         background: Vec3::ZERO,
         environment: None,
         sky: None,
+        studio: None,
         defaults: RenderDefaults::default(),
     }
 }

@@ -476,3 +476,41 @@ fn converted_files_keep_the_look_and_the_samples() {
         assert_eq!((&before.lights, before.background), (&after.lights, after.background), "{text}");
     }
 }
+
+/// Metals and glass need something to mirror. What is matt, rough or lit by its file keeps the plain background.
+#[test]
+fn bare_files_with_metals_or_glass_get_a_studio() {
+    let obj = box_obj(Vec3::ZERO, Vec3::ONE).replacen("f 1", "mtllib m.mtl\nusemtl a\nf 1", 1);
+    let studio = |mtl: &str, look: Look| {
+        let mtl = format!("newmtl a\n{mtl}\n");
+        load(&[("a.obj", &obj), ("m.mtl", &mtl)], &LoadOptions { look, ..LoadOptions::default() }).studio
+    };
+    for mtl in ["Pm 1\nPr 0.1", "illum 3\nKs 0.9 0.9 0.9", "illum 7\nKs 1 1 1\nTf 1 1 1"] {
+        let to_viewer = studio(mtl, Look::default()).unwrap_or_else(|| panic!("{mtl}"));
+        assert!(to_viewer.is_normalized() && to_viewer.y.abs() < 1e-6 && to_viewer.z > 0.0, "{to_viewer}");
+        assert_eq!(
+            studio(
+                mtl,
+                Look { sky: Some(SkyChoice { elevation: 30.0, azimuth: None, turbidity: 3.0 }), ..Look::default() }
+            ),
+            None
+        );
+    }
+    let of_z = studio("Pm 1\nPr 0.1", Look { up: Some(Up::Z), ..Look::default() }).unwrap();
+    assert!(of_z.z.abs() < 1e-6 && of_z.y < 0.0, "{of_z}");
+    for mtl in ["Kd 0.5 0.5 0.5", "Pm 1\nPr 0.9", "Pm 0\nPr 0.1", "illum 2\nKs 1 1 1", "illum 5\nKs 0.2 0.2 0.2"] {
+        assert_eq!(studio(mtl, Look::default()), None, "{mtl}");
+    }
+    let toml = "[materials]\na = { metallic = 1, roughness = 0.1 }\n\
+                [[mesh]]\ngenerator = 'box'\nsize = [1, 1, 1]\nmaterials = ['a']\n";
+    assert!(load_toml(toml).studio.is_some());
+    assert_eq!(load_toml(&format!("ambient = [1, 1, 1]\n{toml}")).studio, None);
+    assert_eq!(load_toml(&format!("ambient = [1, 1, 1]\nstudio = [0, 0, 2]\n{toml}")).studio, Some(Vec3::Z));
+    // A scene file of such a file has the same studio.
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("a.obj"), &obj).unwrap();
+    fs::write(folder.path().join("m.mtl"), "newmtl a\nPm 1\nPr 0.1\n").unwrap();
+    let (input, output) = (folder.path().join("a.obj"), folder.path().join("b.toml"));
+    fs::write(&output, scene_file_of(&input, &output, &LoadOptions::default()).unwrap()).unwrap();
+    assert_eq!(Scene::load(&output).unwrap().studio, Scene::load(&input).unwrap().studio);
+}

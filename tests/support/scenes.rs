@@ -41,6 +41,7 @@ pub fn empty() -> FlatScene {
         background: Vec3::ZERO,
         area_lights: Vec::new(),
         environment: None,
+        studio: None,
         defaults: RenderDefaults::default(),
     }
 }

@@ -33,6 +33,7 @@ pub fn empty() -> Scene {
         background: Vec3::ZERO,
         environment: None,
         sky: None,
+        studio: None,
         defaults: RenderDefaults::default(),
     }
 }

@@ -32,6 +32,9 @@ pub(super) struct MeshTable {
 pub(super) fn scene_file(scene: &Scene, mesh: &MeshTable) -> String {
     let mut text = format!("# {} as a scene of kdray, to be edited.\n\n", quoted(&mesh.file));
     text += &format!("ambient = {}\nbackground = {}\n", ambient(scene), vector(scene.background));
+    if let Some(to_viewer) = scene.studio {
+        text += &format!("studio = {}\n", vector(to_viewer));
+    }
     if !mesh.replaced.is_empty() {
         let words: Vec<_> = mesh.replaced.iter().map(|choice| quoted(&choice.to_string())).collect();
         text += &format!("replace = [{}]\n", words.join(", "));

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use glam::{DMat3, DMat4, Vec3};
+use glam::{DMat3, DMat4, DVec3, Vec3};
 use gltf::{
     Semantic,
     json::{Index, accessor::Type, mesh::MorphTarget},
@@ -129,6 +129,9 @@ pub(super) struct Skin {
     /// JSON path.
     path: String,
     world_from_mesh: Vec<DMat4>,
+    /// The point of world space from which the positions count that it gives. It is subtracted before they are rounded
+    /// to single precision.
+    pub origin: DVec3,
 }
 
 /// A skin as it moves a primitive's vertices.
@@ -153,7 +156,7 @@ impl Skin {
                 *matrix *= glam::Mat4::from_cols_array(&matrices.numbers(ix, 0.0)?).as_dmat4();
             }
         }
-        Ok(Self { path, world_from_mesh })
+        Ok(Self { path, world_from_mesh, origin: DVec3::ZERO })
     }
 
     /// Returns the skin as it moves a primitive of `n` vertices.
@@ -173,11 +176,11 @@ impl Skin {
 }
 
 impl Skinning<'_> {
-    /// Returns position, normal and tangent of the vertex with index `ix` in world space.
+    /// Returns position, normal and tangent of the vertex with index `ix` in world space, moved by the skin's origin.
     pub fn apply(&self, ix: usize, [position, normal, tangent]: [Vec3; 3]) -> Checked<[Vec3; 3]> {
         let matrix = self.matrix(ix)?;
         let linear = DMat3::from_mat4(matrix);
-        let position = matrix.transform_point3(position.as_dvec3()).as_vec3();
+        let position = (matrix.transform_point3(position.as_dvec3()) - self.skin.origin).as_vec3();
         let normal = (normals_of(linear) * normal.as_dvec3()).normalize_or_zero().as_vec3();
         let tangent = (linear * tangent.as_dvec3()).normalize_or_zero().as_vec3();
         Ok([position, normal, tangent])

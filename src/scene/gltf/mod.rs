@@ -22,8 +22,10 @@ mod uri;
 
 use std::path::Path;
 
+use glam::DVec3;
 use gltf::json::{Node, mesh::Primitive};
 use hashbrown::{HashMap, HashSet};
+use rayon::prelude::*;
 
 pub(super) use self::document::named_files;
 use self::{
@@ -36,9 +38,10 @@ use self::{
 use super::{
     Instance, LoadOptions, Mesh, Scene, SceneError, Transform,
     error::Checked,
-    extent,
+    extent::{self, MeshOrigin},
     image::MAX_PIXELS,
     look::Up,
+    mesh_file::bounds_of,
     needs::{MeshSize, require_for_mesh},
     outside::Access,
     preset::MaterialChoice,
@@ -136,6 +139,15 @@ fn read(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<Document, 
 /// the weights of morph targets.
 type MeshKey = (usize, Option<usize>, bool, Vec<u32>);
 
+/// A mesh that has been made.
+#[derive(Clone)]
+struct Known {
+    mesh_ix: usize,
+    materials: Vec<u32>,
+    /// The point of world space that is the origin of a mesh with a skin.
+    origin: DVec3,
+}
+
 /// Loads the meshes of a scene's nodes.
 struct Loader<'a> {
     document: &'a Document,
@@ -147,8 +159,8 @@ struct Loader<'a> {
     has_materials: bool,
     materials: Materials<'a>,
     meshes: Vec<Mesh>,
-    /// Indices into `meshes`, and the materials of the mesh; `None` for meshes without triangles.
-    known: HashMap<MeshKey, Option<(usize, Vec<u32>)>>,
+    /// `None` for meshes without triangles.
+    known: HashMap<MeshKey, Option<Known>>,
 }
 
 impl<'a> Loader<'a> {
@@ -226,24 +238,28 @@ impl<'a> Loader<'a> {
                 known
             }
         };
-        Ok(known.map(|(mesh_ix, materials)| Instance { mesh_ix, transform, materials }))
+        Ok(known.map(|Known { mesh_ix, materials, origin }| {
+            let transform = if origin == DVec3::ZERO { transform } else { transform.moved(origin) };
+            Instance { mesh_ix, transform, materials }
+        }))
     }
 
-    /// Adds the mesh of a node in its pose. Returns its index and its materials, or `None` if it has no triangles.
+    /// Adds the mesh of a node in its pose, or returns `None` if it has no triangles. A mesh that its skin moves far
+    /// from the origin is made around a point near it, so that its vertices are not rounded at their far places.
     fn mesh(
         &mut self,
         (mesh_ix, meter): (usize, &Meter),
         node: &Node,
         node_ix: usize,
         (weights, is_turned): (&[f32], bool),
-    ) -> Checked<Option<(usize, Vec<u32>)>> {
+    ) -> Checked<Option<Known>> {
         let document = self.document;
-        let skin = node.skin.map(|skin| self.skin(skin.value(), node_ix)).transpose()?;
+        let mut skin = node.skin.map(|skin| self.skin(skin.value(), node_ix)).transpose()?;
         if weights.iter().any(|weight| !weight.is_finite()) {
             return Err(format!("nodes[{node_ix}]: a weight of its morph targets is not finite"));
         }
         let pose = Pose { weights, skin: skin.as_ref(), is_turned };
-        let (mut whole, mut materials) = (Mesh::default(), Vec::new());
+        let (mut whole, mut materials, mut parts) = (Mesh::default(), Vec::new(), Vec::new());
         let primitives = &document.root.meshes[mesh_ix].primitives;
         let attributes = geometry::attributes_of(primitives);
         for (ix, primitive) in primitives.iter().enumerate() {
@@ -257,13 +273,24 @@ impl<'a> Loader<'a> {
             let Some(mesh) = mesh else { continue };
             materials.push(material);
             whole.append(mesh);
+            parts.push(part);
         }
         if whole.faces.is_empty() {
             return Ok(None);
         }
+        let far = MeshOrigin::Near.second(bounds_of(whole.positions.par_iter().copied()));
+        let origin = far.filter(|_| skin.is_some()).unwrap_or_default();
+        if let (Some(skin), true) = (&mut skin, origin != DVec3::ZERO) {
+            skin.origin = origin;
+            let (pose, mut n_read) = (Pose { weights, skin: Some(skin), is_turned }, 0);
+            whole = Mesh::default();
+            for part in &parts {
+                geometry::mesh(document, part, pose, &mut n_read)?.into_iter().for_each(|mesh| whole.append(mesh));
+            }
+        }
         whole.name = document.root.meshes[mesh_ix].name.clone().unwrap_or_default();
         self.meshes.push(whole);
-        Ok(Some((self.meshes.len() - 1, materials)))
+        Ok(Some(Known { mesh_ix: self.meshes.len() - 1, materials, origin }))
     }
 
     /// Returns a skin in the pose of its joints.

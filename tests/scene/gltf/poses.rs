@@ -44,6 +44,29 @@ fn skins_place_their_meshes() {
     assert!(agreement(&model) > 0.0);
 }
 
+/// Single precision has multiples of 0.03 at 500 km, and the edges are a hundredth long.
+#[test]
+fn far_skins_keep_the_details_of_their_meshes() {
+    let mut model = triangle();
+    let joints = model.accessor("VEC4", U8, &[0_u8; 12]);
+    let weights = model.accessor("VEC4", F32, &[[1.0_f32, 0.0, 0.0, 0.0]; 3].concat());
+    let attributes = &mut model.json["meshes"][0]["primitives"][0]["attributes"];
+    attributes["JOINTS_0"] = json!(joints);
+    attributes["WEIGHTS_0"] = json!(weights);
+    model.json["nodes"][0]["skin"] = json!(0);
+    model.root(json!({ "translation": [500_000, 0, 0], "scale": [0.01, 0.01, 0.01] }));
+    model.push("skins", json!({ "joints": [1] }));
+    let scene = model.scene();
+    let mesh = &scene.meshes[0];
+    let [a, b, c] = mesh.faces[0].map(|ix| mesh.positions[ix as usize]);
+    assert!(((b - a) - 0.01 * Vec3::X).length() < 1e-7 && ((c - a) - 0.01 * Vec3::Y).length() < 1e-7, "{a} {b} {c}");
+    let placed = scene.instances[0].transform.point(a);
+    assert!((placed - Vec3::new(500_000.0, 0.0, 0.0)).length() <= 0.04, "{placed}");
+    // A near mesh is not moved.
+    model.json["nodes"][1]["translation"] = json!([0.5, 0, 0]);
+    assert_eq!(model.scene().meshes[0].positions[0], Vec3::new(0.5, 0.0, 0.0));
+}
+
 /// The node of a mesh says which side of its faces is outside, although a skin places the mesh.
 #[test]
 fn the_node_of_a_skinned_mesh_decides_which_side_is_outside() {
