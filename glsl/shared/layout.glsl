@@ -644,6 +644,9 @@ struct Segment {
 #define MOST_NOISE_TILES 4096u
 // `Frame.window_x` if the window is a column of noise tiles (noise_tiles.glsl).
 #define WINDOW_OF_TILES 0xffffffffu
+// The least density, per steradian, with which a lobe samples a direction in which it sees the studio. That of matt
+// surfaces is at most 1 / pi.
+#define STUDIO_LEAST_DENSITY 1.0
 // Number of the layers of light (path_layers.comp).
 #define LIGHT_LAYERS 3u
 // The bounce of a path, counted from 0, from which on it may end by Russian roulette.

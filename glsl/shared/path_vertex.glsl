@@ -48,12 +48,14 @@ vec3 added_light(vec3 light, uint depth) {
 }
 
 // The light of an environment that a ray meets. The camera and perfectly smooth surfaces do not see the ambient light.
-// The studio is no light that is sampled, so that all of it is met.
+// The studio is no light that is sampled, so all of it is met. Only narrow lobes see it: it is there to be mirrored,
+// and wide ones would make noise of it.
 vec3 met_environment(PathRay ray, PathState state, uint depth) {
     vec3 radiance = environment_radiance(ray.direction);
     if (state.density > 0.0) radiance += ambient_radiance(ray.direction);
     vec3 met = radiance * share_of_met(state, environment_density(ray.direction));
-    return depth > 0u ? met + studio_radiance(ray.direction) : met;
+    bool mirrors = depth > 0u && (state.density == 0.0 || state.density > STUDIO_LEAST_DENSITY);
+    return mirrors ? met + studio_radiance(ray.direction) : met;
 }
 
 // The segment to a light that is picked at a hit.

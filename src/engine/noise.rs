@@ -27,8 +27,8 @@ const N_LAYERS: usize = LIGHT_LAYERS as usize;
 /// How low the noise of a picture has to be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoiseGoal {
-    /// The most noise of a tile: the root mean square error of what its colours look like ([`appearance`]). 0.01 is an
-    /// error of about a hundredth of white on a display.
+    /// The most noise of a tile: the root mean square error of what its colours look like. That is the square root of
+    /// light up to white, and above it 1 and half of the logarithm. 0.01 is an error of about a hundredth of white.
     pub noise: f32,
     /// Number of samples of each pixel after which a tile gets no more: 2^n, at least [`NoiseGoal::FEWEST`].
     pub most_samples: u32,

@@ -17,7 +17,7 @@ use super::{
 };
 use crate::layout::{
     Hit, LEAST_SURVIVAL, NO_TRIANGLE, PathRay, PathState, ROULETTE_DEPTH, SEGMENT_NONE, SEGMENT_SHARE, SEGMENT_WAITS,
-    Segment,
+    STUDIO_LEAST_DENSITY, Segment,
 };
 
 /// The number of pairs of random numbers that come before those of the first hit: in the pixel and in the lens.
@@ -45,14 +45,16 @@ fn added_light(inputs: &KernelInputs, light: Vec3, depth: u32) -> Vec3 {
 }
 
 /// The light of an environment that a ray meets.
-/// The studio is no light that is sampled, so that all of it is met.
+/// The studio is no light that is sampled, so all of it is met. Only narrow lobes see it: it is there to be mirrored,
+/// and wide ones would make noise of it.
 fn met_environment(inputs: &KernelInputs, ray: &PathRay, state: &PathState, depth: u32) -> Vec3 {
     let mut radiance = environment_radiance(inputs, ray.direction);
     if state.density > 0.0 {
         radiance += ambient_radiance(inputs, ray.direction);
     }
     let met = radiance * share_of_met(state, environment_density(inputs, ray.direction));
-    if depth > 0 { met + studio_radiance(inputs.frame(), ray.direction) } else { met }
+    let mirrors = depth > 0 && (state.density == 0.0 || state.density > STUDIO_LEAST_DENSITY);
+    if mirrors { met + studio_radiance(inputs.frame(), ray.direction) } else { met }
 }
 
 const NO_SEGMENT: Segment = Segment {

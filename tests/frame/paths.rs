@@ -9,7 +9,7 @@ use kdray::{
         sampling::samples_log2,
     },
     gpu::DeviceOverrides,
-    layout::Material,
+    layout::{MATERIAL_MICROFACET, Material},
     render::{BandedRenderer, Renderer},
     scene::Projection,
     world::FlatScene,
@@ -75,6 +75,7 @@ fn all_kinds() -> Vec<(&'static str, FlatScene)> {
         ("outdoors", scenes::mixed_outdoors()),
         ("with a lamp", lamp(scenes::mixed())),
         ("in parallel", scenes::orthographic(scenes::mixed_outdoors())),
+        ("in a studio", FlatScene { studio: Some(Vec3::Z), ..scenes::mixed_outdoors() }),
     ]
 }
 
@@ -97,6 +98,30 @@ fn device_and_cpu_agree() {
         assert!(n_differing <= 1200 / 20, "{name}: {n_differing} of 1200 pixels differ");
         let n_others = differing(&found, &on_cpu(&scene, &options, 2), 1e-3).len();
         assert!(n_others > 300, "{name}: pictures of other samples differ in {n_others} pixels");
+    }
+}
+
+/// A mirror shows the studio. Matt surfaces and the camera do not see it.
+#[test]
+fn only_narrow_lobes_see_the_studio() {
+    let options = options(24, 18, 3);
+    let flags = MATERIAL_MICROFACET;
+    let metal = Material { metallic: 1.0, roughness: 0.0, flags, ..scenes::diffuse(Vec3::ONE) };
+    for (material, mirrors) in [(scenes::diffuse(Vec3::splat(0.7)), false), (metal, true)] {
+        let ball = |studio| {
+            let mut scene = FlatScene { background: Vec3::splat(0.2), studio, ..scenes::empty() };
+            scenes::add(&mut scene, scenes::smooth_sphere(12, 1.0, Vec3::ZERO), material);
+            scene.camera.eye = vec3(0.0, 0.0, 3.0);
+            scene.camera.target = Vec3::ZERO;
+            scene
+        };
+        for render in [on_cpu, on_device] {
+            let [without, within] = [None, Some(Vec3::Z)].map(|studio| render(&ball(studio), &options, 4));
+            let n_differing = differing(&without, &within, 0.0).len();
+            let n_pixels = within.radiance.len();
+            assert!(if mirrors { (20..n_pixels).contains(&n_differing) } else { n_differing == 0 }, "{n_differing}");
+            assert_eq!(without.radiance[0], within.radiance[0], "the camera sees the background in the corner");
+        }
     }
 }
 
