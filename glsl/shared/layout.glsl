@@ -942,6 +942,8 @@ struct AccelConstants {
 
 // Whether the frame traces paths, whose rays are all stored, and not the ray trees of the paper.
 #define CONSTANT_PATHS 12u
+// Whether a light tree picks lights (emitters/tree.glsl). Kernels without one need fewer registers.
+#define CONSTANT_LIGHT_TREE 13u
 
 // Whether a kernel builds the lower level of a grid.
 #define CONSTANT_LOWER_LEVEL 10u

@@ -164,7 +164,8 @@ impl Resources {
                 PUSH_BYTES,
                 (accel.constants(is_of_paths))
                     .set(layout::constants::ORTHOGRAPHIC, constants.is_orthographic == 1)
-                    .set(layout::constants::PATHS, is_of_paths),
+                    .set(layout::constants::PATHS, is_of_paths)
+                    .set(layout::constants::LIGHT_TREE, is_of_paths && world.emitters().has_tree()),
             )?,
             accel,
             set: None,

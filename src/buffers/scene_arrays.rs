@@ -16,11 +16,11 @@ use crate::{
 /// Way in which kernels read the scene's arrays (glsl/shared/scene.glsl). It is the same for all arrays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SceneAccess {
-    /// As bound storage buffers.
+    /// Kernels read bound storage buffers.
     Bound,
-    /// As texels. For software drivers, if no array has more texels than the device allows.
+    /// Kernels read texels. It is for software drivers, if no array has more texels than the device allows.
     Texels,
-    /// By device address. For scenes with an array that is larger than the device can bind.
+    /// Kernels read device addresses. It is for scenes with an array that is larger than the device can bind.
     Address,
 }
 

@@ -32,9 +32,9 @@ impl LightLayers {
 /// The sums of a range of samples: of the picture, and of its layers of light.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RangeSums {
-    /// Of the radiance.
+    /// The sums of the radiance.
     pub picture: SampleSums,
-    /// Of the layers of light. Without layers, they have no blocks.
+    /// The sums of each layer of light. Without layers, they have no blocks.
     pub light: [SampleSums; N_LAYERS],
 }
 

@@ -8,9 +8,9 @@ use super::{
 
 /// The t at which a ray meets the planes of a node's cell on each axis.
 pub struct BoxPlanes {
-    /// Of the planes that the ray meets first.
+    /// The t of the planes that the ray meets first.
     pub near: [f32; 3],
-    /// Of the opposite planes.
+    /// The t of the opposite planes.
     pub far: [f32; 3],
 }
 

@@ -60,7 +60,8 @@ SeenLight seen_light(vec3 origin, vec3 direction, float t_max) {
     if (light.kind == AREA_RECTANGLE) density = rectangle_density(light, origin, direction, nearest);
     else if (light.kind == AREA_DISK) density = flat_density(light, direction, nearest);
     else density = sphere_density(light, origin);
-    float probability = light.probability * tree_probability(origin, light.leaf_ix);
+    float probability = light.probability;
+    if (LIGHT_TREE) probability *= tree_probability(origin, light.leaf_ix);
     return SeenLight(nearest, light.radiance, probability * density);
 }
 

@@ -36,7 +36,7 @@ LightPick pick_light(vec3 point_world, vec3 u) {
     float more = fract(u.y * 4096.0);
     AliasPick picked = pick_alias(accel.emitters_begin, 5u, accel.n_emitters, u.x, more);
     Emitter emitter = emitter_at(picked.ix);
-    if (emitter.kind == EMITTER_TREE) {
+    if (LIGHT_TREE && emitter.kind == EMITTER_TREE) {
         TreePick light = pick_in_tree(point_world, picked.rest, more);
         emitter = emitter_at(light.emitter_ix);
         emitter.probability *= light.probability;
@@ -76,7 +76,7 @@ float emission_density(uint triangle_ix, vec3 point_world, vec3 direction, float
     if (low == end) return 0.0;
     Emitter emitter = emitter_at(low);
     if (emitter.ix != triangle_ix) return 0.0;
-    if (accel.light_nodes_begin != NO_WORDS) emitter.probability *= tree_probability(point_world, emitter.alias_ix);
+    if (LIGHT_TREE) emitter.probability *= tree_probability(point_world, emitter.alias_ix);
     return emitter.probability * area_density(triangle_at(triangle_ix), direction, distance);
 }
 

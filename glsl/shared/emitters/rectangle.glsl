@@ -42,7 +42,7 @@ struct SeenRectangle {
     float height;
     // The turn at x0.
     float first_turn;
-    // Steradians. 0: directions are not picked by solid angle.
+    // The solid angle that the rectangle fills, steradians. It is 0 if directions are not picked by solid angle.
     float solid_angle;
 };
 

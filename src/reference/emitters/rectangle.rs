@@ -44,7 +44,7 @@ struct SeenRectangle {
     height: f32,
     /// The turn at the first end along `edge_u`.
     first_turn: f32,
-    /// Steradians. 0: directions are not picked by solid angle.
+    /// The solid angle that the rectangle fills, steradians. It is 0 if directions are not picked by solid angle.
     solid_angle: f32,
 }
 
