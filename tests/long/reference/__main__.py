@@ -41,7 +41,7 @@ def main():
     parser.add_argument("--keep", help="folder for scenes and pictures [default: a temporary one]")
     parser.add_argument("--cpu", action="store_true", help="renders without Vulkan")
     options = parser.parse_args()
-    arguments = ["--cpu"] if options.cpu else []
+    arguments = ["--spp", str(options.runs * options.spp), *(["--cpu"] if options.cpu else [])]
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(options.keep or temporary)
         folder.mkdir(exist_ok=True, parents=True)
