@@ -102,8 +102,9 @@ fn a_slow_variant_warms_up_with_fewer_casts_than_a_fast_one() {
     let variants = [Traversal::Mask, Traversal::Brute].map(Variant::KdTree);
     let mut tracers = Tracers::new(Some(&context), &stage, &variants).unwrap();
     let [primary, ..] = ray_sets(&stage);
-    let n_casts = tracers.n_warm_up(&primary).unwrap();
-    assert!(n_casts[0] > 4 * n_casts[1], "{n_casts:?} untimed casts");
+    // Other work on the machine may delay the cast from which the numbers are estimated.
+    let attempts: Vec<_> = (0..5).map(|_| tracers.n_warm_up(&primary).unwrap()).collect();
+    assert!(attempts.iter().any(|n_casts| n_casts[0] > 4 * n_casts[1]), "{attempts:?} untimed casts");
 }
 
 #[test]
