@@ -14,7 +14,9 @@ use rayon::prelude::*;
 
 use crate::{
     cpu,
-    frame::{Crop, Drawn, LightLayers, NoiseTiles, Picture, Profile, RenderOptions, SampleRange, TileSamples},
+    frame::{
+        Crop, Drawn, DrawnTiles, LightLayers, NoiseTiles, Picture, Profile, RenderOptions, SampleRange, TileSamples,
+    },
     gpu::GpuError,
     layout::{Feature, LIGHT_LAYERS, MOST_SAMPLES_LOG2},
 };
@@ -65,9 +67,8 @@ pub struct NoisePicture {
     pub n_noisy: usize,
 }
 
-/// Draws samples of tiles, all of which get equally many. Returns what is known of their pixels, and the means of the
-/// samples with those of their squared luminance, tile by tile.
-pub(super) type DrawTiles<'a> = dyn FnMut(&[TileSamples]) -> Result<(Drawn, Vec<[f32; 4]>), GpuError> + 'a;
+/// Draws samples of tiles, all of which get equally many.
+pub(super) type DrawTiles<'a> = dyn FnMut(&[TileSamples]) -> Result<DrawnTiles, GpuError> + 'a;
 
 /// Number of tiles with which a device has enough to do: 16 samples of each of their pixels are two million paths, as
 /// many as a frame traces together.
@@ -102,7 +103,7 @@ pub(super) fn draw_until(
             let place = tile.place;
             (0..n_parts).map(move |ix| TileSamples { place, samples: part(ix) })
         };
-        let (drawn, means) = draw(&noisy.iter().flat_map(parts_of).collect::<Vec<_>>())?;
+        let DrawnTiles { drawn, means } = draw(&noisy.iter().flat_map(parts_of).collect::<Vec<_>>())?;
         profile.add(&drawn.profile);
         let layers = drawn.light.0.iter().filter(|layer| !layer.is_empty()).map(Vec::as_slice);
         let layers: Vec<&[[f32; 4]]> = [&means[..]].into_iter().chain(layers).collect();

@@ -11,8 +11,8 @@ use super::{
 use crate::{
     cpu::{self, Batching},
     frame::{
-        Drawn, Goal, Integrator, NoiseTiles, Pacer, Picture, RangeSums, RenderOptions, SampleRange, TileSamples,
-        Watcher,
+        Drawn, DrawnTiles, Goal, Integrator, NoiseTiles, Pacer, Picture, RangeSums, RenderOptions, SampleRange,
+        TileSamples, Watcher,
     },
     gpu::{Context, GivenImage, GpuError, TimelinePoint},
     render::BandedRenderer,
@@ -137,7 +137,7 @@ impl Renderer {
     }
 
     /// Draws samples of noise tiles.
-    fn draw_tiles(&mut self, tiles: &[TileSamples]) -> Result<(Drawn, Vec<[f32; 4]>), GpuError> {
+    fn draw_tiles(&mut self, tiles: &[TileSamples]) -> Result<DrawnTiles, GpuError> {
         match &mut self.backend {
             Backend::Device(renderer) => renderer.draw_tiles(tiles),
             Backend::Group(group) => group.draw_tiles(tiles),
@@ -220,17 +220,14 @@ fn draw_on_cpu(renderer: &mut cpu::Renderer, goal: Goal, watcher: &mut impl Watc
     drawn
 }
 
-fn draw_tiles_on_cpu(renderer: &mut cpu::Renderer, tiles: &[TileSamples]) -> (Drawn, Vec<[f32; 4]>) {
-    let (mut all, mut means) = (Drawn::default(), Vec::with_capacity(tiles.len() * NoiseTiles::N_PIXELS));
+fn draw_tiles_on_cpu(renderer: &mut cpu::Renderer, tiles: &[TileSamples]) -> DrawnTiles {
+    let mut all = DrawnTiles::default();
     for together in tiles.chunks(NoiseTiles::MOST) {
         let tiles = NoiseTiles::new(together);
         let (first_sample, n_samples) = (tiles.first_sample(), tiles.n_samples());
         renderer.set_window(Some(tiles), first_sample);
-        let mut drawn = draw_on_cpu(renderer, Goal::Samples(n_samples), &mut || ());
-        means.extend_from_slice(renderer.window_mean());
-        all.profile.add(&drawn.profile);
-        all.features.append(&mut drawn.features);
-        all.light.append(drawn.light);
+        let drawn = draw_on_cpu(renderer, Goal::Samples(n_samples), &mut || ());
+        all.append(DrawnTiles { drawn, means: renderer.window_mean().to_vec() });
     }
-    (all, means)
+    all
 }

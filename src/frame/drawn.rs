@@ -17,6 +17,25 @@ pub struct Drawn {
     pub n_samples: u32,
 }
 
+/// Samples of noise tiles, tile by tile.
+#[derive(Clone, Debug, Default)]
+pub struct DrawnTiles {
+    /// The features and layers of the tiles' pixels, and the sums of times and counts.
+    pub drawn: Drawn,
+    /// The means of the samples of each pixel. The fourth component is the mean of their squared luminance.
+    pub means: Vec<[f32; 4]>,
+}
+
+impl DrawnTiles {
+    /// Appends further tiles.
+    pub(crate) fn append(&mut self, mut next: Self) {
+        self.drawn.profile.add(&next.drawn.profile);
+        self.drawn.features.append(&mut next.drawn.features);
+        self.drawn.light.append(next.drawn.light);
+        self.means.append(&mut next.means);
+    }
+}
+
 /// Follows the progress of a drawing.
 pub trait Watcher {
     /// Whether the watcher makes use of [`Watcher::part`]. If it does not, the renderer saves the time to wait for

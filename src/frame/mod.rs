@@ -33,7 +33,7 @@ mod view;
 pub use self::{
     aov::{Aov, Channel, Samples},
     crop::Crop,
-    drawn::{Drawn, Watcher},
+    drawn::{Drawn, DrawnTiles, Watcher},
     goal::{Goal, Pacer},
     light_layers::{LightLayers, RangeSums},
     noise_tiles::{NoiseTiles, TileSamples},

@@ -3,25 +3,24 @@
 use super::BandedRenderer;
 use crate::{
     buffers::Pixels,
-    frame::{Drawn, Goal, NoiseTiles, PathOptions, RenderOptions, TileSamples},
+    frame::{DrawnTiles, Goal, NoiseTiles, PathOptions, RenderOptions, TileSamples},
     gpu::GpuError,
 };
 
 impl BandedRenderer {
-    /// Draws samples of tiles, as many tiles together as the device can bind. All get equally many. Returns the
-    /// means of the samples of their pixels, tile by tile; the fourth component is the mean of their squared luminance.
-    /// Features and layers have the same order. [`BandedRenderer::set_crop`] ends the drawing of tiles.
+    /// Draws samples of tiles, as many tiles together as the device can bind. All get equally many.
+    /// [`BandedRenderer::set_crop`] ends the drawing of tiles.
     ///
     /// # Panics
     /// The options have a noise filter, or they do not ask for paths.
     ///
     /// # Errors
     /// Fails as [`BandedRenderer::draw`] does.
-    pub fn draw_tiles(&mut self, tiles: &[TileSamples]) -> Result<(Drawn, Vec<[f32; 4]>), GpuError> {
+    pub fn draw_tiles(&mut self, tiles: &[TileSamples]) -> Result<DrawnTiles, GpuError> {
         let options = self.renderer.options().clone();
         let most_pixels = self.renderer.context.limits().storage_range / Pixels::bytes_per_pixel(&options);
         let most_tiles = (most_pixels as usize / NoiseTiles::N_PIXELS).clamp(1, NoiseTiles::MOST);
-        let (mut all, mut means) = (Drawn::default(), Vec::with_capacity(tiles.len() * NoiseTiles::N_PIXELS));
+        let mut all = DrawnTiles::default();
         let n_chunks = tiles.len().div_ceil(most_tiles).max(1);
         for together in tiles.chunks(tiles.len().div_ceil(n_chunks).max(1)) {
             let tiles = NoiseTiles::new(together);
@@ -29,12 +28,9 @@ impl BandedRenderer {
                 (PathOptions { first_sample: tiles.first_sample(), ..options.paths }, tiles.n_samples());
             (self.bands, self.joined) = (vec![tiles.window()], None);
             self.renderer.set_options(&RenderOptions { noise_tiles: Some(tiles), paths, ..options.clone() })?;
-            let mut drawn = self.draw_band(Goal::Samples(n_samples), &mut || ())?;
-            means.append(&mut self.renderer.window_mean()?);
-            all.profile.add(&drawn.profile);
-            all.features.append(&mut drawn.features);
-            all.light.append(drawn.light);
+            let drawn = self.draw_band(Goal::Samples(n_samples), &mut || ())?;
+            all.append(DrawnTiles { drawn, means: self.renderer.window_mean()? });
         }
-        Ok((all, means))
+        Ok(all)
     }
 }

@@ -187,7 +187,7 @@ impl Emitters {
 
     /// Returns the number of all that can be picked: lights, emitting triangles, suns and the environment.
     pub fn n_lights(&self) -> usize {
-        // The tree has an entry, too.
+        // One entry of the table is the tree itself, which is no light.
         self.entries.len() - usize::from(self.has_tree())
     }
 

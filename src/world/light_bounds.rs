@@ -50,8 +50,8 @@ impl Cone {
         Self { axis: axis.normalize(), spread, end, is_two_sided }
     }
 
-    /// Returns the measure of its directions by which splits are compared. Beyond the spread, directions count by the
-    /// cosine.
+    /// Returns the solid angle in which the lights shine, by which splits are compared. Directions outside of the cone
+    /// of the lights' axes are weighted by the cosine of their angle to it.
     fn measure(self) -> f32 {
         let (spread, end) = (self.spread, (self.spread + self.end).min(PI));
         let (sine, cosine) = spread.sin_cos();

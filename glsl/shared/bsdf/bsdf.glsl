@@ -177,7 +177,7 @@ float dielectric_albedo(vec3 dielectric, GgxAlbedo albedo) {
     return dielectric.x * at_normal + dielectric.y * albedo.grazing + dielectric.z * albedo.loss;
 }
 
-// The albedo of no interface.
+// The albedo of a surface without an interface, which reflects and loses nothing.
 const GgxAlbedo NO_ALBEDO = GgxAlbedo(0.0, 0.0);
 
 // Sets the terms of the Lambertian lobe. albedo: of the interface, towards the viewer.

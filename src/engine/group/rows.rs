@@ -58,7 +58,7 @@ impl RendererGroup {
         let mut all = Drawn { n_samples, ..Drawn::default() };
         for (_, mut drawn) in tiles {
             all.features.append(&mut drawn.features);
-            all.light.0.iter_mut().zip(&mut drawn.light.0).for_each(|(all, part)| all.append(part));
+            all.light.append(drawn.light);
             all.profile.append(drawn.profile);
         }
         self.picture = picture.into_inner().unwrap_or_else(PoisonError::into_inner);

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{RendererGroup, share, work_queue::Chunking};
 use crate::{
-    frame::{Drawn, TileSamples},
+    frame::{DrawnTiles, TileSamples},
     gpu::{Context, GpuError},
 };
 
@@ -22,19 +22,14 @@ pub fn chunking(contexts: &[Arc<Context>]) -> Chunking {
 impl RendererGroup {
     /// Draws samples of tiles, as
     /// [`BandedRenderer::draw_tiles`](crate::render::BandedRenderer::draw_tiles) does.
-    pub fn draw_tiles(&mut self, tiles: &[TileSamples]) -> Result<(Drawn, Vec<[f32; 4]>), GpuError> {
+    pub fn draw_tiles(&mut self, tiles: &[TileSamples]) -> Result<DrawnTiles, GpuError> {
         let units = 0..tiles.len() as u32;
         let parts = share(&mut self.members, &mut self.tiles, units, &mut || (), |renderer, units, _| {
             renderer.draw_tiles(&tiles[units.start as usize..units.end as usize])
         })?;
-        let (mut all, mut all_means) = (Drawn::default(), Vec::new());
-        for (_, (mut drawn, mut means)) in parts {
-            all_means.append(&mut means);
-            all.profile.add(&drawn.profile);
-            all.features.append(&mut drawn.features);
-            all.light.append(drawn.light);
-        }
-        all.profile.device = self.device_names();
-        Ok((all, all_means))
+        let mut all = DrawnTiles::default();
+        parts.into_iter().for_each(|(_, part)| all.append(part));
+        all.drawn.profile.device = self.device_names();
+        Ok(all)
     }
 }

@@ -203,7 +203,7 @@ fn dielectric_albedo(dielectric: Vec3, albedo: GgxAlbedo) -> f32 {
     dielectric.x * at_normal + dielectric.y * albedo.grazing + dielectric.z * albedo.loss
 }
 
-/// The albedo of no interface.
+/// The albedo of a surface without an interface, which reflects and loses nothing.
 const NO_ALBEDO: GgxAlbedo = GgxAlbedo { loss: 0.0, grazing: 0.0 };
 
 /// Sets the terms of the Lambertian lobe. `albedo`: of the interface, towards the viewer.
