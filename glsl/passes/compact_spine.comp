@@ -6,10 +6,8 @@
 // `overflow` is set, as is `any_overflow` of the first row of bounces.
 // Reads and writes scan_blocks and bounces.
 #include "layout.glsl"
+#include "integrator.glsl"
 #include "scan.glsl"
-
-// Whether the rays are those of paths, which are not stored bounce after bounce: each path has one ray.
-layout(constant_id = CONSTANT_PATHS) const bool PATHS = false;
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;
 layout(push_constant) uniform BatchBlock { Batch batch; };

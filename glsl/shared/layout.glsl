@@ -942,8 +942,25 @@ struct AccelConstants {
 
 // Whether the frame traces paths, whose rays are all stored, and not the ray trees of the paper.
 #define CONSTANT_PATHS 12u
-// Whether a light tree picks lights (emitters/tree.glsl). Kernels without one need fewer registers.
-#define CONSTANT_LIGHT_TREE 13u
+// The kinds of emitters that the scene may have, as bits: `1 << EMITTER_AREA` and its like, `EMITTERS_MAP`, and
+// `EMITTERS_SHAPE << AREA_DISK` and its like. Kernels are made without the code for the others.
+#define CONSTANT_EMITTERS 13u
+// The environment has a map.
+#define EMITTERS_MAP 0x100u
+#define EMITTERS_SHAPE 0x10000u
+// The lobes that the scene's materials may have in the path tracer, as bits: `LOBE_INTERFACE` and its like. Kernels are
+// made without the code for the others.
+#define CONSTANT_LOBES 14u
+// An interface that reflects light or lets it pass.
+#define LOBE_INTERFACE 1u
+// A metal.
+#define LOBE_METAL 2u
+// A metal whose complex index of refraction is given.
+#define LOBE_CONDUCTOR 4u
+// Light that passes through the surface.
+#define LOBE_TRANSMISSION 8u
+#define LOBE_CLEARCOAT 16u
+#define LOBE_SHEEN 32u
 
 // Whether a kernel builds the lower level of a grid.
 #define CONSTANT_LOWER_LEVEL 10u

@@ -58,15 +58,30 @@ vec4 map_at(uint texture_ix, TextureHit hit) {
     return sample_texture(map, uv_at(hit.triangle_ix, uv_set_of(map), hit.u, hit.v), level_of(map, hit));
 }
 
+// The places of the material's textures, as bits.
+uint places_of(MaterialMaps maps) {
+    return (maps.base_colour != NO_TEXTURE ? 1u << MAP_BASE_COLOUR : 0u)
+        | (maps.opacity != NO_TEXTURE ? 1u << MAP_OPACITY : 0u)
+        | (maps.specular != NO_TEXTURE ? 1u << MAP_SPECULAR : 0u)
+        | (maps.specular_factor != NO_TEXTURE ? 1u << MAP_SPECULAR_FACTOR : 0u)
+        | (maps.emission != NO_TEXTURE ? 1u << MAP_EMISSION : 0u)
+        | (maps.normal != NO_TEXTURE ? 1u << MAP_NORMAL : 0u)
+        | (maps.roughness != NO_TEXTURE ? 1u << MAP_ROUGHNESS : 0u)
+        | (maps.metallic != NO_TEXTURE ? 1u << MAP_METALLIC : 0u)
+        | (maps.transmission != NO_TEXTURE ? 1u << MAP_TRANSMISSION : 0u)
+        | (maps.occlusion != NO_TEXTURE ? 1u << MAP_OCCLUSION : 0u);
+}
+
 // The values of a material's textures, in the order of `MaterialMaps`: a colour with opacity, or the number of a
 // texture of one number in all components. A texture that is missing has 1. They are looked up in a loop, since each
-// copy of the lookup would make every kernel that shades longer by a thousand instructions.
-vec4[N_MAPS] map_values(uint material_ix, TextureHit hit) {
+// copy of the lookup would make every kernel that shades longer by a thousand instructions. The loop has a turn for
+// each texture that is there, since some drivers run the lookup in each turn, needed or not.
+vec4[N_MAPS] map_values(MaterialMaps maps, uint material_ix, TextureHit hit) {
     vec4 values[N_MAPS];
-    for (uint i = 0u; i < N_MAPS; ++i) {
-        values[i] = vec4(1.0);
+    for (uint i = 0u; i < N_MAPS; ++i) values[i] = vec4(1.0);
+    for (uint left = places_of(maps); left != 0u; left &= left - 1u) {
+        uint i = uint(findLSB(left));
         uint texture_ix = load_texture_words(accel.material_maps_begin + 16u * material_ix + i);
-        if (texture_ix == NO_TEXTURE) continue;
         vec4 value = map_at(texture_ix, hit);
         bool is_colour = i == MAP_BASE_COLOUR || i == MAP_SPECULAR || i == MAP_EMISSION || i == MAP_NORMAL;
         values[i] = is_colour ? value : vec4(scalar_of(texture_at(texture_ix), value));
@@ -159,7 +174,7 @@ Material material_at(PathRay ray, Hit hit, Triangle t, inout Surface surface) {
     if (TEXTURED) {
         MaterialMaps maps = maps_of(material_ix);
         TextureHit at = texture_hit(ray, hit, t, surface);
-        vec4 values[N_MAPS] = map_values(material_ix, at);
+        vec4 values[N_MAPS] = map_values(maps, material_ix, at);
         apply_maps(maps, values, at, material);
         surface.shading = mapped_normal(maps, values[MAP_NORMAL], at, surface);
     }

@@ -51,9 +51,10 @@ vec3 added_light(vec3 light, uint depth) {
 // The studio is no light that is sampled, so all of it is met. Only narrow lobes see it: it is there to be mirrored,
 // and wide ones would make noise of it.
 vec3 met_environment(PathRay ray, PathState state, uint depth) {
-    vec3 radiance = environment_radiance(ray.direction);
+    SeenEnvironment seen = seen_environment(ray.direction);
+    vec3 radiance = seen.radiance;
     if (state.density > 0.0) radiance += ambient_radiance(ray.direction);
-    vec3 met = radiance * share_of_met(state, environment_density(ray.direction));
+    vec3 met = radiance * share_of_met(state, seen.density);
     bool mirrors = depth > 0u && (state.density == 0.0 || state.density > STUDIO_LEAST_DENSITY);
     return mirrors ? met + studio_radiance(ray.direction) : met;
 }

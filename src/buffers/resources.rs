@@ -165,7 +165,7 @@ impl Resources {
                 (accel.constants(is_of_paths))
                     .set(layout::constants::ORTHOGRAPHIC, constants.is_orthographic == 1)
                     .set(layout::constants::PATHS, is_of_paths)
-                    .set(layout::constants::LIGHT_TREE, is_of_paths && world.emitters().has_tree()),
+                    .set(layout::constants::EMITTERS, if is_of_paths { world.emitters().kinds() } else { 0 }),
             )?,
             accel,
             set: None,

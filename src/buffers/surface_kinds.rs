@@ -4,8 +4,11 @@ use rayon::prelude::*;
 
 use crate::{
     gpu::Constants,
-    layout::{FLAT_NORMAL, MATERIAL_MICROFACET, MATERIAL_UNLIT, constants},
-    world::FlatScene,
+    layout::{
+        FLAT_NORMAL, LOBE_CLEARCOAT, LOBE_CONDUCTOR, LOBE_INTERFACE, LOBE_METAL, LOBE_SHEEN, LOBE_TRANSMISSION,
+        MATERIAL_CONDUCTOR, MATERIAL_MICROFACET, MATERIAL_UNLIT, Material, constants,
+    },
+    world::{FlatScene, path_materials},
 };
 
 /// The kinds of surfaces of a scene.
@@ -23,6 +26,26 @@ pub struct SurfaceKinds {
     has_shadow_gaps: bool,
     /// Whether rays of paths do.
     has_path_gaps: bool,
+    /// The lobes that materials have in the path tracer: `LOBE_INTERFACE` and its like.
+    lobes: u32,
+}
+
+/// Returns the lobes that a material of the path tracer may have, whatever its textures are: they only multiply.
+fn lobes_of(material: &Material) -> u32 {
+    // A term that is no number counts.
+    let is_there = |term: f32| !(term <= 0.0);
+    let (is_metal, passes) = (is_there(material.metallic), is_there(material.transmission));
+    let is_conductor = is_metal && material.flags & MATERIAL_CONDUCTOR != 0;
+    [
+        (LOBE_INTERFACE, is_metal || passes || material.ks.to_array().into_iter().any(is_there)),
+        (LOBE_METAL, is_metal),
+        (LOBE_CONDUCTOR, is_conductor),
+        (LOBE_TRANSMISSION, passes),
+        (LOBE_CLEARCOAT, is_there(material.clearcoat)),
+        (LOBE_SHEEN, material.sheen_colour.to_array().into_iter().any(is_there)),
+    ]
+    .into_iter()
+    .fold(0, |lobes, (lobe, is_present)| if is_present { lobes | lobe } else { lobes })
 }
 
 impl SurfaceKinds {
@@ -36,6 +59,7 @@ impl SurfaceKinds {
             has_cutouts: scene.textures.has_cutouts(),
             has_shadow_gaps: scene.textures.has_shadow_gaps(),
             has_path_gaps: scene.textures.has_path_gaps(),
+            lobes: path_materials(scene).iter().map(lobes_of).fold(0, |lobes, more| lobes | more),
         }
     }
 
@@ -46,6 +70,7 @@ impl SurfaceKinds {
             .set(constants::MICROFACETS, self.has_microfacets || of_paths)
             .set(constants::TEXTURED, self.is_textured)
             .set(constants::SMOOTH, self.is_smooth)
+            .set(constants::LOBES, self.lobes)
             .set(constants::CUTOUTS, self.has_cutouts)
             .set(constants::SHADOW_GAPS, if of_paths { self.has_path_gaps } else { self.has_shadow_gaps })
     }

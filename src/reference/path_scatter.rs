@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::{
     inputs::KernelInputs,
+    live_paths::parts,
     path_vertex::step_path,
     paths::{key_of_path, pixel_of_path},
 };
@@ -17,7 +18,7 @@ pub struct PathBuffers<'a> {
 }
 
 /// Takes the paths `live` one step further. Writes whether the path at each place of the list goes on (`child_kinds`),
-/// and how many of each block of `SCAN_GROUP_SIZE` places do (`scan_blocks`).
+/// and how many of each block of `SCAN_GROUP_SIZE` places do (`scan_blocks`). `live` is in ascending order.
 pub fn path_scatter(
     inputs: &KernelInputs,
     batch: &Batch,
@@ -25,26 +26,25 @@ pub fn path_scatter(
     paths: PathBuffers,
     (child_kinds, scan_blocks): (&mut [u32], &mut [u32]),
 ) {
-    let step = |&path_ix: &u32| {
-        let ix = path_ix as usize;
-        let key = key_of_path(inputs, batch, path_ix, pixel_of_path(inputs.frame(), batch, path_ix));
-        let (mut ray, mut state) = (paths.rays[ix], paths.states[ix]);
-        let (goes_on, segment) = step_path(inputs, key, batch.depth, &hits[ix], &mut ray, &mut state);
-        (goes_on, ray, state, segment)
-    };
-    let steps: Vec<_> = live.par_iter().map(step).collect();
-    for ((&path_ix, kind), (goes_on, ray, state, segment)) in live.iter().zip(&mut *child_kinds).zip(steps) {
-        let ix = path_ix as usize;
-        *kind = goes_on.into();
-        paths.states[ix] = state;
-        if segment.state != SEGMENT_NONE {
-            paths.segments[ix] = segment;
+    let block_size = SCAN_GROUP_SIZE as usize;
+    let of_blocks = (live.par_chunks(block_size), child_kinds.par_chunks_mut(block_size), scan_blocks.par_iter_mut());
+    let of_paths = (
+        parts(paths.rays, live, block_size),
+        parts(paths.states, live, block_size),
+        parts(paths.segments, live, block_size),
+    );
+    of_blocks.into_par_iter().zip(of_paths).for_each(|(of_block, (mut rays, mut states, mut segments))| {
+        let (live, kinds, n_going_on) = of_block;
+        for (&path_ix, kind) in live.iter().zip(&mut *kinds) {
+            let key = key_of_path(inputs, batch, path_ix, pixel_of_path(inputs.frame(), batch, path_ix));
+            let (ray, state) = (rays.of_path(path_ix), states.of_path(path_ix));
+            let (goes_on, segment) = step_path(inputs, key, batch.depth, &hits[path_ix as usize], ray, state);
+            // A path without a segment has none already.
+            if segment.state != SEGMENT_NONE {
+                *segments.of_path(path_ix) = segment;
+            }
+            *kind = goes_on.into();
         }
-        if goes_on {
-            paths.rays[ix] = ray;
-        }
-    }
-    for (block, kinds) in scan_blocks.iter_mut().zip(child_kinds.chunks(SCAN_GROUP_SIZE as usize)) {
-        *block = kinds.iter().sum();
-    }
+        *n_going_on = kinds.iter().sum();
+    });
 }

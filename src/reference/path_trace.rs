@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::{
     RAYS_PER_TASK,
     inputs::KernelInputs,
+    live_paths::{Part, parts},
     search_ray::SearchRay,
     traverser::{Tracer, Traverser},
 };
@@ -14,7 +15,7 @@ use crate::{
     layout::{Hit, NO_TRIANGLE, PathRay, PathState, SEGMENT_NONE, Segment},
 };
 
-/// Writes the closest hits of the paths `live` to `hits`. Returns how many of them hit something.
+/// Writes the closest hits of the paths `live`, which are in ascending order, to `hits`. Returns how many of them hit something.
 pub fn closest_hits(
     inputs: &KernelInputs,
     traversal: Traversal,
@@ -34,21 +35,20 @@ pub fn closest_hits_by<T: Tracer>(
     hits: &mut [Hit],
 ) -> u32 {
     let inputs = &inputs.through_veils_at_random();
-    let mut found = vec![Hit::default(); live.len()];
-    found.par_chunks_mut(RAYS_PER_TASK).zip(live.par_chunks(RAYS_PER_TASK)).for_each_init(
-        || T::new(inputs, traversal),
-        |traverser, (found, live)| {
-            let search_rays = live.iter().map(|&path_ix| SearchRay::from(&rays[path_ix as usize]));
-            traverser.trace_all::<false, _>(inputs, found.iter_mut().zip(search_rays), |hit, closest| *hit = closest);
-        },
-    );
-    for (&path_ix, hit) in live.iter().zip(&found) {
-        hits[path_ix as usize] = *hit;
-    }
-    found.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count() as u32
+    let trace = |tracer: &mut T, live: &[u32], mut hits: Part<Hit>| {
+        let mut n_hits = 0;
+        let search_rays = live.iter().map(|&path_ix| (path_ix, SearchRay::from(&rays[path_ix as usize])));
+        tracer.trace_all::<false, _>(inputs, search_rays, |path_ix, closest| {
+            n_hits += u32::from(closest.triangle_ix != NO_TRIANGLE);
+            *hits.of_path(path_ix) = closest;
+        });
+        n_hits
+    };
+    let chunks = live.par_chunks(RAYS_PER_TASK).zip(parts(hits, live, RAYS_PER_TASK));
+    chunks.map_init(|| T::new(inputs, traversal), |tracer, (live, hits)| trace(tracer, live, hits)).sum()
 }
 
-/// Tests the segments of the paths `live`, which were alive at the bounce before. Light that arrives is added to the
+/// Tests the segments of the paths `live`, which were alive at the bounce before and are in ascending order. Light that arrives is added to the
 /// paths' states, and the segments are removed. Returns how many there were.
 pub fn segments(
     inputs: &KernelInputs,
@@ -69,26 +69,28 @@ pub fn segments_by<T: Tracer>(
     states: &mut [PathState],
 ) -> u32 {
     let inputs = &inputs.through_veils_at_random();
-    let waiting: Vec<u32> =
-        live.iter().copied().filter(|&path_ix| segments[path_ix as usize].state != SEGMENT_NONE).collect();
-    let mut arrives = vec![false; waiting.len()];
-    arrives.par_chunks_mut(RAYS_PER_TASK).zip(waiting.par_chunks(RAYS_PER_TASK)).for_each_init(
-        || T::new(inputs, traversal),
-        |traverser, (arrives, waiting)| {
-            let search_rays = waiting.iter().map(|&path_ix| SearchRay::from(&ray_of(&segments[path_ix as usize])));
-            traverser.trace_all::<true, _>(inputs, arrives.iter_mut().zip(search_rays), |arrives, hit| {
-                *arrives = hit.triangle_ix == NO_TRIANGLE;
-            });
-        },
-    );
-    for (&path_ix, arrives) in waiting.iter().zip(&arrives) {
-        let segment = &mut segments[path_ix as usize];
-        segment.state = SEGMENT_NONE;
-        if *arrives {
-            states[path_ix as usize].radiance += segment.light;
+    let test = |tracer: &mut T, live: &[u32], mut segments: Part<Segment>, mut states: Part<PathState>| {
+        let mut waiting = Vec::with_capacity(live.len());
+        for &path_ix in live {
+            let segment = segments.of_path(path_ix);
+            if segment.state != SEGMENT_NONE {
+                waiting.push((path_ix, SearchRay::from(&ray_of(segment))));
+            }
         }
-    }
-    waiting.len() as u32
+        let n_segments = waiting.len() as u32;
+        tracer.trace_all::<true, _>(inputs, waiting.into_iter(), |path_ix, hit| {
+            let segment = segments.of_path(path_ix);
+            segment.state = SEGMENT_NONE;
+            if hit.triangle_ix == NO_TRIANGLE {
+                states.of_path(path_ix).radiance += segment.light;
+            }
+        });
+        n_segments
+    };
+    let of_paths = (parts(segments, live, RAYS_PER_TASK), parts(states, live, RAYS_PER_TASK));
+    let chunks = live.par_chunks(RAYS_PER_TASK).zip(of_paths);
+    let n_segments = |tracer: &mut T, (live, (segments, states))| test(tracer, live, segments, states);
+    chunks.map_init(|| T::new(inputs, traversal), n_segments).sum()
 }
 
 fn ray_of(segment: &Segment) -> PathRay {

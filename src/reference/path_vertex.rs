@@ -4,10 +4,7 @@ use glam::{Vec3, vec3};
 
 use super::{
     bsdf::{BsdfTerms, bsdf_terms, is_smooth, sample_bsdf, value_at},
-    emitters::{
-        ambient_radiance, emission_at, emission_density, environment_density, environment_radiance, pick_light,
-        seen_light,
-    },
+    emitters::{ambient_radiance, emission_at, emission_density, pick_light, seen_environment, seen_light},
     inputs::KernelInputs,
     maps::shaded_at,
     material::{emitted, is_unlit, unabsorbed},
@@ -48,11 +45,12 @@ fn added_light(inputs: &KernelInputs, light: Vec3, depth: u32) -> Vec3 {
 /// The studio is no light that is sampled, so all of it is met. Only narrow lobes see it: it is there to be mirrored,
 /// and wide ones would make noise of it.
 fn met_environment(inputs: &KernelInputs, ray: &PathRay, state: &PathState, depth: u32) -> Vec3 {
-    let mut radiance = environment_radiance(inputs, ray.direction);
+    let seen = seen_environment(inputs, ray.direction);
+    let mut radiance = seen.radiance;
     if state.density > 0.0 {
         radiance += ambient_radiance(inputs, ray.direction);
     }
-    let met = radiance * share_of_met(state, environment_density(inputs, ray.direction));
+    let met = radiance * share_of_met(state, seen.density);
     let mirrors = depth > 0 && (state.density == 0.0 || state.density > STUDIO_LEAST_DENSITY);
     if mirrors { met + studio_radiance(inputs.frame(), ray.direction) } else { met }
 }

@@ -15,7 +15,8 @@ use super::{
 use crate::{
     layout::{
         AREA_SUN, AccelConstants, AreaLight, EMITTER_AREA, EMITTER_ENVIRONMENT, EMITTER_LIGHT, EMITTER_SUN,
-        EMITTER_TREE, EMITTER_TRIANGLE, Emitter, LIGHT_DIRECTIONAL, LIGHT_NODE_LEAF, LIGHT_SPOT, Light, LightNode,
+        EMITTER_TREE, EMITTER_TRIANGLE, EMITTERS_MAP, EMITTERS_SHAPE, Emitter, LIGHT_DIRECTIONAL, LIGHT_NODE_LEAF,
+        LIGHT_SPOT, Light, LightNode,
     },
     scene::{Ground, Up},
 };
@@ -183,6 +184,17 @@ impl Emitters {
     /// Returns whether a tree picks the lights, and not the alias table alone.
     pub fn has_tree(&self) -> bool {
         !self.light_nodes.is_empty()
+    }
+
+    /// Returns the kinds of emitters as bits: `1 << EMITTER_AREA` and its like, `EMITTERS_MAP`, and
+    /// `EMITTERS_SHAPE << AREA_DISK` and its like.
+    pub fn kinds(&self) -> u32 {
+        let of_entries = self.entries.iter().map(|emitter| 1 << emitter.kind);
+        // Rays meet area lights, suns and the map even if they are never picked.
+        let of_shapes = self.shapes().iter().map(|light| 1 << EMITTER_AREA | EMITTERS_SHAPE << light.kind);
+        let of_suns = self.suns().iter().map(|_| 1 << EMITTER_SUN);
+        let of_map = self.environment.iter().map(|_| EMITTERS_MAP);
+        of_entries.chain(of_shapes).chain(of_suns).chain(of_map).fold(0, |kinds, kind| kinds | kind)
     }
 
     /// Returns the number of all that can be picked: lights, emitting triangles, suns and the environment.

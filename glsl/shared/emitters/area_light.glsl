@@ -7,6 +7,7 @@
 
 #include "layout.glsl"
 #include "texture_words.glsl"
+#include "emitters/kinds.glsl"
 #include "emitters/pick.glsl"
 #include "emitters/rectangle.glsl"
 #include "emitters/disk.glsl"
@@ -37,15 +38,26 @@ AreaLight area_light_at(uint light_ix) {
 
 // Distance at which a ray meets an area light, world units; infinity if it does not. direction: a unit vector.
 float hit_area_light(AreaLight light, vec3 origin, vec3 direction) {
-    if (light.kind == AREA_RECTANGLE) return hit_rectangle(light, origin, direction);
-    if (light.kind == AREA_DISK) return hit_disk(light, origin, direction);
-    return hit_sphere(light, origin, direction);
+    if (has_shapes(AREA_RECTANGLE) && light.kind == AREA_RECTANGLE) return hit_rectangle(light, origin, direction);
+    if (has_shapes(AREA_DISK) && light.kind == AREA_DISK) return hit_disk(light, origin, direction);
+    if (has_shapes(AREA_SPHERE)) return hit_sphere(light, origin, direction);
+    return uintBitsToFloat(0x7f800000u);
+}
+
+// The density with which a pick of the light gives the direction in which it is hit at a distance, per steradian.
+float shape_density(AreaLight light, vec3 origin, vec3 direction, float distance) {
+    if (has_shapes(AREA_RECTANGLE) && light.kind == AREA_RECTANGLE) {
+        return rectangle_density(light, origin, direction, distance);
+    }
+    if (has_shapes(AREA_DISK) && light.kind == AREA_DISK) return flat_density(light, direction, distance);
+    return has_shapes(AREA_SPHERE) ? sphere_density(light, origin) : 0.0;
 }
 
 // The nearest rectangle, disk or sphere that the ray meets between 0 and t_max. direction: a unit vector. The backs of
 // rectangles and disks and the insides of spheres are not seen.
 SeenLight seen_light(vec3 origin, vec3 direction, float t_max) {
     float nearest = uintBitsToFloat(0x7f800000u);
+    if (!has_emitters(EMITTER_AREA)) return SeenLight(nearest, vec3(0.0), 0.0);
     uint nearest_ix = 0u;
     for (uint light_ix = 0u; light_ix < accel.n_area_lights; ++light_ix) {
         float t = hit_area_light(area_light_at(light_ix), origin, direction);
@@ -56,22 +68,19 @@ SeenLight seen_light(vec3 origin, vec3 direction, float t_max) {
     }
     if (isinf(nearest)) return SeenLight(nearest, vec3(0.0), 0.0);
     AreaLight light = area_light_at(nearest_ix);
-    float density;
-    if (light.kind == AREA_RECTANGLE) density = rectangle_density(light, origin, direction, nearest);
-    else if (light.kind == AREA_DISK) density = flat_density(light, direction, nearest);
-    else density = sphere_density(light, origin);
     float probability = light.probability;
-    if (LIGHT_TREE) probability *= tree_probability(origin, light.leaf_ix);
-    return SeenLight(nearest, light.radiance, probability * density);
+    if (has_emitters(EMITTER_TREE)) probability *= tree_probability(origin, light.leaf_ix);
+    return SeenLight(nearest, light.radiance, probability * shape_density(light, origin, direction, nearest));
 }
 
 // probability: with which this light is picked.
 LightPick pick_area_light(uint light_ix, vec3 point_world, vec2 u, float probability) {
     AreaLight light = area_light_at(light_ix);
     light.probability = probability;
-    if (light.kind == AREA_RECTANGLE) return pick_rectangle(light, point_world, u);
-    if (light.kind == AREA_DISK) return pick_disk(light, point_world, u);
-    return pick_sphere(light, point_world, u);
+    if (has_shapes(AREA_RECTANGLE) && light.kind == AREA_RECTANGLE) return pick_rectangle(light, point_world, u);
+    if (has_shapes(AREA_DISK) && light.kind == AREA_DISK) return pick_disk(light, point_world, u);
+    if (has_shapes(AREA_SPHERE)) return pick_sphere(light, point_world, u);
+    return no_pick();
 }
 
 #endif

@@ -12,6 +12,7 @@
 #include "emitters/alias.glsl"
 #include "emitters/area_light.glsl"
 #include "emitters/environment.glsl"
+#include "emitters/kinds.glsl"
 #include "emitters/pick.glsl"
 #include "emitters/punctual.glsl"
 #include "emitters/tree.glsl"
@@ -36,24 +37,24 @@ LightPick pick_light(vec3 point_world, vec3 u) {
     float more = fract(u.y * 4096.0);
     AliasPick picked = pick_alias(accel.emitters_begin, 5u, accel.n_emitters, u.x, more);
     Emitter emitter = emitter_at(picked.ix);
-    if (LIGHT_TREE && emitter.kind == EMITTER_TREE) {
+    if (has_emitters(EMITTER_TREE) && emitter.kind == EMITTER_TREE) {
         TreePick light = pick_in_tree(point_world, picked.rest, more);
         emitter = emitter_at(light.emitter_ix);
         emitter.probability *= light.probability;
     }
     LightPick pick = no_pick();
-    if (emitter.kind == EMITTER_LIGHT) {
+    if (has_emitters(EMITTER_LIGHT) && emitter.kind == EMITTER_LIGHT) {
         pick = pick_punctual(lights[emitter.ix], point_world, emitter.probability);
-    } else if (emitter.kind == EMITTER_AREA) {
+    } else if (has_emitters(EMITTER_AREA) && emitter.kind == EMITTER_AREA) {
         pick = pick_area_light(emitter.ix, point_world, u.yz, emitter.probability);
-    } else if (emitter.kind == EMITTER_SUN) {
+    } else if (has_emitters(EMITTER_SUN) && emitter.kind == EMITTER_SUN) {
         pick = pick_sun(emitter.ix, u.yz);
-    } else if (emitter.kind == EMITTER_TRIANGLE) {
+    } else if (has_emitters(EMITTER_TRIANGLE) && emitter.kind == EMITTER_TRIANGLE) {
         pick = pick_triangle(emitter.ix, point_world, u.yz, emitter.probability);
-    } else {
+    } else if (has_emitters(EMITTER_ENVIRONMENT)) {
         pick = pick_environment(u.yz);
     }
-    if (accel.n_area_lights == 0u) return pick;
+    if (!has_emitters(EMITTER_AREA)) return pick;
     SeenLight before = seen_light(point_world, pick.direction, LIGHT_HIDES_UP_TO * pick.distance);
     if (!isinf(before.t)) return no_pick();
     return pick;
@@ -62,6 +63,7 @@ LightPick pick_light(vec3 point_world, vec3 u) {
 // The density with which pick_light picks the point of a triangle that is seen from a point in a direction at a
 // distance, per steradian; 0 for a triangle that is never picked. direction: a unit vector.
 float emission_density(uint triangle_ix, vec3 point_world, vec3 direction, float distance) {
+    if (!has_emitters(EMITTER_TRIANGLE)) return 0.0;
     uint low = accel.first_triangle_emitter, end = low + accel.n_triangle_emitters;
     // The first entry whose triangle has this index or a larger one.
     uint high = end;
@@ -76,7 +78,7 @@ float emission_density(uint triangle_ix, vec3 point_world, vec3 direction, float
     if (low == end) return 0.0;
     Emitter emitter = emitter_at(low);
     if (emitter.ix != triangle_ix) return 0.0;
-    if (LIGHT_TREE) emitter.probability *= tree_probability(point_world, emitter.alias_ix);
+    if (has_emitters(EMITTER_TREE)) emitter.probability *= tree_probability(point_world, emitter.alias_ix);
     return emitter.probability * area_density(triangle_at(triangle_ix), direction, distance);
 }
 

@@ -13,12 +13,9 @@
 #include "layout.glsl"
 #include "texture_words.glsl"
 #include "emitters/alias.glsl"
+#include "emitters/kinds.glsl"
 #include "emitters/pick.glsl"
 #include "emitters/sun.glsl"
-
-bool has_environment_map() {
-    return accel.environment_begin != NO_WORDS;
-}
 
 // A texel: colour, and the density of its directions, per steradian.
 vec4 environment_texel(uint x, uint y) {
@@ -34,10 +31,10 @@ vec2 environment_place(vec3 direction) {
     return vec2(turns - floor(turns), atan(aside, direction.y) / EMITTER_PI);
 }
 
-// The map's colour in a direction, bilinear between the middles of texels.
-vec3 environment_map(vec3 direction) {
+// The map's colour at a place, bilinear between the middles of texels.
+vec3 map_colour(vec2 place) {
     uint width = accel.environment_width, height = accel.environment_height;
-    vec2 at = environment_place(direction) * vec2(width, height) - 0.5;
+    vec2 at = place * vec2(width, height) - 0.5;
     ivec2 low = ivec2(floor(at));
     vec2 weight = at - vec2(low);
     vec3 rows[2];
@@ -51,29 +48,36 @@ vec3 environment_map(vec3 direction) {
     return rows[0] + (rows[1] - rows[0]) * weight.y;
 }
 
-// The density of a direction if the environment without the suns is picked, per steradian.
-float map_density(vec3 direction) {
-    if (!has_environment_map()) return 1.0 / (4.0 * EMITTER_PI);
+// The density of the direction at a place if the environment without the suns is picked, per steradian.
+float map_density(vec2 place) {
     uint width = accel.environment_width, height = accel.environment_height;
-    vec2 at = environment_place(direction) * vec2(width, height);
+    vec2 at = place * vec2(width, height);
     return environment_texel(min(uint(at.x), width - 1u), min(uint(at.y), height - 1u)).w;
 }
 
-// The radiance that a ray in this direction sees beyond the scene.
-vec3 environment_radiance(vec3 direction) {
-    vec3 radiance = has_environment_map() ? environment_map(direction) : accel.background;
-    return radiance + seen_suns(direction).radiance;
+// What a ray that leaves the scene meets: the environment and its suns. density: with which pick_light picks the
+// direction because of them, per steradian.
+struct SeenEnvironment {
+    vec3 radiance;
+    float density;
+};
+
+// What a ray in this direction meets beyond the scene.
+SeenEnvironment seen_environment(vec3 direction) {
+    SeenEnvironment seen = SeenEnvironment(accel.background, 1.0 / (4.0 * EMITTER_PI));
+    if (HAS_ENVIRONMENT_MAP) {
+        vec2 place = environment_place(direction);
+        seen = SeenEnvironment(map_colour(place), map_density(place));
+    }
+    SeenSuns suns = seen_suns(direction);
+    float density = accel.environment_probability * seen.density + suns.density;
+    return SeenEnvironment(seen.radiance + suns.radiance, density);
 }
 
 // The radiance that surfaces get from a direction in addition: from the sky or from the ground. Neither the camera nor
 // mirrors see it.
 vec3 ambient_radiance(vec3 direction) {
     return direction[accel.up_axis] < 0.0 ? accel.ground_ambient : accel.ambient;
-}
-
-// The environment's and its suns' part of the density with which pick_light picks a direction, per steradian.
-float environment_density(vec3 direction) {
-    return accel.environment_probability * map_density(direction) + seen_suns(direction).density;
 }
 
 // A direction of the environment, and its density without the suns, per steradian.
@@ -112,23 +116,24 @@ MapPick pick_any_direction(vec2 u) {
     return MapPick(vec3(sine * sin(azimuth), up, -sine * cos(azimuth)), 1.0 / (4.0 * EMITTER_PI));
 }
 
-// The pick of a direction of the environment. density: of the environment without the suns.
-LightPick pick_beyond(vec3 direction, float density) {
-    SeenSuns suns = seen_suns(direction);
-    vec3 radiance = has_environment_map() ? environment_map(direction) : accel.background;
+// The pick of a direction beyond the scene.
+LightPick pick_beyond(vec3 direction, SeenEnvironment seen) {
     Towards way = Towards(direction, uintBitsToFloat(0x7f800000u));
-    float whole = accel.environment_probability * density + suns.density;
-    return pick_of_point(way, radiance + suns.radiance + ambient_radiance(direction), whole);
+    return pick_of_point(way, seen.radiance + ambient_radiance(direction), seen.density);
 }
 
 LightPick pick_environment(vec2 u) {
-    MapPick pick = has_environment_map() ? pick_map_direction(u) : pick_any_direction(u);
-    return pick_beyond(pick.direction, pick.density);
+    // The density is that of the texel that was picked. Rounding may move the direction to its neighbour.
+    MapPick pick = HAS_ENVIRONMENT_MAP ? pick_map_direction(u) : pick_any_direction(u);
+    vec3 radiance = HAS_ENVIRONMENT_MAP ? map_colour(environment_place(pick.direction)) : accel.background;
+    SeenSuns suns = seen_suns(pick.direction);
+    float density = accel.environment_probability * pick.density + suns.density;
+    return pick_beyond(pick.direction, SeenEnvironment(radiance + suns.radiance, density));
 }
 
 LightPick pick_sun(uint sun_ix, vec2 u) {
     vec3 direction = sun_direction(sun_ix, u);
-    return pick_beyond(direction, map_density(direction));
+    return pick_beyond(direction, seen_environment(direction));
 }
 
 #endif

@@ -5,6 +5,7 @@
 #define KDRAY_SUN
 
 #include "layout.glsl"
+#include "emitters/kinds.glsl"
 #include "emitters/pick.glsl"
 #include "emitters/area_light.glsl"
 
@@ -17,6 +18,7 @@ struct SeenSuns {
 
 SeenSuns seen_suns(vec3 direction) {
     SeenSuns seen = SeenSuns(vec3(0.0), 0.0);
+    if (!has_emitters(EMITTER_SUN)) return seen;
     for (uint i = 0u; i < accel.n_suns; ++i) {
         AreaLight sun = area_light_at(accel.n_area_lights + i);
         // The squared distance of two unit vectors is twice 1 - cos. It keeps small angles exact.

@@ -10,9 +10,6 @@
 #include "texture_words.glsl"
 #include "emitters/alias.glsl"
 
-// Whether the scene has a light tree.
-layout(constant_id = CONSTANT_LIGHT_TREE) const bool LIGHT_TREE = false;
-
 // The least squared distance from a light, square world units, which bounds what lights without a size send.
 const float LEAST_SQUARED = 1.0e-30;
 // The step of a random number from which on the digits of another one continue it.

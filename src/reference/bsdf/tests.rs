@@ -2,19 +2,29 @@
 
 use std::f32::consts::TAU;
 
-use glam::{Vec3, vec3};
+use glam::{Vec3, Vec3Swizzles, vec3};
 
 use super::{
     albedo::{ggx_albedo, mean_ggx_albedo, sheen_albedo},
+    bsdf_terms,
     conductor::conductor_reflectance,
     ggx::{ggx_root, ggx_visible_density, sample_ggx},
+    is_smooth,
     reflection::{evaluate_reflection, reflected_by},
+    sample::BsdfSample,
     sheen::{evaluate_sheen, sample_sheen},
-    *,
+    value_at,
 };
 use crate::{
-    layout::MATERIAL_MICROFACET,
-    reference::chi_square::{LARGEST_DEVIATION, Uniform, chi_square, probabilities},
+    layout::{
+        LEAST_INDEX_STEP, LEAST_SHEEN_ROUGHNESS, MATERIAL_MICROFACET, MATERIAL_SINGLE_SCATTERING, MATERIAL_SOLID,
+        MATERIAL_UNLIT, Material,
+    },
+    reference::{
+        chi_square::{LARGEST_DEVIATION, Uniform, chi_square, probabilities},
+        fresnel::{fresnel, refraction_cosine},
+        surface::Surface,
+    },
 };
 
 const VIEW_COSINES: [f32; 5] = [0.1, 0.3, 0.5, 0.8, 1.0];

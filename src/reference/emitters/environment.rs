@@ -26,10 +26,10 @@ fn environment_place(map: &EnvironmentMap, direction: Vec3) -> Vec2 {
     Vec2::new(turns - turns.floor(), aside.atan2(direction.y) / PI)
 }
 
-/// The map's colour in a direction, bilinear between the middles of texels.
-fn environment_map(map: &EnvironmentMap, direction: Vec3) -> Vec3 {
+/// The map's colour at a place, bilinear between the middles of texels.
+fn map_colour(map: &EnvironmentMap, place: Vec2) -> Vec3 {
     let [width, height] = map.size;
-    let at = environment_place(map, direction) * Vec2::new(width as f32, height as f32) - 0.5;
+    let at = place * Vec2::new(width as f32, height as f32) - 0.5;
     let low: IVec2 = at.floor().as_ivec2();
     let weight = at - low.as_vec2();
     let row = |i: i32| {
@@ -43,27 +43,39 @@ fn environment_map(map: &EnvironmentMap, direction: Vec3) -> Vec3 {
     upper + (row(1) - upper) * weight.y
 }
 
-/// The density of a direction if the environment without the suns is picked, per steradian.
-fn map_density(emitters: &Emitters, direction: Vec3) -> f32 {
-    let Some(map) = &emitters.environment else { return UNIFORM };
+/// The density of the direction at a place if the environment without the suns is picked, per steradian.
+fn map_density(map: &EnvironmentMap, place: Vec2) -> f32 {
     let [width, height] = map.size;
-    let at = environment_place(map, direction) * Vec2::new(width as f32, height as f32);
+    let at = place * Vec2::new(width as f32, height as f32);
     map.density((at.x as u32).min(width - 1), (at.y as u32).min(height - 1))
 }
 
-/// The map's colour in a direction, or the background.
-fn radiance_without_suns(emitters: &Emitters, direction: Vec3) -> Vec3 {
-    match &emitters.environment {
-        Some(map) => environment_map(map, direction),
-        None => emitters.background,
-    }
+/// What a ray that leaves the scene meets: the environment and its suns.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SeenEnvironment {
+    pub radiance: Vec3,
+    /// Density with which [`pick_light`](super::pick_light) picks the direction because of them, per steradian.
+    pub density: f32,
 }
 
-/// The radiance that a ray in this direction sees beyond the scene.
-pub fn environment_radiance(inputs: &KernelInputs, direction: Vec3) -> Vec3 {
-    inputs.emitters.map_or(Vec3::ZERO, |emitters| {
-        radiance_without_suns(emitters, direction) + seen_suns(emitters, direction).radiance
-    })
+/// What a ray in this direction meets beyond the scene.
+pub fn seen_environment(inputs: &KernelInputs, direction: Vec3) -> SeenEnvironment {
+    inputs.emitters.map_or_else(SeenEnvironment::default, |emitters| seen_beyond(emitters, direction))
+}
+
+fn seen_beyond(emitters: &Emitters, direction: Vec3) -> SeenEnvironment {
+    let (radiance, density) = match &emitters.environment {
+        Some(map) => {
+            let place = environment_place(map, direction);
+            (map_colour(map, place), map_density(map, place))
+        }
+        None => (emitters.background, UNIFORM),
+    };
+    let suns = seen_suns(emitters, direction);
+    SeenEnvironment {
+        radiance: radiance + suns.radiance,
+        density: emitters.environment_probability * density + suns.density,
+    }
 }
 
 /// The radiance that surfaces get from all directions in addition. Neither the camera nor mirrors see it.
@@ -73,14 +85,6 @@ pub fn ambient_radiance(inputs: &KernelInputs, direction: Vec3) -> Vec3 {
 
 fn ambient_from(emitters: &Emitters, direction: Vec3) -> Vec3 {
     if direction[emitters.up_axis] < 0.0 { emitters.ground_ambient } else { emitters.ambient }
-}
-
-/// The environment's and its suns' part of the density with which [`pick_light`](super::pick_light) picks a direction,
-/// per steradian.
-pub fn environment_density(inputs: &KernelInputs, direction: Vec3) -> f32 {
-    inputs.emitters.map_or(0.0, |emitters| {
-        emitters.environment_probability * map_density(emitters, direction) + seen_suns(emitters, direction).density
-    })
 }
 
 /// A direction of the map, and its density.
@@ -104,32 +108,35 @@ fn pick_map_direction(map: &EnvironmentMap, u: Vec2) -> (Vec3, f32) {
     (Vec3::new(sine * azimuth.sin(), up, -sine * azimuth.cos()), map.density(column.ix, row.ix))
 }
 
-/// A direction that is uniform on the sphere, and its density.
-fn pick_any_direction(u: Vec2) -> (Vec3, f32) {
+/// A direction that is uniform on the sphere.
+fn pick_any_direction(u: Vec2) -> Vec3 {
     let up = 1.0 - 2.0 * u.x;
     let sine = 2.0 * (u.x * (1.0 - u.x)).max(0.0).sqrt();
     let azimuth = TAU * u.y;
-    (Vec3::new(sine * azimuth.sin(), up, -sine * azimuth.cos()), UNIFORM)
+    Vec3::new(sine * azimuth.sin(), up, -sine * azimuth.cos())
 }
 
-/// The pick of a direction of the environment. `density`: of the environment without the suns.
-fn pick_beyond(emitters: &Emitters, direction: Vec3, density: f32) -> LightPick {
-    let suns = seen_suns(emitters, direction);
-    let radiance = radiance_without_suns(emitters, direction);
+/// The pick of a direction beyond the scene.
+fn pick_beyond(emitters: &Emitters, direction: Vec3, seen: SeenEnvironment) -> LightPick {
     let way = Towards { direction, distance: f32::INFINITY };
-    let whole = emitters.environment_probability * density + suns.density;
-    pick_of_point(way, radiance + suns.radiance + ambient_from(emitters, direction), whole)
+    pick_of_point(way, seen.radiance + ambient_from(emitters, direction), seen.density)
 }
 
 pub(super) fn pick_environment(emitters: &Emitters, u: Vec2) -> LightPick {
-    let (direction, density) = match &emitters.environment {
-        Some(map) => pick_map_direction(map, u),
-        None => pick_any_direction(u),
+    let (direction, radiance, density) = match &emitters.environment {
+        Some(map) => {
+            // The density is that of the texel that was picked. Rounding may move the direction to its neighbour.
+            let (direction, density) = pick_map_direction(map, u);
+            (direction, map_colour(map, environment_place(map, direction)), density)
+        }
+        None => (pick_any_direction(u), emitters.background, UNIFORM),
     };
-    pick_beyond(emitters, direction, density)
+    let suns = seen_suns(emitters, direction);
+    let density = emitters.environment_probability * density + suns.density;
+    pick_beyond(emitters, direction, SeenEnvironment { radiance: radiance + suns.radiance, density })
 }
 
 pub(super) fn pick_sun(emitters: &Emitters, sun: &AreaLight, u: Vec2) -> LightPick {
     let direction = sun_direction(sun, u);
-    pick_beyond(emitters, direction, map_density(emitters, direction))
+    pick_beyond(emitters, direction, seen_beyond(emitters, direction))
 }

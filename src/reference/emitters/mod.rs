@@ -28,7 +28,7 @@ use self::{
 };
 pub use self::{
     area_light::{SeenLight, seen_light},
-    environment::{ambient_radiance, environment_density, environment_radiance},
+    environment::{ambient_radiance, seen_environment},
     pick::LightPick,
     triangle::emission_at,
 };

@@ -4,10 +4,7 @@ use std::{f32::consts::PI, path::Path};
 
 use glam::{DVec3, Vec3, vec3};
 
-use super::{
-    LightPick, ambient_radiance, emission_at, emission_density, environment_density, environment_radiance, pick_light,
-    seen_light,
-};
+use super::{LightPick, ambient_radiance, emission_at, emission_density, pick_light, seen_environment, seen_light};
 use crate::{
     accel::kdtree::BuildOptions,
     frame::RenderOptions,
@@ -237,7 +234,7 @@ fn picks_have_the_stated_density() {
             };
             let density = |direction| {
                 let seen = seen_light(&inputs, point, direction, f32::INFINITY).density;
-                seen + environment_density(&inputs, direction)
+                seen + seen_environment(&inputs, direction).density
             };
             // Lights have sharp edges, which many points in a cell resolve.
             let found = chi_square((30_000, 100), &mut sample, &density);
@@ -270,10 +267,10 @@ fn densities_of_environments_are_whole() {
     ] {
         let frame = frame(&world);
         let inputs = inputs_of(&world, &frame);
-        assert_near(over_sphere(|direction| environment_density(&inputs, direction)), 1.0, 5e-3);
+        assert_near(over_sphere(|direction| seen_environment(&inputs, direction).density), 1.0, 5e-3);
         // Picks find all the light that there is.
         let found = irradiance(&inputs, Vec3::ZERO, Vec3::Y).x;
-        let expected = over_sphere(|it| environment_radiance(&inputs, it).x * it.y.max(0.0));
+        let expected = over_sphere(|it| seen_environment(&inputs, it).radiance.x * it.y.max(0.0));
         assert_near(found, expected, 2e-2);
     }
 }
@@ -304,7 +301,7 @@ fn picks_have_the_density_of_what_is_seen() {
         }
         let density = if pick.distance.is_infinite() {
             n_beyond += 1;
-            environment_density(&inputs, pick.direction)
+            seen_environment(&inputs, pick.direction).density
         } else if (seen.t - pick.distance).abs() < 1e-3 * pick.distance {
             n_shapes += 1;
             seen.density
@@ -350,15 +347,15 @@ fn the_map_is_where_it_is_documented() {
         let world = world_with(Vec::new(), |scene| scene.environment = Some(made));
         let frame = frame(&world);
         let inputs = inputs_of(&world, &frame);
-        assert_near(environment_radiance(&inputs, expected).x, 1.0, 1e-3);
-        assert_eq!(environment_radiance(&inputs, -expected), Vec3::ZERO);
+        assert_near(seen_environment(&inputs, expected).radiance.x, 1.0, 1e-3);
+        assert_eq!(seen_environment(&inputs, -expected).radiance, Vec3::ZERO);
     }
     let mut colours = vec![Vec3::ZERO; 64 * 32];
     colours[..64].fill(Vec3::ONE);
     let (made, _) = Environment::new([64, 32], colours, (0.0, 1.0)).unwrap();
     let world = world_with(Vec::new(), |scene| scene.environment = Some(made));
     let frame = frame(&world);
-    assert_eq!(environment_radiance(&inputs_of(&world, &frame), Vec3::Y), Vec3::ONE);
+    assert_eq!(seen_environment(&inputs_of(&world, &frame), Vec3::Y).radiance, Vec3::ONE);
 }
 
 /// A sky is seen where its sun is stated, with the radiance of its formula, and the sun's disk before it.
@@ -374,7 +371,7 @@ fn skies_are_seen_as_their_formula_tells() {
         // Directions that are at least a texel above the horizon.
         let directions = numbers(2000).map(|u| (2.0 * u - 1.0).normalize_or(zenith)).filter(|d| d.dot(zenith) > 0.02);
         for direction in directions.filter(|d| d.distance(sky.towards_sun) > 0.05) {
-            let (seen, expected) = (environment_radiance(&inputs, direction), sky.radiance(direction));
+            let (seen, expected) = (seen_environment(&inputs, direction).radiance, sky.radiance(direction));
             assert!((seen / expected - 1.0).abs().max_element() < 0.01, "{up} {direction}: {seen} {expected}");
         }
         let Light::Sun { towards, irradiance, angle_degrees } = sky.sun() else { panic!("{:?}", sky.sun()) };
@@ -382,12 +379,12 @@ fn skies_are_seen_as_their_formula_tells() {
         let beside =
             |degrees: f32| (towards + towards.any_orthonormal_vector() * degrees.to_radians().tan()).normalize();
         // The cosine of a quarter of a degree has three digits of 1 - cos in single precision.
-        assert_near(environment_radiance(&inputs, towards).x, disk, 1e-2);
-        assert_near(environment_radiance(&inputs, beside(0.26)).x, disk, 1e-2);
-        assert!(environment_radiance(&inputs, beside(0.27)).x < 10.0);
+        assert_near(seen_environment(&inputs, towards).radiance.x, disk, 1e-2);
+        assert_near(seen_environment(&inputs, beside(0.26)).radiance.x, disk, 1e-2);
+        assert!(seen_environment(&inputs, beside(0.27)).radiance.x < 10.0);
         let hidden = Scene { sky: Some(Sky { has_sun: false, ..sky }), ..scene };
         let world = World::of_flat(FlatScene::new(&hidden).unwrap(), &BuildOptions::default()).unwrap();
-        assert!(environment_radiance(&inputs_of(&world, &frame), towards).x < 10.0);
+        assert!(seen_environment(&inputs_of(&world, &frame), towards).radiance.x < 10.0);
         assert_eq!((world.emitters().suns().len(), world.scene().lights.len()), (0, 0));
     }
 }

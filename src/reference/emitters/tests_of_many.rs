@@ -5,7 +5,7 @@ use std::f32::consts::PI;
 use glam::{Vec3, vec3};
 
 use super::{
-    LightPick, emission_density, environment_density, pick_light, seen_light,
+    LightPick, emission_density, pick_light, seen_environment, seen_light,
     tests::{assert_near, emitting_square, frame, inputs_of, irradiance, map, numbers, sun, world, world_with},
 };
 use crate::{
@@ -83,7 +83,7 @@ fn density_of_seen(world: &World, point: Vec3, pick: &LightPick) -> f32 {
     let frame = frame(world);
     let inputs = inputs_of(world, &frame);
     if pick.distance.is_infinite() {
-        return environment_density(&inputs, pick.direction);
+        return seen_environment(&inputs, pick.direction).density;
     }
     let seen = seen_light(&inputs, point, pick.direction, f32::INFINITY);
     if (seen.t - pick.distance).abs() < 1e-3 * pick.distance {

@@ -1,0 +1,125 @@
+//! The sum of a surface's lobes for two directions, and the density with which
+//! [`sample_bsdf`](super::sample::sample_bsdf) samples the one towards the light. Twin of `bsdf/evaluate.glsl`.
+
+use glam::{Vec3, Vec3Swizzles, Vec4};
+
+use super::{
+    albedo::ggx_albedo,
+    clearcoat::clearcoat_fresnel,
+    lambert::{evaluate_lambert, lambert_density},
+    lobes::{has_clearcoat, has_sheen},
+    local_frame::to_local,
+    reflection::{evaluate_reflection, reflection_density},
+    sheen::{evaluate_sheen, sheen_density},
+    terms::{BsdfTerms, NO_ALBEDO, dielectric_albedo, passes_straight, reflected_choice, split_at},
+    transmission::{evaluate_refraction, refracting_normal, refraction_density, refracts_between},
+};
+use crate::reference::surface::Surface;
+
+/// The scattered share of light times the cosine, and the density of its direction.
+#[derive(Clone, Copy, Debug)]
+pub struct BsdfValue {
+    pub value: Vec3,
+    pub density: f32,
+}
+
+/// Adds the interface's reflection.
+fn add_reflection(terms: &BsdfTerms, to_light: Vec3, half_vector: Vec3, sum: &mut BsdfValue) {
+    if terms.width == 0.0 || !terms.has_interface {
+        return;
+    }
+    let lobe = evaluate_reflection(terms.to_viewer, to_light, half_vector, terms.width);
+    let split = split_at(terms, terms.to_viewer.dot(half_vector));
+    sum.value += terms.base_share * split.reflected * lobe;
+    // Light that passes straight tells nothing of a microfacet, so the surface's normal decides.
+    let choice = if passes_straight(terms) { terms.straight_choice } else { reflected_choice(&split) };
+    sum.density += terms.choice.x * choice * reflection_density(terms.to_viewer, half_vector, terms.width);
+}
+
+/// Adds the reflection of the clear layer.
+fn add_clearcoat(terms: &BsdfTerms, to_light: Vec3, half_vector: Vec3, sum: &mut BsdfValue) {
+    if !has_clearcoat(&terms.material) || terms.coat_roughness == 0.0 {
+        return;
+    }
+    let width = terms.coat_roughness * terms.coat_roughness;
+    let lobe = evaluate_reflection(terms.to_viewer, to_light, half_vector, width);
+    sum.value += terms.material.clearcoat * clearcoat_fresnel(terms.to_viewer.dot(half_vector)) * lobe;
+    sum.density += terms.choice.z * reflection_density(terms.to_viewer, half_vector, width);
+}
+
+/// Adds the Lambertian lobe.
+fn add_lambert(terms: &BsdfTerms, to_light: Vec3, sum: &mut BsdfValue) {
+    let albedo = if terms.has_interface { ggx_albedo(to_light.z, terms.width.sqrt()) } else { NO_ALBEDO };
+    let left = (1.0 - dielectric_albedo(terms.dielectric, albedo)).max(0.0);
+    let reflectance = terms.below * left + terms.between * albedo.loss;
+    sum.value += terms.base_share * evaluate_lambert(reflectance, to_light);
+    sum.density += terms.choice.y * lambert_density(to_light);
+}
+
+/// Adds the sheen.
+fn add_sheen(terms: &BsdfTerms, to_light: Vec3, sum: &mut BsdfValue) {
+    if !has_sheen(&terms.material) {
+        return;
+    }
+    let lobe = evaluate_sheen(terms.to_viewer, to_light, terms.sheen_roughness) * terms.sheen_bound;
+    sum.value += terms.sheen_share * terms.material.sheen_colour * lobe;
+    sum.density += terms.choice.w * sheen_density(to_light);
+}
+
+/// Adds the light that passes through the interface.
+fn add_transmission(terms: &BsdfTerms, to_light: Vec3, sum: &mut BsdfValue) {
+    if terms.width == 0.0 || passes_straight(terms) {
+        return;
+    }
+    let (to_viewer, width, eta) = (terms.to_viewer, terms.width, terms.eta);
+    let mirrored = to_light.xy().extend(-to_light.z);
+    let half_vector = match terms.is_solid {
+        true => refracting_normal(to_viewer, to_light, eta),
+        false => (to_viewer + mirrored).normalize(),
+    };
+    if terms.is_solid && !refracts_between(to_viewer, to_light, half_vector) {
+        return;
+    }
+    let split = split_at(terms, to_viewer.dot(half_vector));
+    let (lobe, density) = match terms.is_solid {
+        true => (
+            evaluate_refraction(to_viewer, to_light, half_vector, width, eta),
+            refraction_density(to_viewer, to_light, half_vector, width, eta),
+        ),
+        false => (
+            evaluate_reflection(to_viewer, mirrored, half_vector, width),
+            reflection_density(to_viewer, half_vector, width),
+        ),
+    };
+    sum.value += terms.base_share * split.transmitted * lobe;
+    sum.density += terms.choice.x * (1.0 - reflected_choice(&split)) * density;
+}
+
+/// Returns the sum of all lobes but the delta lobes. `to_light`: in the frame of the surface.
+pub(super) fn value_of(terms: &BsdfTerms, to_light: Vec3) -> BsdfValue {
+    let mut sum = BsdfValue { value: Vec3::ZERO, density: 0.0 };
+    if to_light.z > 0.0 {
+        let half_vector = (terms.to_viewer + to_light).normalize();
+        add_reflection(terms, to_light, half_vector, &mut sum);
+        add_lambert(terms, to_light, &mut sum);
+        add_clearcoat(terms, to_light, half_vector, &mut sum);
+        add_sheen(terms, to_light, &mut sum);
+    } else if to_light.z < 0.0 {
+        add_transmission(terms, to_light, &mut sum);
+    }
+    sum
+}
+
+/// Whether a direction is on the same side of the triangle and of the surface's frame. `local`: in this frame.
+pub(super) fn is_consistent(surface: &Surface, direction: Vec3, local: Vec3) -> bool {
+    surface.geometric.dot(direction) * local.z > 0.0
+}
+
+/// Returns the sum of all lobes but the delta lobes, at a surface.
+pub fn value_at(terms: &BsdfTerms, surface: &Surface, to_light: Vec3) -> BsdfValue {
+    let local = to_local(&terms.frame, to_light);
+    if terms.choice == Vec4::ZERO || !is_consistent(surface, to_light, local) {
+        return BsdfValue { value: Vec3::ZERO, density: 0.0 };
+    }
+    value_of(terms, local)
+}
