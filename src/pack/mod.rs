@@ -18,7 +18,7 @@ use crate::{
     },
 };
 
-/// Endings of names of files that are compressed already.
+/// Endings of the names of files that are compressed already.
 const COMPRESSED: [&str; 9] = ["png", "jpg", "jpeg", "webp", "exr", "zip", "gz", "ktx2", "basis"];
 
 /// The message if the scene of the pack is not the scene that was packed.
@@ -178,8 +178,9 @@ fn write(file: &mut File, manifest: &Manifest, sources: &Sources) -> io::Result<
     // No option sets the time of a file, so it is the earliest one that ZIP knows, and equal files make equal packs.
     let options = |name: &str, n_bytes: u64| {
         let ending = name.rsplit_once('.').map(|(_, ending)| ending.to_ascii_lowercase()).unwrap_or_default();
-        let is_compressed = name == MANIFEST || COMPRESSED.contains(&ending.as_str());
-        let method = if is_compressed { CompressionMethod::Stored } else { CompressionMethod::Deflated };
+        // Scripts find the hash in the manifest without decompressing it.
+        let is_stored = name == MANIFEST || COMPRESSED.contains(&ending.as_str());
+        let method = if is_stored { CompressionMethod::Stored } else { CompressionMethod::Deflated };
         SimpleFileOptions::DEFAULT.compression_method(method).large_file(n_bytes > u64::from(u32::MAX) / 2)
     };
     archive.start_file(MANIFEST, options(MANIFEST, 0))?;
