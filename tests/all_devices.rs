@@ -32,6 +32,25 @@ fn film(path: &Path, devices: &str, more: &[&str]) -> (Vec<Vec<u8>>, String) {
     (frames, stdout(&printed) + &stderr(&printed))
 }
 
+/// The record of a picture that all devices have drawn together names each kind once.
+#[test]
+fn a_picture_of_all_devices_names_each_kind_once() {
+    let directory = TempDir::new().unwrap();
+    let devices = usable_devices();
+    let list: Vec<_> = devices.iter().chain(&devices).map(|it| it.index.to_string()).collect();
+    let common = ["render", &cornell(), "--size", "16x12", "-o", "a.exr", "--device", &list.join(",")];
+    succeed(directory.path(), &common);
+    let mut names: Vec<&str> = Vec::new();
+    devices.iter().for_each(|it| {
+        if !names.contains(&it.name.as_str()) {
+            names.push(&it.name)
+        }
+    });
+    let expected = format!(r#""device":"{}","#, names.join("; "));
+    let bytes = fs::read(directory.path().join("a.exr")).unwrap();
+    assert!(bytes.windows(expected.len()).any(|part| part == expected.as_bytes()), "{expected}");
+}
+
 /// Each frame has the bytes of the file that its device writes alone, with the name of this device. A note says so if
 /// the devices are of several kinds.
 #[test]
