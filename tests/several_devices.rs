@@ -303,7 +303,7 @@ fn frames_that_end_at_a_noise_count_once() {
     let (mut samples, goal) = (Samples::default(), NoiseGoal { noise: 0.1, most_samples: 32 });
     let camera = world.scene().camera;
     let draw = |renderer: &mut Renderer, _: u32, tell_sample: &dyn Fn()| {
-        let noisy = renderer.draw_until(&camera, goal, || tell_sample())?;
+        let noisy = renderer.draw_until(&camera, goal, tell_sample)?;
         Ok((renderer.n_bands(), noisy.picture))
     };
     let frames = film.draw(4, &mut &mut samples, draw, |_, drawn| Ok::<_, GpuError>(drawn)).unwrap();

@@ -165,8 +165,8 @@ impl Sources {
     }
 }
 
-/// Returns the absolute path without `.` and `..`. Links are not followed, because files name each other by the names of
-/// links, too.
+/// Returns the absolute path without `.` and `..`. Links are not followed, because files name each other by the names
+/// of links, too.
 fn absolute(path: &Path) -> Result<PathBuf, String> {
     let absolute = std::path::absolute(path).ok().and_then(|path| normalized(&path));
     absolute.ok_or_else(|| format!("`{}` has no absolute path", path.display()))

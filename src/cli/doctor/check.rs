@@ -21,8 +21,8 @@ const N_SAMPLES: u32 = 4;
 /// far smaller differences: a path has some hundred operations, each of which may be off by 2.5 units in the last place
 /// (Vulkan's precision of OpFDiv), that is by 3e-7.
 const TOLERANCE: f32 = 1e-3;
-/// One in this number of pixels may differ by more: where a ray passes an edge, rounding decides which side it hits, and
-/// so changes one of the four samples of the pixel.
+/// One in this number of pixels may differ by more: where a ray passes an edge, rounding decides which side it hits,
+/// and so changes one of the four samples of the pixel.
 const PIXELS_FOR_ONE_OUTLIER: usize = 20;
 /// Greatest relative difference of the means of all pixels. It finds errors in fewer pixels than may differ, such as a
 /// small black block.

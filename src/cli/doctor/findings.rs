@@ -180,8 +180,8 @@ impl SceneFindings {
         let structure = in_words(*structure_bytes);
         let of_pack = pack_hash.as_ref().map_or(String::new(), |hash| format!("\n  pack with hash {hash}"));
         format!(
-            ", {name}, {triangles} triangles, hash {hash}{of_pack}\n  loaded in {load_ms:.0} ms, structure of {structure} built \
-             in {build_ms:.0} ms, picture of {width}x{height} pixels"
+            ", {name}, {triangles} triangles, hash {hash}{of_pack}\n  loaded in {load_ms:.0} ms, \
+             structure of {structure} built in {build_ms:.0} ms, picture of {width}x{height} pixels"
         )
     }
 }

@@ -46,8 +46,8 @@ pub struct Common<'a> {
     pub n_drawn: u32,
     /// The samples that are drawn, if they are not all samples of the pictures.
     pub some_samples: Option<SampleRange>,
-    /// The record of the pictures. Its camera differs from picture to picture, and so does its device if each of several
-    /// draws whole frames.
+    /// The record of the pictures. Its camera differs from picture to picture, and so does its device if each of
+    /// several draws whole frames.
     pub record: Record,
 }
 

@@ -112,8 +112,8 @@ pub(super) fn scene_of(path: &Path, options: &LoadOptions) -> Result<Option<Pack
     Ok(Some(PackedScene { path: path.join(&pack.manifest.scene), pack, options }))
 }
 
-/// Returns the path of the file of the camera path that a pack has. `None` if it has none, or if `path` is not that of a
-/// pack.
+/// Returns the file of the camera path that a pack has, as a path into the pack. `None` if it has none, or if `path` is
+/// not that of a pack.
 ///
 /// # Errors
 /// The file is no pack, or it is damaged.
