@@ -75,6 +75,7 @@ def arguments():
 
 
 def connect(args):
+    """A client of the scheduler that the user names, or of one with workers of its own on this computer."""
     if args.scheduler_file:
         return Client(scheduler_file=str(args.scheduler_file))
     if args.scheduler:

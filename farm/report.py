@@ -18,6 +18,7 @@ Run = collections.namedtuple("Run", "begin end host code unit")
 
 
 def kind_of(unit):
+    """The first word of a unit: `frames` if it renders, `merge` if it joins parts."""
     return unit.split()[0]
 
 
@@ -34,6 +35,7 @@ def run_of(line):
 
 
 def report(lines):
+    """What the lines of units.tsv say, as main writes it to the file of --json."""
     lines = [line for line in lines if line.strip()]
     runs = [run for line in lines if (run := run_of(line))]
     good = collections.defaultdict(list)

@@ -28,6 +28,23 @@ fn no_file_breaks_a_reader() {
     }
 }
 
+/// A pack that was changed is read on behind its hashes, which no longer fit.
+#[test]
+fn changed_packs_are_read_on() {
+    let reader = Reader::new();
+    let pack = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus/pack/scene_stored.kdpack");
+    let pack = fs::read(pack).unwrap();
+    let check_changed = |old: &str, new: &str| {
+        let at = pack.windows(old.len()).position(|bytes| bytes == old.as_bytes()).unwrap();
+        reader.check(Format::Pack, &[&pack[..at], new.as_bytes(), &pack[at + old.len()..]].concat())
+    };
+    assert_eq!(check_changed("v -1 -1 0", "v -100 -1 0"), None);
+    let error_of = |old: &str, new: &str| check_changed(old, new).unwrap();
+    assert!(error_of("\"s.toml\"", "\"t.toml\"").contains("there is no file `t.toml`"));
+    assert!(error_of("\"parts/a.obj\"", "\"parts/../a.obj\"").contains("`parts/../a.obj` is no path below the pack"));
+    assert!(error_of("'parts/a.obj'", "'parts/b.obj'").contains("b.obj"));
+}
+
 #[test]
 fn an_error_that_names_its_file_is_accepted() {
     for line in ["/a/file.obj:3: vertex 4 is out of range", "/a/file.obj: has no triangles"] {

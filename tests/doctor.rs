@@ -70,6 +70,24 @@ fn a_scene_is_examined_on_each_processor() {
     assert_eq!(text.matches("\n  scene: ok, ").count(), 2, "{text}");
 }
 
+/// The report has the hash that `kdray pack` prints, of a pack and of a scene in it, and none of other scenes.
+#[test]
+fn a_pack_has_its_own_hash() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    let packed = kdray(path, &["pack", &cornell(), "-o", "c.kdpack"]).output().unwrap();
+    let hash = stdout(&packed).lines().find_map(|line| Some(line.strip_prefix("hash ")?.to_owned())).unwrap();
+    for scene in ["c.kdpack", "c.kdpack/cornell.toml"] {
+        let text = stdout(&doctor(path, &[scene], 0));
+        assert!(text.lines().any(|line| line == format!("  pack with hash {hash}")), "{text}");
+        let found = &json(&doctor(path, &[scene, "--json"], 0))["scene"]["found"];
+        assert_eq!(found["pack_hash"], *hash);
+        assert_ne!(found["hash"], *hash);
+    }
+    assert!(!stdout(&doctor(path, &[&cornell()], 0)).contains("pack with"));
+    assert_eq!(json(&doctor(path, &[&cornell(), "--json"], 0))["scene"]["found"]["pack_hash"], Value::Null);
+}
+
 #[test]
 fn a_wrong_scene_ends_with_3_and_names_the_file() {
     let directory = TempDir::new().unwrap();

@@ -6,14 +6,15 @@ use std::fs;
 
 use kdray::{
     engine::{Engine, NoiseGoal, NoisePicture, choices::Workload},
-    frame::{Crop, Denoise, Drawn, Goal, Integrator, Picture, RenderOptions},
+    frame::{Crop, Denoise, Drawn, Goal, Integrator, Picture, RenderOptions, Watcher},
+    gpu::DeviceOverrides,
     scene::Scene,
     world::World,
 };
 use support::{
     assert_silent,
     command::{cornell, fail, stdout, succeed},
-    device,
+    device, pretended,
 };
 use tempfile::TempDir;
 
@@ -96,6 +97,43 @@ fn tiles_have_the_bits_of_pictures_of_fixed_numbers_of_samples() {
     });
     assert!(found[1] == found[2], "several devices draw the same picture");
     devices.iter().for_each(|context| assert_silent(context));
+}
+
+/// The watcher is told of the picture as of one sample, whose share grows from band to band.
+#[test]
+fn the_progress_of_a_picture_in_bands_adds_up_to_one_sample() {
+    /// What a watcher is told: `None` is a sample of a band.
+    #[derive(Default)]
+    struct Told(Vec<Option<f32>>);
+    impl Watcher for &mut Told {
+        fn part(&mut self, share: f32) {
+            self.0.push(Some(share));
+        }
+
+        fn sample(&mut self) {
+            self.0.push(None);
+        }
+    }
+    let options = RenderOptions { width: 64, height: 96, max_depth: 2, ..options() };
+    let world = world(&options);
+    let device = pretended(DeviceOverrides { storage_range: Some(64 * 128 * 50), ..DeviceOverrides::default() });
+    let mut renderer = Engine::on_device(device).renderer(&world, &options).unwrap();
+    let (mut told, goal) = (Told::default(), NoiseGoal { noise: 1e-9, most_samples: 128 });
+    renderer.draw_until(&world.scene().camera, goal, &mut told).unwrap();
+    let n_bands = renderer.n_bands();
+    assert!(n_bands > 1, "{n_bands}");
+    let (mut n_done, mut shares) = (0, Vec::new());
+    for part in told.0 {
+        match part {
+            Some(share) => shares.push((n_done as f32 + share) / n_bands as f32),
+            None => n_done += 1,
+        }
+    }
+    assert_eq!(n_done, n_bands);
+    // The number of samples doubles, and no tile ever has little noise.
+    let expected = [0.125, 0.25, 0.5, 1.0];
+    assert!(shares.iter().zip(expected).all(|(share, of)| (share - of).abs() < 1e-3), "{shares:?}");
+    assert_eq!(shares.len(), expected.len());
 }
 
 /// If no tile ever has little noise, the picture is that of the most samples, with all of its layers.

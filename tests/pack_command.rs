@@ -11,7 +11,7 @@ use kdray::{
     pack::pack,
     scene::{LoadOptions, Scene},
 };
-use support::command::{fail, names, stdout, succeed};
+use support::command::{fail, names, stderr, stdout, succeed};
 use tempfile::TempDir;
 
 const SCENE: &str = "\
@@ -285,6 +285,29 @@ fn pictures_and_films_from_packs_have_the_same_bytes() {
     assert!(!same("f0.png", "f4.png"));
     let listed = names(path);
     assert!(!listed.iter().any(|name| name.starts_with(".kdray")), "{listed:?}");
+}
+
+/// A small pack can have a list of files that takes much memory. It is refused if there is less.
+#[test]
+fn a_vast_manifest_is_refused() {
+    use std::io::Write;
+    let directory = TempDir::new().unwrap();
+    let file = |ix: usize| format!(r#"{{"name":"{ix:x}","n_bytes":0,"blake3":""}},"#);
+    let files: String = (0..1_500_000).map(file).collect();
+    let manifest =
+        format!(r#"{{"hash":"","format":1,"version":"","scene":"0","files":[{}]}}"#, files.trim_end_matches(','));
+    let mut archive = zip::ZipWriter::new(fs::File::create(directory.path().join("vast.kdpack")).unwrap());
+    archive.start_file("kdpack.json", zip::write::SimpleFileOptions::DEFAULT).unwrap();
+    archive.write_all(manifest.as_bytes()).unwrap();
+    archive.finish().unwrap();
+    let output = std::process::Command::new("sh")
+        .args(["-c", "ulimit -v 300000; exec \"$0\" inspect vast.kdpack", env!("CARGO_BIN_EXE_kdray")])
+        .current_dir(directory.path())
+        .output()
+        .unwrap();
+    let error = stderr(&output);
+    assert_eq!(output.status.code(), Some(3), "{error}");
+    assert!(error.contains("vast.kdpack: reading the manifest of a pack needs some "), "{error}");
 }
 
 #[test]

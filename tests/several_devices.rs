@@ -13,7 +13,7 @@ use std::{
 
 use glam::Vec3;
 use kdray::{
-    engine::{Engine, FilmRenderer, Renderer, choices::Workload},
+    engine::{Engine, FilmRenderer, NoiseGoal, Renderer, choices::Workload},
     frame::{Denoise, Drawn, Goal, Integrator, Picture, RenderOptions, Watcher},
     gpu::{Context, DeviceOverrides, GpuError},
     scene::{Camera, Scene},
@@ -290,6 +290,25 @@ fn a_film_outlives_a_device() {
     contexts.iter().for_each(|context| context.fail_creations_after(Some(0)));
     assert!(draw_film(&mut film, &cameras, whole).frames.is_err(), "no device is left");
     contexts.iter().for_each(|context| context.fail_creations_after(None));
+}
+
+/// The watcher is told of each frame that ends at a noise once, also if the devices draw other pictures in bands.
+#[test]
+fn frames_that_end_at_a_noise_count_once() {
+    let options = RenderOptions { integrator: Integrator::Path, denoise: Denoise::Off, ..RenderOptions::default() };
+    let options = RenderOptions { width: 64, height: 96, max_depth: 1, ..options };
+    let world = world(&options);
+    let small = || pretended(DeviceOverrides { storage_range: Some(64 * 128 * 50), ..DeviceOverrides::default() });
+    let mut film = Engine::on_devices(vec![small(), small()]).film_renderer(&world, &options).unwrap();
+    let (mut samples, goal) = (Samples::default(), NoiseGoal { noise: 0.1, most_samples: 32 });
+    let camera = world.scene().camera;
+    let draw = |renderer: &mut Renderer, _: u32, tell_sample: &dyn Fn()| {
+        let noisy = renderer.draw_until(&camera, goal, tell_sample)?;
+        Ok((renderer.n_bands(), noisy.picture))
+    };
+    let frames = film.draw(4, &mut &mut samples, draw, |_, drawn| Ok::<_, GpuError>(drawn)).unwrap();
+    assert!(frames.iter().all(|frame| frame.0 > 1 && *frame == frames[0]), "all frames are drawn in bands, and equal");
+    assert_eq!(samples.n_samples, 4, "frames that the watcher is told of");
 }
 
 /// A frame that cannot be written ends the film: no device begins a further frame.

@@ -14,7 +14,7 @@ use crate::{
         Drawn, DrawnTiles, Goal, Integrator, NoiseTiles, Pacer, Picture, RangeSums, RenderOptions, SampleRange,
         TileSamples, Watcher,
     },
-    gpu::{Context, GivenImage, GpuError, TimelinePoint},
+    gpu::{Context, DeviceInfo, GivenImage, GpuError, TimelinePoint},
     render::BandedRenderer,
     scene::Camera,
     world::World,
@@ -50,6 +50,11 @@ impl Renderer {
             contexts => Backend::Group(Box::new(RendererGroup::new(contexts, world, options)?)),
         };
         Ok(Self { backend, options: options.clone() })
+    }
+
+    /// Returns what is known of the device. `None` for several devices and the CPU.
+    pub fn device(&self) -> Option<&DeviceInfo> {
+        if let Backend::Device(renderer) = &self.backend { Some(renderer.device()) } else { None }
     }
 
     /// Returns the number of bands: parts of the picture that are drawn one after the other.
@@ -104,8 +109,7 @@ impl Renderer {
     }
 
     /// Draws what a camera sees until the noise of each tile of the picture is low, or the tile has the most samples.
-    /// The watcher is notified by [`Watcher::part`] of the share of the work that is done, and of one sample at the
-    /// end.
+    /// The watcher is notified as if the whole picture were one sample, which [`Renderer::draw`] draws band by band.
     ///
     /// # Panics
     /// The options do not ask for paths, have a noise filter or another first sample than 0.
@@ -120,9 +124,10 @@ impl Renderer {
     ) -> Result<NoisePicture, GpuError> {
         let options = self.options.clone();
         self.set_camera(camera);
-        let progress = |share: f32| watcher.part(share);
+        let mut progress = BandProgress { n_bands: self.n_bands(), n_told: 0, watcher: &mut watcher };
         let n_devices = if let Backend::Group(group) = &self.backend { group.n_devices() } else { 1 };
-        let drawn = noise::draw_until(goal, &options, (&mut |tiles| self.draw_tiles(tiles), n_devices), progress);
+        let mut draw = |tiles: &[TileSamples]| self.draw_tiles(tiles);
+        let drawn = noise::draw_until(goal, &options, (&mut draw, n_devices), |share| progress.set(share));
         // Also after an error, what is drawn next are rectangles.
         match &mut self.backend {
             Backend::Device(renderer) => {
@@ -132,7 +137,7 @@ impl Renderer {
             Backend::Group(group) => group.leave_tiles()?,
             Backend::Cpu(renderer) => renderer.set_window(None, 0),
         }
-        watcher.sample();
+        progress.end();
         drawn
     }
 
@@ -195,6 +200,33 @@ impl Renderer {
             Backend::Group(group) => Ok(Cow::Borrowed(group.picture())),
             Backend::Cpu(renderer) => Ok(Cow::Owned(renderer.picture())),
         }
+    }
+}
+
+/// Tells a watcher of the progress of one sample of a picture, as if the picture were drawn band by band.
+struct BandProgress<'a, W> {
+    n_bands: u32,
+    /// Number of bands of which the watcher knows that they are done.
+    n_told: u32,
+    watcher: &'a mut W,
+}
+
+impl<W: Watcher> BandProgress<'_, W> {
+    /// Notes which share of the picture is done, 0 to 1. A share that is less than before tells the watcher of no band.
+    fn set(&mut self, share: f32) {
+        let n_done = share * self.n_bands as f32;
+        // The last band is done when the picture is.
+        self.tell_bands((n_done as u32).min(self.n_bands - 1));
+        self.watcher.part((n_done - self.n_told as f32).clamp(0.0, 1.0));
+    }
+
+    fn end(&mut self) {
+        self.tell_bands(self.n_bands);
+    }
+
+    fn tell_bands(&mut self, n_done: u32) {
+        (self.n_told..n_done).for_each(|_| self.watcher.sample());
+        self.n_told = self.n_told.max(n_done);
     }
 }
 

@@ -18,14 +18,14 @@ use crate::{
     },
 };
 
-/// Endings of files that do not become smaller.
+/// Endings of the names of files that are compressed already.
 const COMPRESSED: [&str; 9] = ["png", "jpg", "jpeg", "webp", "exr", "zip", "gz", "ktx2", "basis"];
 
-/// Why a pack that was written is refused.
+/// The message if the scene of the pack is not the scene that was packed.
 const OTHER_SCENE: &str = "is another scene when it is read from its pack: a file has changed meanwhile, or one is \
                            named in a way that only this computer knows";
 
-/// What a pack has.
+/// What is known of a pack that was made.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Packed {
     /// The hash of the pack: packs of the same files have the same hash.
@@ -55,7 +55,7 @@ pub enum PackError {
 }
 
 /// Writes a pack of a scene and, if it is given, of the path along which its camera moves. The pack is read again and
-/// has to give the same scene; otherwise nothing is written.
+/// has to give the same scene; otherwise no file is left.
 ///
 /// # Errors
 /// The scene cannot be loaded, or names files that do not exist; a file has a name that is not UTF-8; the pack cannot
@@ -74,18 +74,11 @@ pub fn pack(
     let original = Original { scene: Scene::load_with(scene_file, options)?, path, options };
     let mut files = source_files_with(scene_file, options);
     files.extend(path_file.map(Path::to_owned));
-    let missing: Vec<_> = files.iter().filter(|file| !file.is_file()).map(|file| file.display().to_string()).collect();
-    if !missing.is_empty() {
-        return Err(failed(format!("names files that do not exist: {}", missing.join(", "))));
-    }
     let sources = Sources::new(files).map_err(failed)?;
     let mut manifest = Manifest::new(sources.name(scene_file).map_err(failed)?);
     (manifest.scene_name, manifest.camera) = (options.scene.clone(), options.camera.clone());
     manifest.path = path_file.map(|path| sources.name(path)).transpose().map_err(failed)?;
-    for (name, path) in &sources.files {
-        let unread = |error: io::Error| PackError::Refused { path: path.clone(), message: error.to_string() };
-        manifest.files.push(described(name, path).map_err(unread)?);
-    }
+    manifest.files = sources.described()?;
     let write_as = |manifest: Manifest| {
         let manifest = manifest.sealed();
         let check = |written: &Path| original.check(written, &manifest).map_err(failed);
@@ -93,7 +86,7 @@ pub fn pack(
         Ok(manifest)
     };
     let written = match write_as(manifest.clone()) {
-        // Absolute names are found in the pack if it states the folder that they begin with.
+        // Perhaps files are named by absolute paths. They are found if the manifest states the folder of all files.
         Err(PackError::Refused { .. }) if options.allow_outside => {
             let folder = sources.folder.to_str().ok_or_else(|| failed("its folder's name is not UTF-8".to_owned()))?;
             write_as(Manifest { folder: Some(folder.to_owned()), ..manifest })
@@ -104,7 +97,7 @@ pub fn pack(
     Ok(Packed { hash, files: files.into_iter().map(|file| (file.name, file.n_bytes)).collect() })
 }
 
-/// What a pack has to give when it is read.
+/// What the pack has to give when it is read.
 struct Original<'a> {
     scene: Scene,
     path: Option<CameraPath>,
@@ -123,16 +116,22 @@ impl Original<'_> {
     }
 }
 
-/// The files of a pack.
+/// The files on disk that become the files of a pack.
 struct Sources {
-    /// The folder below which all of them are.
+    /// The absolute path of the innermost folder that all of them are below.
     folder: PathBuf,
-    /// Names in the pack and paths, sorted by name.
+    /// Names in the pack and paths on disk, sorted by name.
     files: Vec<(String, PathBuf)>,
 }
 
 impl Sources {
+    /// An error is a message for people.
     fn new(paths: Vec<PathBuf>) -> Result<Self, String> {
+        let missing: Vec<_> =
+            paths.iter().filter(|path| !path.is_file()).map(|path| path.display().to_string()).collect();
+        if !missing.is_empty() {
+            return Err(format!("names files that do not exist: {}", missing.join(", ")));
+        }
         let absolutes = paths.iter().map(|path| absolute(path)).collect::<Result<Vec<_>, _>>()?;
         let first = absolutes.first().ok_or("has no files")?;
         let holds_all = |folder: &&Path| absolutes.iter().all(|path| path.starts_with(folder) && path != folder);
@@ -146,36 +145,42 @@ impl Sources {
         Ok(sources)
     }
 
-    /// Returns the name in the pack of a file.
+    /// Returns the name that a file gets in the pack. An error is a message for people.
     fn name(&self, path: &Path) -> Result<String, String> {
         let absolute = absolute(path)?;
         let below = absolute.strip_prefix(&self.folder).ok();
         let name = below.and_then(name_of).filter(|name| name != MANIFEST);
         name.ok_or_else(|| format!("`{}` is a name that no file of a pack can have", path.display()))
     }
+
+    /// Returns the size and the hash of each file, as the manifest states them.
+    fn described(&self) -> Result<Vec<PackedFile>, PackError> {
+        let file = |(name, path): &(String, PathBuf)| {
+            let unread = |error: io::Error| PackError::Refused { path: path.clone(), message: error.to_string() };
+            let mut hasher = blake3::Hasher::new();
+            let n_bytes = File::open(path).and_then(|mut file| io::copy(&mut file, &mut hasher)).map_err(unread)?;
+            Ok(PackedFile { name: name.clone(), n_bytes, blake3: hasher.finalize().to_hex().to_string() })
+        };
+        self.files.iter().map(file).collect()
+    }
 }
 
-/// Returns the absolute path without `.` and `..`. Links are kept, because files name each other by them.
+/// Returns the absolute path without `.` and `..`. Links are not followed, because files name each other by the names
+/// of links, too.
 fn absolute(path: &Path) -> Result<PathBuf, String> {
     let absolute = std::path::absolute(path).ok().and_then(|path| normalized(&path));
     absolute.ok_or_else(|| format!("`{}` has no absolute path", path.display()))
 }
 
-/// Returns the manifest's entry of a file.
-fn described(name: &str, path: &Path) -> io::Result<PackedFile> {
-    let mut hasher = blake3::Hasher::new();
-    let n_bytes = io::copy(&mut File::open(path)?, &mut hasher)?;
-    Ok(PackedFile { name: name.to_owned(), n_bytes, blake3: hasher.finalize().to_hex().to_string() })
-}
-
-/// Writes the archive.
+/// Writes the ZIP archive of a pack.
 fn write(file: &mut File, manifest: &Manifest, sources: &Sources) -> io::Result<()> {
     let mut archive = ZipWriter::new(io::BufWriter::new(file));
-    // The time of all files is the format's earliest one, so that equal files make equal packs.
+    // No option sets the time of a file, so it is the earliest one that ZIP knows, and equal files make equal packs.
     let options = |name: &str, n_bytes: u64| {
         let ending = name.rsplit_once('.').map(|(_, ending)| ending.to_ascii_lowercase()).unwrap_or_default();
-        let is_compressed = name == MANIFEST || COMPRESSED.contains(&ending.as_str());
-        let method = if is_compressed { CompressionMethod::Stored } else { CompressionMethod::Deflated };
+        // Scripts find the hash in the manifest without decompressing it.
+        let is_stored = name == MANIFEST || COMPRESSED.contains(&ending.as_str());
+        let method = if is_stored { CompressionMethod::Stored } else { CompressionMethod::Deflated };
         SimpleFileOptions::DEFAULT.compression_method(method).large_file(n_bytes > u64::from(u32::MAX) / 2)
     };
     archive.start_file(MANIFEST, options(MANIFEST, 0))?;

@@ -12,7 +12,7 @@ use super::Renderer;
 use crate::{
     buffers::Pixels,
     frame::{Crop, Drawn, Goal, Integrator, Pacer, PathOptions, Picture, Profile, RenderOptions, Watcher},
-    gpu::{Context, GivenImage, GpuError, Limits, TimelinePoint},
+    gpu::{Context, DeviceInfo, GivenImage, GpuError, Limits, TimelinePoint},
     scene::Camera,
     world::World,
 };
@@ -51,6 +51,11 @@ impl BandedRenderer {
         };
         tracing::debug!(n_bands = bands.len(), "the picture's bands");
         Ok(Self { renderer, bands, joined: None, is_slow })
+    }
+
+    /// Returns what is known of the device.
+    pub fn device(&self) -> &DeviceInfo {
+        self.renderer.context.info()
     }
 
     /// Number of bands of the picture.

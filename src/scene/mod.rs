@@ -66,7 +66,7 @@ pub use self::{
     look::{LightChoice, Look, SkyChoice, Up},
     material::{Alpha, Clearcoat, Conductor, Lobes, Maps, Material, Microfacet, Sheen},
     mesh::Mesh,
-    pack::{ENDING as PACK_ENDING, packed_path},
+    pack::{ENDING as PACK_ENDING, pack_hash, packed_path},
     path::CameraPath,
     preset::{MaterialChoice, Preset},
     sky::Sky,

@@ -122,7 +122,7 @@ impl<'a> Reach<'a> {
 
     /// Returns the path of an absolute name, if the folder is in a pack.
     fn absolute(self, name: &str) -> Option<PathBuf> {
-        pack::absolute(self.root, Path::new(name))
+        pack::of_absolute(self.root, Path::new(name))
     }
 
     /// Refuses a path that leads out of the folder by symbolic links.

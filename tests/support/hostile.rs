@@ -1,6 +1,9 @@
 //! Reads files of unknown content as the command does, and checks what a hostile one must not break. The fuzz targets
 //! (`fuzz/`) and `tests/corpus.rs` share it.
 
+#[path = "packs.rs"]
+mod packs;
+
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -12,8 +15,9 @@ use kdray::{
     engine::{Engine, choices::Workload},
     frame::RenderOptions,
     merge::{MergeError, merge},
-    scene::{LoadOptions, Scene, source_files},
+    scene::{CameraPath, LoadOptions, Scene, pack_hash, packed_path, source_files},
 };
+use packs::PackFile;
 use tempfile::TempDir;
 use tracing::{
     Event, Metadata,
@@ -33,11 +37,12 @@ pub enum Format {
     Image,
     Npy,
     Part,
+    Pack,
 }
 
 impl Format {
     /// All formats with the folder of `tests/corpus` that has files of it.
-    pub const ALL: [(Self, &str); 9] = [
+    pub const ALL: [(Self, &str); 10] = [
         (Self::Obj, "obj"),
         (Self::Mtl, "mtl"),
         (Self::Toml, "toml"),
@@ -47,6 +52,7 @@ impl Format {
         (Self::Image, "image"),
         (Self::Npy, "npy"),
         (Self::Part, "part"),
+        (Self::Pack, "pack"),
     ];
 
     /// Returns the name under which a file of the format is read. The content says which format an image has, but
@@ -62,6 +68,7 @@ impl Format {
             Self::Image => "file.tga",
             Self::Npy => "file.npy",
             Self::Part => "file.exr",
+            Self::Pack => "file.kdpack",
         }
     }
 
@@ -110,9 +117,24 @@ impl Reader {
     /// # Panics
     /// An error or a warning is not one line of printable text, or does not name the file.
     pub fn check(&self, format: Format, content: &[u8]) -> Option<String> {
-        if format == Format::Toml && asks_for_much(content) {
+        match format {
+            Format::Toml if asks_for_much(content) => None,
+            Format::Pack => self.check_pack(content),
+            _ => self.check_file(format, content),
+        }
+    }
+
+    /// Reads a pack. If it is refused, reads it again with the right hashes: otherwise no changed pack would be read
+    /// beyond its manifest.
+    fn check_pack(&self, content: &[u8]) -> Option<String> {
+        let files = packs::files_of(content);
+        if files.iter().filter_map(PackFile::content).any(|content| asks_for_much(&content)) {
             return None;
         }
+        self.check_file(Format::Pack, content).and_then(|_| self.check_file(Format::Pack, &packs::resealed(files)))
+    }
+
+    fn check_file(&self, format: Format, content: &[u8]) -> Option<String> {
         let path = self.write(format.file_name(), content);
         let scene = match format.user() {
             Some((name, content)) => self.write(name, content.as_bytes()),
@@ -121,6 +143,7 @@ impl Reader {
         let error = match format {
             Format::Npy => read_rays(&path).err(),
             Format::Part => merge_part(&path).err(),
+            Format::Pack => read_scene(&scene).and_then(|()| read_rest_of_pack(&path)).err(),
             _ => read_scene(&scene).err(),
         };
         if let Some(line) = &error {
@@ -136,11 +159,17 @@ impl Reader {
     }
 }
 
-/// Checks that an error begins with the name of a file, perhaps with a line, and then says what is wrong.
+/// Checks that an error begins with the name of a file, or of a file in a pack, perhaps with a line, and then says what
+/// is wrong.
 pub fn check_error(line: &str, files: &[&Path]) {
     check_line(line);
     assert!(line.chars().count() < 800, "too long: {line}");
-    let rest = files.iter().find_map(|file| line.strip_prefix(file.to_str()?)?.strip_prefix(':'));
+    let after_name = |file: &&Path| {
+        let rest = line.strip_prefix(file.to_str()?)?;
+        let in_pack = rest.strip_prefix('/').filter(|_| file.extension().is_some_and(|ending| ending == "kdpack"));
+        in_pack.and_then(|rest| Some(rest.split_once(':')?.1)).or_else(|| rest.strip_prefix(':'))
+    };
+    let rest = files.iter().find_map(after_name);
     let rest = rest.unwrap_or_else(|| panic!("the error names no file: {line}"));
     let what = rest.trim_start_matches(|c: char| c.is_ascii_digit() || c == ':');
     assert!(what.starts_with(' ') && what.len() > 5, "the error says nothing: {line}");
@@ -162,6 +191,13 @@ fn read_scene(path: &Path) -> Result<(), String> {
     let world = engine.build(scene, &workload).expect("a loaded scene has a tree").world;
     engine.render(&world, &options).expect("a loaded scene is rendered");
     Ok(())
+}
+
+/// Reads the hash of a pack, and its camera path, if it has one.
+fn read_rest_of_pack(pack: &Path) -> Result<(), String> {
+    assert!(pack_hash(pack).is_ok_and(|hash| hash.is_some()), "a pack with a scene has a hash");
+    let path = packed_path(pack).map_err(|error| error.to_string())?;
+    path.map_or(Ok(()), |path| CameraPath::load(&path).map(|_| ()).map_err(|error| error.to_string()))
 }
 
 /// Reads all rays of a file, in batches of different sizes.

@@ -1,5 +1,5 @@
-//! The check of a processor: it draws a small picture of a scene that is part of the program, which is compared with
-//! the CPU's picture.
+//! The check of a processor: it draws a small picture, the sample picture, of a scene that is part of the program. The
+//! picture is compared with the CPU's.
 
 use std::time::Instant;
 
@@ -17,15 +17,15 @@ use super::findings::Problem;
 /// The Cornell box. It names no other files.
 const SCENE: &str = include_str!("../../../scenes/cornell.toml");
 const N_SAMPLES: u32 = 4;
-/// Relative difference of two channels that counts as equal, where a channel below 1 counts as 1. Rounding alone makes
+/// Greatest difference of two channels that count as equal, relative to the largest of both and 1. Rounding alone makes
 /// far smaller differences: a path has some hundred operations, each of which may be off by 2.5 units in the last place
 /// (Vulkan's precision of OpFDiv), that is by 3e-7.
 const TOLERANCE: f32 = 1e-3;
-/// One of this number of pixels may differ by more: where a ray passes an edge, rounding decides which side it hits,
-/// and one of the four samples of the pixel is another one.
+/// One in this number of pixels may differ by more: where a ray passes an edge, rounding decides which side it hits,
+/// and so changes one of the four samples of the pixel.
 const PIXELS_FOR_ONE_OUTLIER: usize = 20;
-/// Greatest relative difference of the mean of all pixels. Errors in few pixels, such as a black block, exceed it even
-/// if the number of pixels that differ is allowed.
+/// Greatest relative difference of the means of all pixels. It finds errors in fewer pixels than may differ, such as a
+/// small black block.
 const MEAN_TOLERANCE: f32 = 1e-2;
 /// The mean of the CPU's picture, linear RGB.
 const CPU_MEAN: [f32; 3] = [0.311_784, 0.258_104, 0.176_616];
@@ -35,16 +35,18 @@ pub struct Sample {
     world: World,
     options: RenderOptions,
     expected: Result<Picture, GpuError>,
+    /// Time in which the CPU has drawn it.
     cpu_ms: f64,
 }
 
-/// The result of a check that was passed.
+/// What is known of a processor that has passed the check.
 #[derive(Clone, Debug, Serialize)]
 pub struct Passed {
     /// Time of drawing, with uploading and compiling.
     pub ms: f64,
     /// Number of pixels that differ from the CPU's by more than rounding.
     pub differing_pixels: usize,
+    /// Number of all pixels.
     pub pixels: usize,
 }
 
@@ -98,40 +100,51 @@ fn draw(engine: &Engine, world: &World, options: &RenderOptions) -> Result<Pictu
 /// # Errors
 /// The pictures differ by more than edges explain. The error says how.
 fn compare(expected: &Picture, found: &Picture) -> Result<usize, String> {
-    let n_pixels = expected.radiance.len();
-    if found.radiance.len() != n_pixels {
-        return Err(format!("it has {} pixels, not {n_pixels}", found.radiance.len()));
+    let (n_pixels, n_found) = (expected.radiance.len(), found.radiance.len());
+    if n_found != n_pixels {
+        return Err(format!("it has {n_found} pixels, not {n_pixels}"));
     }
     let n_invalid = found.radiance.iter().flatten().filter(|channel| !channel.is_finite()).count();
     if n_invalid > 0 {
         return Err(format!("{n_invalid} numbers in it are not finite"));
     }
     let is_near = |a: f32, b: f32| (a - b).abs() <= TOLERANCE * a.abs().max(b.abs()).max(1.0);
-    let differs = |(a, b): &(&[f32; 4], &[f32; 4])| !a.iter().zip(*b).all(|(a, b)| is_near(*a, *b));
-    let n_differing = expected.radiance.iter().zip(&found.radiance).filter(differs).count();
-    if n_differing > n_pixels / PIXELS_FOR_ONE_OUTLIER {
-        return Err(format!("{n_differing} of its {n_pixels} pixels differ from the CPU's"));
-    }
+    let n_differing = n_outliers("pixels", &expected.radiance, &found.radiance, is_near)?;
     let means = [mean(expected), mean(found)];
     if mean_differs(means[0], means[1]) {
         return Err(format!("its mean is {:?}, and that of the CPU's is {:?}", means[1], means[0]));
     }
-    // The displayed picture is encoded by a kernel of its own.
-    let is_near = |(a, b): (&[u8; 4], &[u8; 4])| a.iter().zip(b).all(|(a, b)| a.abs_diff(*b) <= 1);
-    let n_displayed = expected.display.iter().zip(&found.display).filter(|(a, b)| !is_near((a, b))).count();
-    if n_displayed > n_pixels / PIXELS_FOR_ONE_OUTLIER {
-        return Err(format!("{n_displayed} of its {n_pixels} displayed pixels differ from the CPU's"));
-    }
+    // Other code than that of the radiance encodes the displayed picture.
+    n_outliers("displayed pixels", &expected.display, &found.display, |a, b| a.abs_diff(b) <= 1)?;
     Ok(n_differing)
 }
 
+/// Returns the number of pixels with a channel that is not near the expected one.
+///
+/// # Errors
+/// More pixels differ than edges explain. The error calls them `noun`.
+fn n_outliers<C: Copy>(
+    noun: &str,
+    expected: &[[C; 4]],
+    found: &[[C; 4]],
+    is_near: impl Fn(C, C) -> bool,
+) -> Result<usize, String> {
+    let differs = |(a, b): &(&[C; 4], &[C; 4])| !a.iter().zip(*b).all(|(a, b)| is_near(*a, *b));
+    let (n, n_pixels) = (expected.iter().zip(found).filter(differs).count(), expected.len());
+    match n > n_pixels / PIXELS_FOR_ONE_OUTLIER {
+        true => Err(format!("{n} of its {n_pixels} {noun} differ from the CPU's")),
+        false => Ok(n),
+    }
+}
+
+/// Returns the mean of the red, green and blue channels.
 fn mean(picture: &Picture) -> [f32; 3] {
     let n_pixels = picture.radiance.len() as f64;
     let channel = |ix: usize| picture.radiance.iter().map(|pixel| f64::from(pixel[ix])).sum::<f64>() / n_pixels;
     [0, 1, 2].map(|ix| channel(ix) as f32)
 }
 
-/// Whether two means differ, or are not numbers.
+/// Returns whether two means differ, or one of them is not a number.
 fn mean_differs(expected: [f32; 3], found: [f32; 3]) -> bool {
     !expected.iter().zip(found).all(|(a, b)| (a - b).abs() <= MEAN_TOLERANCE * a.abs())
 }

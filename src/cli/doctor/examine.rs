@@ -1,4 +1,5 @@
-//! The examination of a scene on a processor.
+//! The examination of a scene on a processor: whether its picture fits into the memory, and whether a part of it is
+//! drawn.
 
 use std::time::Instant;
 
@@ -6,7 +7,7 @@ use kdray::{
     buffers::Pixels,
     engine::{Engine, choices::Workload},
     frame::{Crop, Goal, Integrator, RenderOptions},
-    gpu::GpuError,
+    gpu::{Context, GpuError},
     scene::Scene,
     world::World,
 };
@@ -15,19 +16,19 @@ use serde::Serialize;
 use super::findings::Problem;
 use crate::cli::render::check_memory;
 
-/// Size of the part of the picture that is drawn, pixels.
+/// Width and height of the part of the picture that is drawn, pixels.
 const CROP: u32 = 32;
-/// The most samples that are drawn of each pixel.
+/// Greatest number of samples of each pixel that are drawn.
 const MOST_SAMPLES: u32 = 4;
 
-/// A scene with the options that it states itself.
-pub struct SceneOnProcessor {
+/// The picture that a scene file asks for, with its own size, integrator and number of samples.
+pub struct ScenePicture {
     options: RenderOptions,
     n_samples: u32,
     workload: Workload,
 }
 
-/// What was found of a scene on a processor.
+/// What was found of the scene's picture on a processor.
 #[derive(Clone, Debug, Serialize)]
 pub struct Examined {
     /// Time of drawing a part of the picture, with uploading and compiling.
@@ -37,7 +38,7 @@ pub struct Examined {
     pub needed_bytes: Option<u64>,
 }
 
-impl SceneOnProcessor {
+impl ScenePicture {
     pub fn new(scene: &Scene) -> Self {
         let options = scene.defaults.options();
         let n_samples = scene.defaults.for_integrator(None).samples;
@@ -49,23 +50,20 @@ impl SceneOnProcessor {
         &self.options
     }
 
-    /// Returns the workload of the part of the picture.
     pub fn workload(&self) -> &Workload {
         &self.workload
     }
 
-    /// Allocates the memory of a whole picture, and draws a part of it.
+    /// Checks that a whole picture fits into the memory, and draws a part of it.
     pub fn examine(&self, engine: &Engine, world: &World) -> Result<Examined, Problem> {
         check_memory(&self.options, self.n_samples, engine.context().is_none(), 1)
             .map_err(|error| Problem::of_memory(&error.to_string()))?;
         let methods = engine.methods(world, &self.workload).map_err(|error| Problem::of_device(&error))?;
         let options = methods.apply(&self.options);
-        let needed_bytes = self.needed_bytes(engine, world, &options).map_err(|error| Problem::of_device(&error))?;
-        if let Some((needed, context)) = needed_bytes.zip(engine.context())
-            && needed > context.info().memory_bytes
-        {
-            return Err(Problem::of_device_memory(needed, context.info().memory_bytes));
-        }
+        let needed_bytes = match engine.context() {
+            Some(context) => Some(self.check_device_memory(engine, context, world, &options)?),
+            None => None,
+        };
         let begin = Instant::now();
         let radiance = self.draw_part(engine, world, &options).map_err(|error| Problem::of_device(&error))?;
         if radiance.iter().flatten().any(|channel| !channel.is_finite()) {
@@ -74,18 +72,25 @@ impl SceneOnProcessor {
         Ok(Examined { ms: begin.elapsed().as_secs_f64() * 1e3, needed_bytes })
     }
 
-    /// Returns the bytes that the scene and a whole picture take on the device, by allocating them.
-    fn needed_bytes(&self, engine: &Engine, world: &World, options: &RenderOptions) -> Result<Option<u64>, GpuError> {
-        let Some(context) = engine.context() else { return Ok(None) };
-        let _renderer = engine.renderer(world, options)?;
+    /// Allocates what the scene, its structure and a whole picture take on the device. Returns the number of bytes.
+    fn check_device_memory(
+        &self,
+        engine: &Engine,
+        context: &Context,
+        world: &World,
+        options: &RenderOptions,
+    ) -> Result<u64, Problem> {
+        let _renderer = engine.renderer(world, options).map_err(|error| Problem::of_device(&error))?;
         let allocated: u64 = context.memory().iter().map(|it| it.bytes).sum();
-        // The sums of samples are allocated with the second sample.
-        let of_pixel = match options.integrator {
+        // The sums of samples are allocated only when the second sample is drawn.
+        let bytes_of_sums = match options.integrator {
             Integrator::Path => Pixels::bytes_per_pixel_of_paths(self.n_samples),
             Integrator::Whitted if self.n_samples > 1 => size_of::<[f32; 4]>() as u64,
             Integrator::Whitted => 0,
         };
-        Ok(Some(allocated + of_pixel * u64::from(options.width) * u64::from(options.height)))
+        let needed = allocated + bytes_of_sums * u64::from(options.width) * u64::from(options.height);
+        let available = context.info().memory_bytes;
+        if needed > available { Err(Problem::of_device_memory(needed, available)) } else { Ok(needed) }
     }
 
     /// Draws the middle of the picture. Returns its radiance.

@@ -8,12 +8,12 @@ use serde::{Serialize, Serializer};
 
 use super::{check::Passed, examine::Examined, host::Host};
 
-/// All that was found.
+/// All that was found, in the order of the report.
 #[derive(Serialize)]
 pub struct Findings {
     #[serde(flatten)]
     pub host: Host,
-    /// Whether there are a Vulkan loader and a driver.
+    /// Whether there are a Vulkan loader, a driver and a device.
     pub vulkan: Verdict<()>,
     /// The Vulkan devices in the loader's order, then the CPU.
     pub processors: Vec<ProcessorFindings>,
@@ -38,6 +38,8 @@ pub struct SceneFindings {
     pub name: String,
     /// The hash that pictures of the scene state.
     pub hash: String,
+    /// The hash of the pack that the scene is in, which `kdray pack` prints. None if it is in no pack.
+    pub pack_hash: Option<String>,
     pub triangles: usize,
     /// Size of the acceleration structure.
     pub structure_bytes: u64,
@@ -51,7 +53,7 @@ pub struct SceneFindings {
 /// The result of a check.
 pub struct Verdict<T>(pub Result<T, Problem>);
 
-/// Something that is wrong, and what the user can do about it.
+/// Something that is wrong, and what the user can do about it. Both are parts of a line of the report.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
     pub what: String,
@@ -63,7 +65,7 @@ impl Problem {
         Self { what: what.into(), advice: advice.to_owned() }
     }
 
-    /// The scene cannot be loaded, or its structure cannot be built.
+    /// Returns the problem that a scene cannot be loaded, or its structure cannot be built.
     pub fn of_scene(what: &str) -> Self {
         Self::new(
             what,
@@ -71,20 +73,20 @@ impl Problem {
         )
     }
 
-    /// Vulkan cannot be used at all.
+    /// Returns the problem that Vulkan cannot be used at all.
     pub fn of_vulkan(error: &GpuError) -> Self {
         let advice = "install the Vulkan loader and the driver of the GPU, and see that VK_DRIVER_FILES, if it is set, \
                       names existing files; until then, render with --cpu";
         Self::new(error.to_string(), advice)
     }
 
-    /// A device lacks what kdray needs.
+    /// Returns the problem that a device lacks what kdray needs.
     pub fn of_lacking(device: &DeviceInfo) -> Self {
         let what = format!("it lacks {}", device.missing.join(", "));
         Self::new(what, "update its driver, or render on another device or with --cpu")
     }
 
-    /// A call has failed.
+    /// Returns the problem that a call has failed on a device.
     pub fn of_device(error: &GpuError) -> Self {
         match error.is_out_of_memory() {
             true => Self::of_memory(&error.to_string()),
@@ -92,24 +94,24 @@ impl Problem {
         }
     }
 
-    /// There is too little memory.
+    /// Returns the problem that there is too little memory.
     pub fn of_memory(what: &str) -> Self {
         Self::new(what, "render a smaller picture (--size) or parts of it (--tile), or end other programs")
     }
 
-    /// The scene and its picture do not fit into the device's memory.
+    /// Returns the problem that the scene and its picture do not fit into the memory of a device.
     pub fn of_device_memory(needed: u64, available: u64) -> Self {
         let what = format!("the scene and a picture need {}, and it has {}", in_words(needed), in_words(available));
         Self::of_memory(&what)
     }
 
-    /// A device draws a wrong picture.
+    /// Returns the problem that a device draws a wrong picture.
     pub fn of_wrong_picture(what: &str) -> Self {
         let advice = "do not use this device: update its driver and check it again";
         Self::new(format!("it draws a wrong picture: {what}"), advice)
     }
 
-    /// The CPU draws a wrong picture.
+    /// Returns the problem that the CPU draws a wrong picture.
     pub fn of_cpu(what: &str) -> Self {
         Self::new(format!("it draws a wrong picture: {what}"), "do not use this build of kdray, and report the fault")
     }
@@ -127,7 +129,7 @@ impl<T: Serialize> Serialize for Verdict<T> {
 }
 
 impl<T> Verdict<T> {
-    /// Returns a line: `ok` with what `found` makes of the result, or the problem with its advice.
+    /// Returns a line: the label, and either `ok` with what `found` says of the result, or the problem with the advice.
     fn line(&self, label: &str, found: impl FnOnce(&T) -> String) -> String {
         match &self.0 {
             Ok(result) => format!("{label}: ok{}\n", found(result)),
@@ -174,11 +176,12 @@ impl ProcessorFindings {
 
 impl SceneFindings {
     fn text(&self) -> String {
-        let Self { name, hash, triangles, structure_bytes, width, height, load_ms, build_ms } = self;
+        let Self { name, hash, pack_hash, triangles, structure_bytes, width, height, load_ms, build_ms } = self;
         let structure = in_words(*structure_bytes);
+        let of_pack = pack_hash.as_ref().map_or(String::new(), |hash| format!("\n  pack with hash {hash}"));
         format!(
-            ", {name}, {triangles} triangles, hash {hash}\n  loaded in {load_ms:.0} ms, structure of {structure} built \
-             in {build_ms:.0} ms, picture of {width}x{height} pixels"
+            ", {name}, {triangles} triangles, hash {hash}{of_pack}\n  loaded in {load_ms:.0} ms, \
+             structure of {structure} built in {build_ms:.0} ms, picture of {width}x{height} pixels"
         )
     }
 }
@@ -196,6 +199,7 @@ impl Findings {
         text + &format!("\n{}\n", self.summary())
     }
 
+    /// Returns the findings as JSON, as `--json` prints them.
     pub fn json(&self) -> String {
         let json = serde_json::to_string_pretty(self).expect("plain structs of numbers and words");
         format!("{json}\n")
@@ -206,12 +210,13 @@ impl Findings {
         self.processors.iter().any(ProcessorFindings::is_ok)
     }
 
-    /// Returns what cannot be done.
+    /// Returns what to say if no processor has passed its checks.
     pub fn refusal(&self) -> String {
         let what = if self.scene.is_some() { "this scene" } else { "here" };
         format!("neither a Vulkan device nor the CPU can render {what}; the report says why")
     }
 
+    /// Returns the verdict of all.
     fn summary(&self) -> String {
         let usable = |is_device: bool| {
             self.processors.iter().filter(move |it| it.device.is_some() == is_device && it.is_ok()).count()

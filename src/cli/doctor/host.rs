@@ -6,13 +6,14 @@ use serde::Serialize;
 /// What is known of the machine.
 #[derive(Serialize)]
 pub struct Host {
+    /// The version of kdray.
     pub kdray: &'static str,
-    /// Name and version of the operating system, and the kind of processor.
+    /// Name and version of the operating system, and the processor's instruction set.
     pub os: String,
     pub cpu_threads: usize,
-    /// Size of the memory, bytes; none if the system does not report it.
+    /// Size of the memory, bytes. None if the system does not report it.
     pub memory_bytes: Option<u64>,
-    /// Bytes that the process can still allocate.
+    /// Number of bytes that the process can still allocate. None if the system does not report it.
     pub available_bytes: Option<u64>,
 }
 

@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! host       the machine: operating system, threads, memory
-//! check      draws a small picture on a processor and compares it with the CPU's
-//! examine    draws a part of the user's scene on a processor, and finds the memory that a whole picture takes
+//! check      draws the sample picture on a processor and compares it with the CPU's
+//! examine    finds the memory that a picture of the user's scene takes on a processor, and draws a part of it
 //! findings   what was found, as text and as JSON
 //! ```
 //!
@@ -19,20 +19,27 @@ use std::path::Path;
 use kdray::{
     engine::{Built, Engine},
     gpu::{self, Context, ContextOptions, DeviceInfo, DeviceSelector, GpuError},
-    scene::{LoadOptions, Scene},
+    scene::{LoadOptions, Scene, pack_hash},
     util::progress::Work,
     world::World,
 };
 
 use self::{
     check::Sample,
-    examine::SceneOnProcessor,
+    examine::ScenePicture,
     findings::{Findings, Problem, ProcessorFindings, SceneFindings, Verdict},
     host::Host,
 };
-use super::{args::DoctorArgs, build, error::CliError, load_args::LoadArgs, print, print_raw, progress::Progress};
+use super::{
+    args::DoctorArgs,
+    build::{building, check_memory},
+    error::CliError,
+    load_args::LoadArgs,
+    print, print_raw,
+    progress::Progress,
+};
 
-/// Examines the machine and, if there is one, the scene. Prints what was found even if that is an error.
+/// Examines the machine and, if the user names one, a scene. Prints what was found even if that is an error.
 pub fn run(args: &DoctorArgs) -> Result<(), CliError> {
     let progress = Progress::new(false, 3);
     let devices = gpu::devices();
@@ -64,8 +71,9 @@ pub fn run(args: &DoctorArgs) -> Result<(), CliError> {
     }
 }
 
-/// A processor that was found. Its engine is none if it cannot be used.
+/// A processor that was found.
 struct Processor {
+    /// None if it cannot be used.
     engine: Option<Engine>,
     findings: ProcessorFindings,
 }
@@ -81,6 +89,7 @@ fn check_all(devices: &Result<Vec<DeviceInfo>, GpuError>) -> Vec<Processor> {
     processors
 }
 
+/// Opens a device, and checks it with the sample picture.
 fn check_device(sample: &Sample, device: &DeviceInfo) -> Processor {
     let opened = match device.missing.is_empty() {
         true => Context::new(&ContextOptions::new(Some(DeviceSelector::Index(device.index)), false))
@@ -101,41 +110,50 @@ fn check_device(sample: &Sample, device: &DeviceInfo) -> Processor {
 /// The scene cannot be loaded, or the system has too little memory for its structure.
 fn examine_scene(
     path: &Path,
-    load: &LoadArgs,
+    load_args: &LoadArgs,
     processors: &mut [Processor],
     progress: &Progress,
 ) -> Result<SceneFindings, CliError> {
-    let loading = format!("loading {}", path.display());
-    let observer = progress.observer(&loading, &[Work::Reading, Work::Images]);
-    let options = LoadOptions { progress: observer, ..load.options_of_pictures() };
-    let (scene, load_ms) = progress.stage(&loading, || Scene::load_with(path, &options));
-    let scene = scene?;
-    let on_processor = SceneOnProcessor::new(&scene);
-    let n_triangles = scene.n_triangles();
+    let (scene, load_ms) = load(path, load_args, progress)?;
+    let pack_hash = pack_hash(path)?;
+    let picture = ScenePicture::new(&scene);
+    // The first processor that has passed its check may build the structure.
     let engine = processors.iter().find(|it| it.findings.is_ok()).and_then(|it| it.engine.clone());
     let engine = engine.unwrap_or_else(Engine::on_cpu);
-    let accel = engine.choose_accel(n_triangles, on_processor.workload());
-    build::check_memory(accel, n_triangles)?;
-    let building = build::building(accel, n_triangles);
-    let (built, build_ms) = progress.stage(&building, || engine.build(scene, on_processor.workload()));
-    let Built { world, .. } = built.map_err(GpuError::from)?;
+    let (world, build_ms) = build(scene, &engine, &picture, progress)?;
     for processor in processors.iter_mut().filter(|it| it.findings.is_ok()) {
         let engine = processor.engine.as_ref().expect("a processor that has passed its check has an engine");
-        processor.findings.examine(on_processor.examine(engine, &world));
+        processor.findings.examine(picture.examine(engine, &world));
     }
-    Ok(findings_of(&world, &on_processor, [load_ms, build_ms]))
-}
-
-fn findings_of(world: &World, on_processor: &SceneOnProcessor, [load_ms, build_ms]: [f64; 2]) -> SceneFindings {
-    let scene = world.scene();
-    SceneFindings {
+    let (scene, options) = (world.scene(), picture.options());
+    Ok(SceneFindings {
         name: scene.name.clone(),
         hash: scene.hash(),
+        pack_hash,
         triangles: scene.triangles.len(),
         structure_bytes: world.statistics().bytes(),
-        width: on_processor.options().width,
-        height: on_processor.options().height,
+        width: options.width,
+        height: options.height,
         load_ms,
         build_ms,
-    }
+    })
+}
+
+/// Loads the scene. Returns it and the time in milliseconds.
+fn load(path: &Path, args: &LoadArgs, progress: &Progress) -> Result<(Scene, f64), CliError> {
+    let loading = format!("loading {}", path.display());
+    let observer = progress.observer(&loading, &[Work::Reading, Work::Images]);
+    let options = LoadOptions { progress: observer, ..args.options_of_pictures() };
+    let (scene, load_ms) = progress.stage(&loading, || Scene::load_with(path, &options));
+    Ok((scene?, load_ms))
+}
+
+/// Builds the structure of the scene. Returns the scene with its structure, and the time in milliseconds.
+fn build(scene: Scene, engine: &Engine, picture: &ScenePicture, progress: &Progress) -> Result<(World, f64), CliError> {
+    let n_triangles = scene.n_triangles();
+    let accel = engine.choose_accel(n_triangles, picture.workload());
+    check_memory(accel, n_triangles)?;
+    let (built, build_ms) = progress.stage(&building(accel, n_triangles), || engine.build(scene, picture.workload()));
+    let Built { world, .. } = built.map_err(GpuError::from)?;
+    Ok((world, build_ms))
 }

@@ -7,9 +7,9 @@ use std::{
 
 use kdray::{
     cpu,
-    engine::{Engine, NoiseGoal, Renderer},
+    engine::{Engine, NoiseGoal, NoisePicture, Renderer},
     frame::{Drawn, Goal, Picture, Profile, RangeSums, RenderOptions, SampleRange, SampleSums, Watcher},
-    gpu::GpuError,
+    gpu::{DeviceInfo, GpuError},
     output::{Layers, Record, WholeRecord},
     scene::Camera,
     world::World,
@@ -46,7 +46,8 @@ pub struct Common<'a> {
     pub n_drawn: u32,
     /// The samples that are drawn, if they are not all samples of the pictures.
     pub some_samples: Option<SampleRange>,
-    /// The record of the pictures. Only its camera differs from picture to picture.
+    /// The record of the pictures. Its camera differs from picture to picture, and so does its device if each of
+    /// several draws whole frames.
     pub record: Record,
 }
 
@@ -68,6 +69,8 @@ struct DrawnView {
     picture: Picture,
     drawn: Drawn,
     sums: RangeSums,
+    /// The device that has drawn the picture. None if several have drawn it together, or the CPU.
+    device: Option<DeviceInfo>,
     written: WrittenView,
 }
 
@@ -154,8 +157,8 @@ impl Common<'_> {
     /// Returns the counter of the samples of all bands of all views.
     fn steps<'a>(&self, (progress, message): (&'a Progress, &str), n_views: u32, n_bands: u32) -> StepProgress<'a> {
         let args = self.args;
-        // A picture that ends at a noise is a single step.
-        let (n_drawn, n_bands) = if self.noise_goal.is_some() { (1, 1) } else { (self.n_drawn, n_bands) };
+        // A picture that ends at a noise counts as one sample.
+        let n_drawn = if self.noise_goal.is_some() { 1 } else { self.n_drawn };
         let factors = [n_views, n_drawn, args.repeat.into(), n_bands];
         let mut steps = match self.goal {
             Goal::Samples(_) => progress.steps(message, factors.into_iter().fold(1, u32::saturating_mul)),
@@ -175,18 +178,19 @@ fn draw_view(
     view: &FrameJob,
     watcher: &mut dyn Watcher,
 ) -> Result<DrawnView, GpuError> {
-    let camera = common.camera_of(view);
+    let (camera, device) = (common.camera_of(view), renderer.device().cloned());
     if let Some(range) = common.some_samples {
         let (mut drawn, sums) = renderer.draw_range(&camera, range, Relay(watcher))?;
         let written = WrittenView { profiles: vec![take(&mut drawn.profile)], n_samples: common.n_drawn, noise: None };
-        return Ok(DrawnView { picture: part(common, &sums.picture), drawn, sums, written });
+        return Ok(DrawnView { picture: part(common, &sums.picture), drawn, sums, device, written });
     }
     if let Some(goal) = common.noise_goal {
         let mut noisy = renderer.draw_until(&camera, goal, Relay(watcher))?;
         let (profiles, noise) = (vec![take(&mut noisy.drawn.profile)], Some(NoiseReached::of(&noisy)));
         // Pictures of other crops have the same number, whatever their tiles have needed.
         let written = WrittenView { profiles, n_samples: common.n_drawn, noise };
-        return Ok(DrawnView { picture: noisy.picture, drawn: noisy.drawn, sums: RangeSums::default(), written });
+        let NoisePicture { picture, drawn, .. } = noisy;
+        return Ok(DrawnView { picture, drawn, sums: RangeSums::default(), device, written });
     }
     let (mut drawn, mut profiles) = (Drawn::default(), Vec::new());
     for _ in 0..common.args.repeat {
@@ -194,13 +198,17 @@ fn draw_view(
         profiles.push(take(&mut drawn.profile));
     }
     let written = WrittenView { profiles, n_samples: drawn.n_samples, noise: None };
-    Ok(DrawnView { picture: renderer.picture()?.into_owned(), drawn, sums: RangeSums::default(), written })
+    Ok(DrawnView { picture: renderer.picture()?.into_owned(), drawn, sums: RangeSums::default(), device, written })
 }
 
 /// Writes the files of a view.
 fn write_view(common: &Common, view: &FrameJob, of_view: DrawnView) -> Result<WrittenView, CliError> {
-    let DrawnView { picture, drawn, sums, written } = of_view;
-    let record = record_of(common, &common.camera_of(view), written.n_samples);
+    let DrawnView { picture, drawn, sums, device, written } = of_view;
+    let mut record = record_of(common, &common.camera_of(view), written.n_samples);
+    // Several devices that draw whole frames may be of several kinds.
+    if let Some(DeviceInfo { name, driver, .. }) = device {
+        (record.device, record.driver) = (name, driver);
+    }
     let (sums, light_sums) = sums.untold();
     let light = drawn.light.0.each_ref().map(Vec::as_slice);
     let (aovs, features) = (&common.args.aov[..], &drawn.features[..]);

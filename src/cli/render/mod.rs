@@ -153,8 +153,12 @@ fn record(
 ) -> Record {
     // Devices of one kind round alike, so they are named once.
     let of_devices = |of: fn(&DeviceInfo) -> &String| {
-        let mut words: Vec<&str> = engine.contexts().map(|context| of(context.info()).as_str()).collect();
-        words.dedup();
+        let mut words: Vec<&str> = Vec::new();
+        for word in engine.contexts().map(|context| of(context.info()).as_str()) {
+            if !words.contains(&word) {
+                words.push(word);
+            }
+        }
         words.join("; ")
     };
     Record {

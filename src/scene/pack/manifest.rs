@@ -1,50 +1,56 @@
-//! The manifest of a pack: its first file, which says what the others are.
+//! The manifest of a pack: its first file, which describes all others.
 
 use std::path::{Component, Path};
 
 use serde::{Deserialize, Serialize};
 
-use crate::scene::error::Checked;
+use crate::{scene::error::Checked, util::memory::require};
 
 /// The name of the manifest in the pack.
 pub const MANIFEST: &str = "kdpack.json";
 /// The number of the format. It changes when older packs can no longer be read.
 const FORMAT: u32 = 1;
 
-/// What a pack has.
+/// Memory that a manifest takes while it is read, in bytes per byte of its text: at most 7, if it has many files with
+/// short names.
+const BYTES_PER_TEXT_BYTE: u64 = 8;
+
+/// A manifest. The hash is that of the JSON text of all fields, in this order, with an empty `hash`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
-    /// The hash of all the rest, and so of the whole pack.
+    /// The first half of a BLAKE3 hash, hexadecimal. Since the hashes of all files are hashed, it tells packs apart.
     pub hash: String,
+    /// The number of the format of packs.
     pub format: u32,
     /// The version of kdray that has made the pack.
     pub version: String,
     /// The name of the scene's file in the pack.
     pub scene: String,
-    /// The scene of a glTF file that is loaded unless the user names another one.
+    /// The scene of a glTF file that is loaded unless the user names another one: its name or index.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub scene_name: Option<String>,
-    /// The camera that is taken unless the user names another one.
+    /// The camera that is taken unless the user names another one: its name or index.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub camera: Option<String>,
     /// The name of the camera path's file in the pack.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub path: Option<String>,
-    /// The absolute path of the folder whose files the pack has, if they name each other by absolute paths.
+    /// The absolute path that the folder of all files had where the pack was made. Stated only if the files name each
+    /// other by absolute paths.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub folder: Option<String>,
-    /// All files, by their names in the pack.
+    /// All files but the manifest, sorted by name.
     pub files: Vec<PackedFile>,
 }
 
-/// What is read first: the rest depends on the format.
+/// The part of a manifest that is read first, since the rest depends on the format.
 #[derive(Deserialize)]
 struct OfFormat {
     format: u32,
 }
 
-/// A file of a pack.
+/// What the manifest says of a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PackedFile {
@@ -56,7 +62,8 @@ pub struct PackedFile {
 }
 
 impl Manifest {
-    /// Returns the manifest of a scene's file alone. The hash is computed last, by [`Manifest::sealed`].
+    /// Returns the manifest of a scene's file, yet without files and without its hash, which [`Manifest::sealed`]
+    /// computes when all else is there.
     pub fn new(scene: String) -> Self {
         Self {
             hash: String::new(),
@@ -71,16 +78,14 @@ impl Manifest {
         }
     }
 
-    /// Returns the manifest with its hash.
-    pub fn sealed(self) -> Self {
-        Self { hash: self.own_hash(), ..self }
-    }
-
-    /// Returns the first half of the BLAKE3 hash of all but the hash, hexadecimal.
-    fn own_hash(&self) -> String {
-        let rest = Self { hash: String::new(), ..self.clone() };
-        let json = serde_json::to_vec(&rest).expect("plain values");
-        blake3::hash(&json).to_hex()[..32].to_owned()
+    /// Returns the manifest with the hash of the rest.
+    pub fn sealed(mut self) -> Self {
+        self.hash.clear();
+        // The text of a long list of files is hashed in pieces, since the whole of it would take much memory.
+        let mut hasher = blake3::Hasher::new();
+        serde_json::to_writer(&mut hasher, &self).expect("plain values");
+        self.hash = hasher.finalize().to_hex()[..32].to_owned();
+        self
     }
 
     /// Returns the text of the manifest's file.
@@ -88,7 +93,7 @@ impl Manifest {
         serde_json::to_vec_pretty(self).expect("plain values")
     }
 
-    /// Returns the manifest that a text states. An error is a message for people.
+    /// Parses and checks the text of the manifest's file. An error is a message for people.
     pub fn of_json(json: &[u8]) -> Checked<Self> {
         let damaged = |what: String| format!("is damaged: {MANIFEST}: {what}");
         let unread = |error: serde_json::Error| damaged(error.to_string());
@@ -96,8 +101,12 @@ impl Manifest {
         if format != FORMAT {
             return Err(format!("is a pack of format {format}, and this version of kdray reads format {FORMAT}"));
         }
-        let manifest: Self = serde_json::from_slice(json).map_err(unread)?;
-        if manifest.hash != manifest.own_hash() {
+        require("reading the manifest of a pack", BYTES_PER_TEXT_BYTE * json.len() as u64)
+            .map_err(|error| error.to_string())?;
+        let mut manifest: Self = serde_json::from_slice(json).map_err(unread)?;
+        let stated_hash = manifest.hash.clone();
+        manifest = manifest.sealed();
+        if manifest.hash != stated_hash {
             return Err(damaged("it does not have the hash that it states".to_owned()));
         }
         if let Some(file) = manifest.files.iter().find(|file| !is_below(&file.name)) {
@@ -115,7 +124,8 @@ impl Manifest {
     }
 }
 
-/// Whether a name is that of a file below a folder, spelled in the one way that the manifest has.
+/// Returns whether a file in a pack can have this name: a relative path without `.`, `..` and empty parts, which is not
+/// that of the manifest.
 fn is_below(name: &str) -> bool {
     let is_plain = |part: Component| matches!(part, Component::Normal(_));
     let has_plain_parts = name.split('/').all(|part| !matches!(part, "" | "." | ".."));

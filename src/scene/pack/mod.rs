@@ -1,35 +1,46 @@
 //! Packs: one file with everything that a scene is read from, so that nothing is left behind when it is moved to
 //! another computer.
 //!
-//! A pack is a ZIP archive. Its first file, the manifest, names the scene's file and says what each file has to be. A
-//! pack is used like a folder: `film.kdpack/parts/a.obj` is a file of the pack `film.kdpack`, and files of a pack name
-//! each other as they do on disk. Nothing that is in a pack can name a file on disk.
+//! A pack is a ZIP archive. Its first file, the manifest, names the scene's file, and states the size and the hash of
+//! each file. A pack is used like a folder: `film.kdpack/parts/a.obj` is a file of the pack `film.kdpack`, and files of
+//! a pack name each other as they do on disk. Nothing that is in a pack can name a file on disk.
+//!
+//! ```text
+//! names      names of packs, and of files in them
+//! manifest   the manifest as JSON, and what makes it valid
+//! archive    the ZIP archive, from which files are decompressed
+//! entry      files and folders in a pack, which are read and listed like those on disk
+//! ```
 
+mod archive;
+mod entry;
 mod manifest;
+mod names;
 
 use std::{
     collections::BTreeMap,
-    ffi::OsString,
     fs::File,
-    io::{self, Read},
-    ops::Bound,
-    path::{Component, Path, PathBuf},
+    io,
+    path::{Path, PathBuf},
     sync::{Arc, Mutex, OnceLock, PoisonError, Weak},
     time::SystemTime,
 };
 
-use flate2::read::DeflateDecoder;
-use zip::{CompressionMethod, ZipArchive};
-
-pub(crate) use self::manifest::{MANIFEST, Manifest, PackedFile};
+pub use self::names::ENDING;
+use self::{
+    archive::Archive,
+    entry::Entry,
+    names::{is_pack_name, split},
+};
+pub(crate) use self::{
+    manifest::{MANIFEST, Manifest, PackedFile},
+    names::{name_of, normalized, pack_of},
+};
 use super::{
     LoadOptions,
     error::{Checked, SceneError},
 };
-use crate::util::memory::require;
 
-/// The ending of a pack's name.
-pub const ENDING: &str = "kdpack";
 /// Size of the largest manifest, bytes: it describes half a million files.
 const MOST_MANIFEST_BYTES: u64 = 1 << 26;
 
@@ -39,46 +50,16 @@ pub(super) struct Pack {
     manifest: Manifest,
     /// Indices into the manifest's files, by their names.
     by_name: BTreeMap<String, usize>,
-    /// Why a file that the pack has could not be read, if there is one. Scenes are shown without images that cannot be
-    /// read, but not if a pack is damaged.
+    /// The first error of reading a file of the pack. A scene is shown without the images that cannot be read, but a
+    /// damaged pack is refused.
     failure: OnceLock<String>,
 }
 
-/// The ZIP archive of a pack.
-struct Archive {
-    path: PathBuf,
-    zip: Mutex<ZipArchive<File>>,
-}
-
-/// A file or a folder in a pack, which need not exist.
-pub(super) struct Entry {
-    pack: Arc<Pack>,
-    /// Its name in the pack; empty for the pack itself.
-    name: String,
-}
-
-/// The packs that are open now, with the size and the time of their files. A pack stays open as long as someone has it.
+/// The packs that are open now: a pack stays open as long as someone has it.
 static OPEN: Mutex<Vec<(PathBuf, Stamp, Weak<Pack>)>> = Mutex::new(Vec::new());
 
-/// Tells whether a file is the one that was opened.
+/// Size and time of a file. If a file has another stamp than when it was opened, it has been replaced.
 type Stamp = (u64, Option<SystemTime>);
-
-/// Returns whether a file's name is that of a pack.
-fn is_pack_name(path: &Path) -> bool {
-    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(ENDING))
-}
-
-/// Returns the pack in a path and the rest of the path, if a part of the path is a pack.
-fn split(path: &Path) -> Option<(&Path, &Path)> {
-    let ancestors: Vec<&Path> = path.ancestors().collect();
-    let pack = ancestors.into_iter().rev().find(|part| is_pack_name(part) && part.is_file())?;
-    Some((pack, path.strip_prefix(pack).expect("an ancestor")))
-}
-
-/// Returns the pack that a path leads into.
-pub(crate) fn pack_of(path: &Path) -> Option<&Path> {
-    split(path).map(|(pack, _)| pack)
-}
 
 /// Returns the entry of a pack that a path leads to, or `None` for a path that leads into no pack.
 pub(super) fn entry(path: &Path) -> Option<io::Result<Entry>> {
@@ -89,48 +70,24 @@ pub(super) fn entry(path: &Path) -> Option<io::Result<Entry>> {
     }))
 }
 
-/// Returns the path in the pack of `root` that stands for an absolute path of the computer on which it was packed.
-/// `None` if `root` is in no pack.
-pub(super) fn absolute(root: &Path, name: &Path) -> Option<PathBuf> {
-    let (pack, _) = split(root)?;
+/// Returns where a file is that another file of the pack names by its absolute path on the computer where the pack was
+/// made. `from`: a path into the pack. If the pack does not have the file, the result is a path at which there is none.
+/// `None` if `from` leads into no pack.
+pub(super) fn of_absolute(from: &Path, name: &Path) -> Option<PathBuf> {
+    let (pack, _) = split(from)?;
     let folder = Pack::open(pack).ok().and_then(|pack| pack.manifest.folder.clone());
     // Joined to the pack, an absolute path would lead out of it.
     let below = folder.and_then(|folder| name_of(normalized(name)?.strip_prefix(folder).ok()?));
-    // The manifest is no file of the pack, so it stands for a file that the pack does not have.
+    // No file of a pack has the name of the manifest.
     Some(pack.join(below.unwrap_or_else(|| MANIFEST.to_owned())))
 }
 
-/// Returns the path without `.` and `..`, or `None` if it leads above its beginning.
-pub(crate) fn normalized(path: &Path) -> Option<PathBuf> {
-    let mut plain = PathBuf::new();
-    for part in path.components() {
-        match part {
-            Component::CurDir => (),
-            Component::ParentDir => {
-                let ends_in_name = matches!(plain.components().next_back(), Some(Component::Normal(_)));
-                (ends_in_name && plain.pop()).then_some(())?;
-            }
-            part => plain.push(part),
-        }
-    }
-    Some(plain)
-}
-
-/// Returns a relative path as a name in a pack, or `None` if it leads out of the pack, is absolute or is not UTF-8.
-pub(crate) fn name_of(path: &Path) -> Option<String> {
-    let plain = normalized(path)?;
-    let part = |part| match part {
-        Component::Normal(name) => name.to_str(),
-        _ => None,
-    };
-    let parts: Option<Vec<&str>> = plain.components().map(part).collect();
-    Some(parts?.join("/"))
-}
-
-/// A scene in a pack, and what was said about it when it was packed.
+/// The scene of a pack.
 pub(super) struct PackedScene {
     pack: Arc<Pack>,
+    /// The path of the scene's file in the pack.
     pub path: PathBuf,
+    /// The options with which it is loaded.
     pub options: LoadOptions,
 }
 
@@ -140,8 +97,8 @@ pub(super) fn opened(path: &Path) -> Result<Option<Arc<Pack>>, SceneError> {
     opened.transpose()
 }
 
-/// Opens a pack. Returns its scene and the options of loading it, to which the user's options are added. `None` if the
-/// path is not that of a pack.
+/// Opens a pack and returns its scene. Where the user's options name no scene of the file and no camera, those apply
+/// that were named when the pack was made. `None` if the path is not that of a pack.
 pub(super) fn scene_of(path: &Path, options: &LoadOptions) -> Result<Option<PackedScene>, SceneError> {
     if !is_pack_name(path) || path.is_dir() {
         return Ok(None);
@@ -155,7 +112,8 @@ pub(super) fn scene_of(path: &Path, options: &LoadOptions) -> Result<Option<Pack
     Ok(Some(PackedScene { path: path.join(&pack.manifest.scene), pack, options }))
 }
 
-/// Returns the file of the camera path that a pack has.
+/// Returns the file of the camera path that a pack has, as a path into the pack. `None` if it has none, or if `path` is
+/// not that of a pack.
 ///
 /// # Errors
 /// The file is no pack, or it is damaged.
@@ -164,8 +122,17 @@ pub fn packed_path(path: &Path) -> Result<Option<PathBuf>, SceneError> {
     Ok(pack.manifest.path.as_ref().map(|name| path.join(name)))
 }
 
+/// Returns the hash of the pack that a path leads into: the one that `kdray pack` prints. `None` if the path leads into
+/// no pack.
+///
+/// # Errors
+/// The file is no pack, or it is damaged.
+pub fn pack_hash(path: &Path) -> Result<Option<String>, SceneError> {
+    Ok(opened(path)?.map(|pack| pack.manifest.hash.clone()))
+}
+
 impl Pack {
-    /// Opens a pack, unless it is open already. An error is a message for people.
+    /// Returns the pack at a path, which is opened unless it is open already. An error is a message for people.
     fn open(path: &Path) -> Checked<Arc<Self>> {
         let unread = |error: io::Error| format!("cannot be read: {error}");
         let metadata = path.metadata().map_err(unread)?;
@@ -184,145 +151,27 @@ impl Pack {
         Ok(pack)
     }
 
-    /// Reads the list of files and the manifest.
+    /// Reads the archive's list of files, and the manifest.
     fn read(path: PathBuf, file: File) -> Checked<Self> {
-        let zip = ZipArchive::new(file).map_err(|error| format!("is no pack: {error}"))?;
-        let archive = Archive { path, zip: Mutex::new(zip) };
+        let archive = Archive::new(path, file)?;
         let json = archive.content(MANIFEST, MOST_MANIFEST_BYTES).map_err(|error| format!("is no pack: {error}"))?;
         let manifest = Manifest::of_json(&json)?;
         let by_name = manifest.files.iter().enumerate().map(|(ix, file)| (file.name.clone(), ix)).collect();
         Ok(Self { archive, manifest, by_name, failure: OnceLock::new() })
     }
 
-    /// Returns an error if a file could not be read at any time since the pack was opened.
-    pub fn check(&self) -> Result<(), SceneError> {
-        self.failure.get().map_or(Ok(()), |what| Err(SceneError::file(&self.archive.path, what)))
-    }
-
+    /// Returns what the manifest says of a file, or `None` if the pack does not have the file.
     fn file(&self, name: &str) -> Option<&PackedFile> {
         self.by_name.get(name).map(|ix| &self.manifest.files[*ix])
     }
-}
 
-/// Returns the names of the files and folders in a folder, whose name ends with `/` unless it is the pack itself.
-fn names_in<'a>(folder: &str, files: &'a BTreeMap<String, usize>) -> Vec<&'a str> {
-    let (mut names, mut from) = (Vec::new(), folder.to_owned());
-    while let Some(below) = first_from(&from, files).and_then(|name| name.strip_prefix(folder)) {
-        // All files of a folder follow each other, since their names begin with the folder's and `/`. The first name
-        // that can follow them has `0` there, which is the next character.
-        let (name, end) = match below.split_once('/') {
-            Some((name, _)) => (name, '0'),
-            None => (below, '\0'),
-        };
-        names.push(name);
-        from = format!("{folder}{name}{end}");
-    }
-    names
-}
-
-/// Returns the first name, in alphabetical order, that is not before `from`.
-fn first_from<'a>(from: &str, files: &'a BTreeMap<String, usize>) -> Option<&'a str> {
-    files.range::<str, _>((Bound::Included(from), Bound::Unbounded)).next().map(|(name, _)| name.as_str())
-}
-
-impl Archive {
-    /// Returns the content of a file, which has at most `most` bytes.
-    fn content(&self, name: &str, most: u64) -> io::Result<Vec<u8>> {
-        let (method, packed) = {
-            // Others may decompress their files at the same time.
-            let mut zip = self.zip.lock().unwrap_or_else(PoisonError::into_inner);
-            let ix = zip.index_for_name(name).ok_or(io::ErrorKind::NotFound)?;
-            let mut file = zip.by_index_raw(ix)?;
-            // What a file states of its size may be wrong.
-            let n_bytes = self.path.metadata()?.len().min(file.compressed_size());
-            require("reading a pack", n_bytes).map_err(io::Error::other)?;
-            let mut packed = Vec::new();
-            file.read_to_end(&mut packed)?;
-            (file.compression(), packed)
-        };
-        let mut content = Vec::new();
-        match method {
-            CompressionMethod::Stored => content = packed,
-            CompressionMethod::Deflated => {
-                DeflateDecoder::new(&packed[..]).take(most.saturating_add(1)).read_to_end(&mut content)?;
-            }
-            method => return Err(io::Error::other(format!("files packed by {method} are not read"))),
-        }
-        if content.len() as u64 > most { Err(io::Error::other("it is larger than stated")) } else { Ok(content) }
-    }
-}
-
-impl Entry {
-    /// Reads the file, which has to be what the manifest says.
-    pub fn read(&self) -> io::Result<Vec<u8>> {
-        let file = self.pack.file(&self.name);
-        let file = file.ok_or_else(|| io::Error::new(io::ErrorKind::NotFound, "the pack does not have it"))?;
-        self.read_file(file).inspect_err(|error| {
-            let _ = self.pack.failure.set(format!("{}: {error}", file.name));
-        })
+    /// Notes that a file of the pack could not be read.
+    fn note_failure(&self, file: &PackedFile, error: &io::Error) {
+        let _ = self.failure.set(format!("{}: {error}", file.name));
     }
 
-    fn read_file(&self, file: &PackedFile) -> io::Result<Vec<u8>> {
-        require("reading a file of a pack", file.n_bytes).map_err(io::Error::other)?;
-        let content = self.pack.archive.content(&file.name, file.n_bytes)?;
-        let mut hasher = blake3::Hasher::new();
-        let hash = hasher.update_rayon(&content).finalize().to_hex();
-        if content.len() as u64 == file.n_bytes && hash.as_str() == file.blake3 {
-            Ok(content)
-        } else {
-            Err(io::Error::new(io::ErrorKind::InvalidData, "it is damaged: it is not what was packed"))
-        }
-    }
-
-    /// Returns the size of the file in bytes, or `None` if there is none.
-    pub fn n_bytes(&self) -> Option<u64> {
-        self.pack.file(&self.name).map(|file| file.n_bytes)
-    }
-
-    /// Whether it is a file, or a folder with files.
-    pub fn exists(&self) -> bool {
-        let folder = self.folder();
-        let has_files = || first_from(&folder, &self.pack.by_name).is_some_and(|name| name.starts_with(&folder));
-        self.n_bytes().is_some() || has_files()
-    }
-
-    /// Returns the absolute path.
-    pub fn canonical(&self) -> io::Result<PathBuf> {
-        let pack = self.pack.archive.path.canonicalize()?;
-        match self.exists() {
-            true => Ok(if self.name.is_empty() { pack } else { pack.join(&self.name) }),
-            false => Err(io::ErrorKind::NotFound.into()),
-        }
-    }
-
-    /// Returns the names of the files and folders in a folder.
-    pub fn names(&self) -> Vec<OsString> {
-        names_in(&self.folder(), &self.pack.by_name).into_iter().map(OsString::from).collect()
-    }
-
-    /// Returns how the names of everything in it begin, if it is a folder.
-    fn folder(&self) -> String {
-        if self.name.is_empty() { String::new() } else { format!("{}/", self.name) }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn folders_have_their_own_files_alone() {
-        let files = ["a", "a.obj", "a/b/c", "a/b/d", "a/b.png", "a/b0", "a0/e", "f/g"];
-        let files: BTreeMap<String, usize> = files.iter().map(|name| (name.to_string(), 0)).collect();
-        let names = |folder: &str| {
-            let mut names = names_in(folder, &files);
-            names.sort_unstable();
-            names
-        };
-        assert_eq!(names(""), ["a", "a", "a.obj", "a0", "f"], "a file and a folder may have one name");
-        assert_eq!(names("a/"), ["b", "b.png", "b0"]);
-        assert_eq!(names("a/b/"), ["c", "d"]);
-        assert_eq!(names("none/"), [""; 0]);
-        assert_eq!(names_in("", &BTreeMap::new()), [""; 0]);
+    /// Returns an error if a file could not be read at any time since the pack was opened.
+    pub fn check(&self) -> Result<(), SceneError> {
+        self.failure.get().map_or(Ok(()), |what| Err(SceneError::file(&self.archive.path, what)))
     }
 }
