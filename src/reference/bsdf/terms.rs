@@ -148,13 +148,13 @@ fn interface_albedo(terms: &BsdfTerms, albedo: GgxAlbedo) -> Vec3 {
 
 /// Sets the shares of the layers, and the probabilities of the lobes.
 fn set_layers(terms: &mut BsdfTerms, albedo: GgxAlbedo) {
-    let material = terms.material;
+    let material = &terms.material;
     let cosine = terms.to_viewer.z;
     let (mut coat, mut sheen) = (0.0, 0.0);
-    if has_clearcoat(&material) {
+    if has_clearcoat(material) {
         coat = material.clearcoat * clearcoat_albedo(cosine, terms.coat_roughness);
     }
-    if has_sheen(&material) {
+    if has_sheen(material) {
         sheen = sheen_albedo(cosine, terms.sheen_roughness);
     }
     terms.sheen_bound = sheen_bound(sheen);
@@ -175,7 +175,7 @@ fn set_layers(terms: &mut BsdfTerms, albedo: GgxAlbedo) {
         terms.sheen_share * mean_of(material.sheen_colour) * sheen,
     );
     // Light of macroscopic total reflection may still pass through some microfacets.
-    choice.x += terms.base_share * 0.01 * passing_share(&material);
+    choice.x += terms.base_share * 0.01 * passing_share(material);
     let sum = choice.x + choice.y + choice.z + choice.w;
     terms.choice = if sum > 0.0 { choice / sum } else { Vec4::ZERO };
 }
