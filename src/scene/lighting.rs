@@ -41,8 +41,8 @@ impl Scene {
         self.materials.iter().any(|material| material.ke != Vec3::ZERO)
     }
 
-    /// Returns whether surfaces light the scene: some are brighter than white paper in full light, as lamps are, and all
-    /// of them give off so much light that other surfaces get some of it. The lights of a car do not light the car.
+    /// Returns whether surfaces light the scene. Some are brighter than white paper in full light, as lamps are, and
+    /// together they give off so much light that other surfaces get some of it. The lights of a car do not.
     pub(super) fn has_lamps(&self) -> bool {
         let emission: Vec<f32> = self.materials.iter().map(|material| self.mean_emission(material)).collect();
         if !self.materials.iter().any(|material| material.ke.max_element() > 1.0) {

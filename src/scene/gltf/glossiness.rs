@@ -1,6 +1,6 @@
 //! The extension KHR_materials_pbrSpecularGlossiness, which many older files have: a dielectric whose reflectance along
-//! the normal is stated, so that a metal is one of a high reflectance and a black diffuse colour. Its image of glossiness
-//! is turned into one of roughness.
+//! the normal is stated. A metal has a high reflectance and a black diffuse colour. The image of glossiness is turned
+//! into one of roughness.
 
 use gltf::json::texture::Info;
 use half::f16;

@@ -139,9 +139,9 @@ fn as_meant(path: &Path, described: &mut [Described]) {
     warn(&no_glass, "would be glass by `illum`, but no other term says so: shown opaque; `Ni 1.5` would make it glass");
 }
 
-/// Takes the diffuse and the ambient light from glass. A `Kd` beside it is the colour in which a thing is seen through the glass, as in
-/// programs that write one colour for all materials. A ray passes two boundaries, so each has the square root of it.
-/// Glass with an image keeps its `Kd`, since the image would be lost.
+/// Takes the diffuse and the ambient light from glass. Its `Kd` is the colour in which things are seen through it. A ray
+/// passes two boundaries, so each has the square root of that colour. Glass with an image keeps its `Kd`, since the
+/// image would be lost.
 fn tint_glass(spec: &mut MaterialSpec, more: &More) {
     let is_glass = matches!(spec.illum, Some(4 | 6 | 7 | 9)) && !is_physically_based(more);
     let has_image = more.maps.iter().any(|map| map.term == Term::BaseColour);
@@ -269,8 +269,8 @@ fn warn_of_image(path: &Path, map: &Map, what: &str) {
     tracing::warn!("{}:{}: the image is not shown: {}", shown(path), map.line, what.escape_debug());
 }
 
-/// Makes a material. A colour that is stated by its map alone is white. So is a black `Kd` or `Ke` beside its map, which
-/// would never be seen: Maya writes `Kd 0 0 0` for each material with an image.
+/// Makes a material. A colour that is stated by its map alone is white. So is a black `Kd` or `Ke` beside its map, as
+/// the map would never be seen: Maya writes `Kd 0 0 0` for each material with an image.
 fn material(described: &Described, images: &mut Images) -> Checked<Material> {
     let Described { spec, name, path, more } = described;
     let mut spec = spec.clone();

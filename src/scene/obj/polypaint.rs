@@ -1,5 +1,5 @@
-//! The colours that ZBrush writes into comments of OBJ files, in blocks `#MRGB`. A block has eight hexadecimal digits for
-//! each point, in the order of the points: a mask, which does not concern the picture, then red, green and blue.
+//! The colours that ZBrush writes into comments of OBJ files, in blocks `#MRGB`. A block has eight hexadecimal digits
+//! for each point, in the order of the points: a mask, which is not shown, then red, green and blue.
 
 /// Begins the comments with the colours.
 const KEYWORD: &str = "#MRGB ";

@@ -1,4 +1,4 @@
-//! Faces that are there twice, once for each side, with a material of its own for each: SketchUp writes walls like this.
+//! Faces that are there twice, once for each side, with a material for each: SketchUp writes walls like this.
 //! Both lie in one plane, so that chance would decide which of the two a ray hits. Each is therefore moved to its own
 //! side, by a distance that no picture shows.
 

@@ -340,15 +340,15 @@ fn check(elements: &[ElementDef]) -> Checked<()> {
             Err("has Gaussian splats, which are not shown: no element `face`".to_owned())
         }
         None => Err(format!(
-            "has no element `face`: it is a cloud of {} points, without triangles to show. MeshLab, for example, makes a \
-             mesh of it",
+            "has no element `face`: it is a cloud of {} points, without triangles to show. MeshLab, for example, \
+             makes a mesh of it",
             vertex.count
         )),
     }
 }
 
-/// Makes the mesh, without faces whose corners are not finite, and returns their number. `n_images`: the number of images
-/// that polygons can show.
+/// Makes the mesh, without faces whose corners are not finite, and returns their number. `n_images`: the number of
+/// images that polygons can show.
 fn mesh(elements: Elements, n_images: usize, shading: Shading) -> Checked<(Mesh, usize)> {
     let Elements { vertices, triangles, polygons, strips } = elements;
     let mut mesh = Mesh { slots: vec![0; triangles.len()], faces: triangles, ..Mesh::default() };
