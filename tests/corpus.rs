@@ -22,7 +22,8 @@ fn no_file_breaks_a_reader() {
             eprintln!("{}", file.display());
             n_read += usize::from(reader.check(format, &fs::read(file).unwrap()).is_none());
         }
-        assert!(n_read < files.len(), "all {} files are read", files.len());
+        // What is wrong in an MTL file is left out with a warning.
+        assert!(n_read < files.len() || format == Format::Mtl, "all {} files are read", files.len());
         // Parts are those of one version of kdray. Others refuse all of them.
         assert!(0 < n_read || format == Format::Part, "none of {} files is read", files.len());
     }

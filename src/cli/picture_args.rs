@@ -34,7 +34,7 @@ pub struct PictureArgs {
     #[arg(long, value_name = "X", value_parser = threshold)]
     pub denoise_threshold: Option<f32>,
     /// Factor on radiance before the tone curve, above 0 [default: the scene's; measured in the first view if the
-    /// scene's lights have physical units, as in glTF files]
+    /// scene's lights have physical units, as in glTF files, or if surfaces of a mesh or glTF file light it]
     #[arg(long, value_name = "X", value_parser = positive)]
     pub exposure: Option<f32>,
     #[arg(long, value_name = "CURVE")]

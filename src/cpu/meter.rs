@@ -3,7 +3,7 @@
 use super::{Batching, Renderer};
 use crate::{
     accel::kdtree::Traversal,
-    frame::{Denoise, Primary, RenderOptions},
+    frame::{Denoise, Integrator, Primary, RenderOptions},
     world::World,
 };
 
@@ -11,18 +11,25 @@ use crate::{
 const WIDTH: u32 = 96;
 /// Display value that the mean luminance of all surfaces gets.
 const MEAN: f32 = 0.25;
+/// Number of samples a pixel if surfaces are lamps, whose light comes by chance.
+const PATH_SAMPLES: u32 = 16;
 /// Share of the surfaces that may be brighter than the display.
 const CLIPPED: f32 = 0.05;
 
 /// Returns the exposure at which the scene's own camera shows surfaces of medium brightness, without more than a few
-/// that are too bright for the display. It is measured in a small picture of one sample a pixel, and rounded to two
-/// digits, so that it does not depend on the device. It is 1 if the camera sees no light.
+/// that are too bright for the display. It is measured in a small picture of one sample a pixel, or of a few paths a
+/// pixel if the scene has no other lights than surfaces that shine. It is rounded to two digits, so that it does not
+/// depend on the device. It is 1 if the camera sees no light.
 ///
 /// The CPU measures it on the current rayon pool. If the scene has a grid, the host builds it for this.
 pub fn metered_exposure(world: &World) -> f32 {
     let defaults = &world.scene().defaults;
     let height = (WIDTH as f32 * defaults.height as f32 / defaults.width as f32).round().max(1.0) as u32;
+    let needs_paths = world.scene().lights.is_empty() && defaults.integrator == Integrator::Path;
+    let (integrator, n_samples) = if needs_paths { (Integrator::Path, PATH_SAMPLES) } else { (Integrator::Whitted, 1) };
+    let defaults = defaults.for_integrator(Some(integrator));
     let options = RenderOptions {
+        integrator,
         width: WIDTH,
         height,
         max_depth: defaults.max_depth,
@@ -33,12 +40,25 @@ pub fn metered_exposure(world: &World) -> f32 {
         ..RenderOptions::default()
     };
     let mut renderer = Renderer::new(world, &options, Batching::default());
-    renderer.draw_sample();
+    for _ in 0..n_samples {
+        renderer.draw_sample();
+    }
     let features = renderer.features();
     let pixels = renderer.picture().radiance.into_iter().zip(features);
     let luminance = |[r, g, b, _]: [f32; 4]| 0.2126 * r + 0.7152 * g + 0.0722 * b;
     let of_surfaces = pixels.filter(|(_, feature)| feature.depth.is_finite());
-    exposure_of(of_surfaces.map(|(radiance, _)| luminance(radiance)).collect())
+    let mut luminances: Vec<f32> = of_surfaces.map(|(radiance, _)| luminance(radiance)).collect();
+    if needs_paths {
+        leave_out_lamps(&mut luminances);
+    }
+    exposure_of(luminances)
+}
+
+/// Leaves out the brightest of the luminances, as many as may be clipped. They are those of the lamps, which may be a
+/// thousand times as bright as what they light.
+fn leave_out_lamps(luminances: &mut Vec<f32>) {
+    luminances.sort_by(f32::total_cmp);
+    luminances.truncate((luminances.len() as f32 * (1.0 - CLIPPED)).ceil() as usize);
 }
 
 /// Returns the exposure for surfaces of these luminances.
@@ -78,6 +98,15 @@ mod tests {
         let mut luminances = vec![0.1; 90];
         luminances.extend([100.0; 10]);
         assert_eq!(exposure_of(luminances), 0.01);
+    }
+
+    #[test]
+    fn lamps_do_not_darken_what_they_light() {
+        let mut luminances = vec![2.5; 97];
+        luminances.extend([5000.0; 3]);
+        leave_out_lamps(&mut luminances);
+        assert_eq!(exposure_of(luminances), 0.1);
+        leave_out_lamps(&mut Vec::new());
     }
 
     #[test]

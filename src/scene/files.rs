@@ -26,6 +26,13 @@ pub(super) fn open(path: &Path) -> io::Result<Box<dyn Read>> {
     }
 }
 
+/// Reads up to `n_bytes` from the beginning of a regular file.
+pub(super) fn head(path: &Path, n_bytes: usize) -> io::Result<Vec<u8>> {
+    let mut head = Vec::new();
+    open(path)?.take(n_bytes as u64).read_to_end(&mut head)?;
+    Ok(head)
+}
+
 /// Refuses what is no regular file. Reading a device or a pipe might never end.
 fn regular(path: &Path) -> io::Result<()> {
     match fs::metadata(path)?.is_file() {

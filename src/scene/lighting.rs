@@ -4,11 +4,25 @@ use std::path::Path;
 
 use glam::Vec3;
 
-use super::{Light, Scene, material::Material};
+use super::{
+    Encoding, Image, Instance, Light, Microfacet, Scene, Texture, material::Material, texture::linear_of_srgb,
+};
 use crate::frame::Integrator;
 
 /// Roughness of a surface that still shows shapes of what it mirrors.
 const ROUGHEST_MIRROR: f32 = 0.5;
+/// Share of a material's surface that has to mirror for the material to count as a mirror.
+const LEAST_MIRRORED_SHARE: f32 = 0.25;
+/// Number of pixels of each map that are looked at. It is odd, so that they are not all in one column of the image.
+const N_PLACES: usize = 4095;
+
+/// Least power of all lamps of a scene for its whole area, in units of white paper in full light.
+const LEAST_LAMPLIGHT: f64 = 0.1;
+
+/// Returns the index of the pixel that a share of an image's pixels precedes.
+fn pixel_ix(image: &Image, place: f32) -> usize {
+    ((place * image.pixels.len() as f32) as usize).min(image.pixels.len() - 1)
+}
 
 impl Scene {
     /// Returns whether the scene has light that only paths show: surfaces that shine, lights with an area, an
@@ -27,24 +41,77 @@ impl Scene {
         self.materials.iter().any(|material| material.ke != Vec3::ZERO)
     }
 
-    /// Returns whether some surfaces are brighter than white paper in full light, as lamps are.
-    pub(super) fn has_bright_surfaces(&self) -> bool {
-        self.materials.iter().any(|material| material.ke.max_element() > 1.0)
+    /// Returns whether surfaces light the scene. Some are brighter than white paper in full light, as lamps are, and
+    /// together they give off so much light that other surfaces get some of it. The lights of a car do not.
+    pub(super) fn has_lamps(&self) -> bool {
+        let emission: Vec<f32> = self.materials.iter().map(|material| self.mean_emission(material)).collect();
+        if !self.materials.iter().any(|material| material.ke.max_element() > 1.0) {
+            return false;
+        }
+        let (mut area, mut power) = (0.0, 0.0);
+        for Instance { mesh_ix, transform, materials } in &self.instances {
+            let mesh = &self.meshes[*mesh_ix];
+            for (face, slot) in mesh.faces.iter().zip(&mesh.slots) {
+                let [a, b, c] = face.map(|ix| transform.point(mesh.positions[ix as usize]));
+                let of_face = f64::from((b - a).cross(c - a).length() / 2.0);
+                area += of_face;
+                power += of_face * f64::from(emission[materials[*slot as usize % materials.len()] as usize]);
+            }
+        }
+        power >= LEAST_LAMPLIGHT * area
+    }
+
+    /// Returns the mean of what a material emits over the image of its emission.
+    fn mean_emission(&self, material: &Material) -> f32 {
+        let ke = material.ke.max_element();
+        let Some(map) = material.maps.emission.as_ref().filter(|_| ke > 0.0) else { return ke };
+        let value = |ix: usize| self.colour_of_map(map, (ix as f32 + 0.5) / N_PLACES as f32);
+        ke * (0..N_PLACES).map(value).sum::<f32>() / N_PLACES as f32
+    }
+
+    /// Returns the greatest part of a colour map at a place as of [`value_of_map`](Self::value_of_map), linear.
+    fn colour_of_map(&self, map: &Texture, place: f32) -> f32 {
+        let Some(image) = self.images.get(map.image_ix as usize) else { return 1.0 };
+        let [r, g, b, _] = image.pixels.get(pixel_ix(image, place));
+        let greatest = r.max(g).max(b);
+        if image.encoding(map.encoding) == Encoding::Srgb { linear_of_srgb(greatest) } else { greatest }
     }
 
     /// Returns whether some surfaces mirror what is beyond the scene, or show it through them: metals and glass that
     /// are not rough.
     pub(super) fn has_mirrors(&self) -> bool {
-        let mirrors = |material: &Material| {
-            let Some(it) = material.microfacet else {
-                let is_mirror =
-                    material.lobes.reflection && !material.lobes.fresnel && material.ks.max_element() >= 0.5;
-                return is_mirror || material.lobes.refraction;
-            };
-            let is_metal = it.metallic >= 0.5 || it.conductor.is_some();
-            it.roughness <= ROUGHEST_MIRROR && (is_metal || it.transmission >= 0.5)
+        self.materials.iter().any(|material| match material.microfacet {
+            Some(terms) => self.mirrored_share(material, &terms) >= LEAST_MIRRORED_SHARE,
+            None => {
+                let lobes = &material.lobes;
+                lobes.reflection && !lobes.fresnel && material.ks.max_element() >= 0.5 || lobes.refraction
+            }
+        })
+    }
+
+    /// Returns the share of a material's surface that mirrors what is around it, as far as its maps are evenly shown.
+    fn mirrored_share(&self, material: &Material, terms: &Microfacet) -> f32 {
+        let maps = &material.maps;
+        let [metallic, roughness, transmission, specular] =
+            [&maps.metallic, &maps.roughness, &maps.transmission, &maps.specular];
+        let dielectric = material.ks.max_element() * ((material.ni - 1.0) / (material.ni + 1.0)).powi(2);
+        let mirrors = |place: f32| {
+            let at = |map: &Option<Texture>| map.as_ref().map_or(1.0, |map| self.value_of_map(map, place));
+            let is_metal = terms.metallic * at(metallic) >= 0.5
+                || terms.conductor.is_some()
+                || dielectric.min(1.0) * specular.as_ref().map_or(1.0, |map| self.colour_of_map(map, place)) >= 0.5;
+            terms.roughness * at(roughness) <= ROUGHEST_MIRROR
+                && (is_metal || terms.transmission * at(transmission) >= 0.5)
         };
-        self.materials.iter().any(mirrors)
+        let n =
+            if [metallic, roughness, transmission, specular].iter().any(|map| map.is_some()) { N_PLACES } else { 1 };
+        (0..n).filter(|ix| mirrors((*ix as f32 + 0.5) / n as f32)).count() as f32 / n as f32
+    }
+
+    /// Returns the value of a map at the pixel that a share of the image's pixels precedes.
+    fn value_of_map(&self, map: &Texture, place: f32) -> f32 {
+        let Some(image) = self.images.get(map.image_ix as usize) else { return 1.0 };
+        map.channel.of(image.pixels.get(pixel_ix(image, place)))
     }
 
     /// Warns of light that the integrator does not show, and if nothing illuminates the scene, how to add a light.

@@ -68,6 +68,27 @@ impl Mesh {
         append_corners(&mut self.tangents, other.tangents, n_faces, [Vec4::ZERO; 3]);
     }
 
+    /// Leaves out the faces with a corner that is not finite, as programs write for what they could not compute. Such
+    /// positions are then at a place where another one is, since no face names them. Returns the number of faces that
+    /// are left out.
+    pub(super) fn leave_out_broken_faces(&mut self) -> usize {
+        if self.positions.par_iter().all(|p| p.is_finite()) {
+            return 0;
+        }
+        let n_faces = self.faces.len();
+        let is_whole: Vec<bool> =
+            self.faces.iter().map(|face| face.iter().all(|ix| self.positions[*ix as usize].is_finite())).collect();
+        keep(&mut self.faces, &is_whole);
+        keep(&mut self.normals, &is_whole);
+        keep(&mut self.slots, &is_whole);
+        self.uvs.iter_mut().for_each(|uvs| keep(uvs, &is_whole));
+        keep(&mut self.colours, &is_whole);
+        keep(&mut self.tangents, &is_whole);
+        let place = self.positions.iter().copied().find(|p| p.is_finite()).unwrap_or_default();
+        self.positions.iter_mut().filter(|p| !p.is_finite()).for_each(|p| *p = place);
+        n_faces - self.faces.len()
+    }
+
     /// Returns the positions at which triangles have corners, each once.
     ///
     /// # Panics
@@ -90,6 +111,12 @@ impl Mesh {
             None => Ok(world),
         }
     }
+}
+
+/// Keeps the items of a list that is empty or has one for each face.
+fn keep<T>(list: &mut Vec<T>, is_kept: &[bool]) {
+    let mut is_kept = is_kept.iter();
+    list.retain(|_| *is_kept.next().expect("there is one for each face"));
 }
 
 /// Joins two lists of corners, each of which may be empty. `n_faces`: the faces of their meshes.

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::{
     error::SceneError,
     extent::MeshOrigin,
+    foreign,
     image_files::Images,
     material::Material,
     mesh::Mesh,
@@ -72,7 +73,11 @@ pub(super) fn read_mesh(path: &Path) -> Result<Vec<u8>, SceneError> {
         _ => require_for_text(path),
     };
     required.map_err(|what| SceneError::file(path, what))?;
-    read_bytes(path)
+    let bytes = read_bytes(path)?;
+    match foreign::what_it_is(&bytes) {
+        Some(what) => Err(SceneError::file(path, what)),
+        None => Ok(bytes),
+    }
 }
 
 /// How a mesh file is loaded.
@@ -153,14 +158,23 @@ impl Shape {
     /// Reads the materials, and makes the mesh if that has not been done.
     pub fn loaded(self, path: &Path, loading: &mut Loading) -> Result<Loaded, SceneError> {
         let Self { kind, origin } = self;
+        let n_points = match &kind {
+            ShapeKind::Obj(file) => file.n_points(),
+            ShapeKind::Ply(ply) => ply.mesh().positions.len(),
+            ShapeKind::Stl(mesh) => mesh.positions.len(),
+        };
         let loaded = match kind {
             ShapeKind::Obj(file) => obj_mesh(path, file, loading)?,
             ShapeKind::Ply(ply) => Loaded { origin, ..ply.with_materials(path, loading.access, loading.images) },
             ShapeKind::Stl(mesh) => Loaded { mesh, origin, materials: Vec::new(), uses_crease: loading.shading.smooth },
         };
-        match loaded.mesh.faces.is_empty() {
-            true => Err(SceneError::file(path, "has no triangles")),
-            false => Ok(loaded),
+        match (loaded.mesh.faces.is_empty(), n_points) {
+            (false, _) => Ok(loaded),
+            (true, 0) => Err(SceneError::file(path, "has no triangles")),
+            (true, n) => Err(SceneError::file(
+                path,
+                format!("has {n} points but no triangles: clouds of points, lines and curves are not shown"),
+            )),
         }
     }
 }

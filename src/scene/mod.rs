@@ -13,6 +13,7 @@ mod environment;
 mod error;
 mod extent;
 mod files;
+mod foreign;
 mod framing;
 pub mod generate;
 mod gltf;
@@ -212,8 +213,8 @@ impl Scene {
         } else if MeshFormat::of_name(path).is_some() {
             load_mesh_file(path, options)?
         } else {
-            let endings = "its name ends in none of .toml, .gltf, .glb, .obj, .ply, .stl and .kdpack";
-            return Err(SceneError::file(path, format!("is no scene: {endings}")));
+            let head = files::head(path, HEAD_BYTES).unwrap_or_else(|_| b" ".to_vec());
+            return Err(SceneError::file(path, foreign::of_other_name(path, &head)));
         };
         preset::replace(&mut scene, &options.look.materials).map_err(|what| SceneError::file(path, what))?;
         scene.add_tangents().map_err(|what| SceneError::file(path, what))?;
@@ -310,6 +311,9 @@ impl Scene {
         }
     }
 }
+
+/// Number of bytes at the beginning of a file that tell what it is.
+const HEAD_BYTES: usize = 1024;
 
 /// Returns whether a file's name is that of a scene file in TOML.
 fn is_scene_file(path: &Path) -> bool {

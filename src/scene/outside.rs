@@ -73,6 +73,18 @@ impl<'a> Reach<'a> {
         Ok(path)
     }
 
+    /// Returns the file of a name as [`exact`](Self::exact) does. If there is none, the file that
+    /// [`find`](Self::find) finds is taken.
+    ///
+    /// # Errors
+    /// Those of [`exact`](Self::exact).
+    pub fn exact_or_alike(self, name: &str) -> Checked<NamedFile> {
+        let path = self.exact(name)?;
+        let alike = if files::exists(&path) { None } else { self.find(self.root, name).ok() };
+        let alike = alike.filter(|found| files::is_file(&found.path));
+        Ok(alike.unwrap_or(NamedFile { path, is_other_case: false }))
+    }
+
     /// Returns the file of a name that is relative to `folder`, which lies in the reach. Backslashes count as
     /// separators, as in files from Windows. Where no file has the name, the only one whose name differs in the case of
     /// letters is taken.

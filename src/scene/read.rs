@@ -4,17 +4,34 @@ use std::path::Path;
 
 use super::{error::SceneError, files};
 
-/// Reads text that need not be UTF-8. Invalid bytes become U+FFFD, so that a mesh with comments in an old encoding is
-/// not refused.
+/// Reads text that need not be UTF-8. What is not UTF-8 is read as Windows-1252, as old programs of Europe and America
+/// write names of files and materials.
 pub(super) fn read_lossy(path: &Path) -> Result<String, SceneError> {
     read_bytes(path).map(lossy_text)
 }
 
-/// Returns bytes as text. Invalid bytes become U+FFFD.
+/// The characters of the bytes 0x80 to 0x9F in Windows-1252. Those above are characters of the same number.
+const WINDOWS_1252: [char; 32] = [
+    '€', '\u{81}', '‚', 'ƒ', '„', '…', '†', '‡', 'ˆ', '‰', 'Š', '‹', 'Œ', '\u{8d}', 'Ž', '\u{8f}', '\u{90}', '‘', '’',
+    '“', '”', '•', '–', '—', '˜', '™', 'š', '›', 'œ', '\u{9d}', 'ž', 'Ÿ',
+];
+
+/// Returns bytes as text. Bytes that are not UTF-8 are read as Windows-1252.
 pub(super) fn lossy_text(bytes: Vec<u8>) -> String {
+    let of_byte = |byte: &u8| match byte {
+        0x80..=0x9f => WINDOWS_1252[usize::from(byte - 0x80)],
+        _ => char::from(*byte),
+    };
     without_bom(match String::from_utf8(bytes) {
         Ok(text) => text,
-        Err(e) => String::from_utf8_lossy(e.as_bytes()).into_owned(),
+        Err(e) => {
+            let mut text = String::with_capacity(e.as_bytes().len());
+            for chunk in e.as_bytes().utf8_chunks() {
+                text.push_str(chunk.valid());
+                text.extend(chunk.invalid().iter().map(of_byte));
+            }
+            text
+        }
     })
 }
 

@@ -75,7 +75,10 @@ pub(super) fn fill_in(scene: &mut Scene, lacks: Lacks, options: &LoadOptions) ->
     if lacks.integrator && scene.needs_path() {
         scene.defaults.integrator = Integrator::Path;
     }
-    if lacks_light && !scene.has_bright_surfaces() {
+    // Lamps of a mesh file are bright by the units of its program, and need an exposure.
+    let has_lamps = lacks_light && scene.has_lamps();
+    scene.defaults.is_metered |= has_lamps && lacks.ground;
+    if lacks_light && !has_lamps {
         let lamps = if is_interior { lamps_inside(scene, bounds) } else { lamps_outside(scene, &axes) };
         let [sky, ground] = if is_interior { AMBIENT_OF_INTERIORS } else { AMBIENT };
         (scene.ambient, scene.ground) = (sky, Some(Ground { ambient: ground, up }));

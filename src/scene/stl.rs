@@ -73,8 +73,25 @@ fn binary(mut bytes: Vec<u8>, (n_loaded, progress): (usize, &Progress)) -> Check
         return Err(format!("ends after {n_held} of {n} facets"));
     }
     require_for_facets(n_loaded, n)?;
+    if let Some(whole) = whole_facets(&bytes[HEAD_BYTES..][..n * FACET_BYTES]) {
+        bytes.truncate(HEAD_BYTES);
+        bytes[80..].copy_from_slice(&((whole.len() / FACET_BYTES) as u32).to_le_bytes());
+        bytes.extend(whole);
+    }
     bytes[..80].fill(0); // a comment, which the reader would take for text if it began with `solid`
     triangles_of(bytes, &progress.begin(Work::Reading, n as u64))
+}
+
+/// Returns the facets of a binary file whose corners are finite, or `None` if all are. Programs write NaN for what they
+/// could not compute.
+fn whole_facets(facets: &[u8]) -> Option<Vec<u8>> {
+    // A facet begins with its normal, which is not used.
+    let is_whole = |facet: &[u8; FACET_BYTES]| {
+        facet[12..48].as_chunks().0.iter().all(|bytes| f32::from_le_bytes(*bytes).is_finite())
+    };
+    let facets = facets.as_chunks().0;
+    let is_broken = facets.iter().any(|facet| !is_whole(facet));
+    is_broken.then(|| facets.iter().filter(|facet| is_whole(facet)).flatten().copied().collect())
 }
 
 /// Refuses facets, which have three points each, if there is not enough memory for them.
@@ -129,7 +146,24 @@ fn solids(bytes: &[u8]) -> Vec<(usize, Vec<u8>)> {
                 () if is_statement(statement, b"endsolid") => solid.extend(b"endsolid\n"),
                 () => solid.extend(line.iter().map(u8::to_ascii_lowercase)),
             }
+            if is_statement(statement, b"endfacet") {
+                leave_out_if_broken(solid);
+            }
         }
     }
     solids
+}
+
+/// Takes the last facet from a solid if a number of it is NaN or infinite.
+fn leave_out_if_broken(solid: &mut Vec<u8>) {
+    const BEGIN: &[u8] = b"facet normal 0 0 0\n";
+    let begin = solid.windows(BEGIN.len()).rposition(|part| part == BEGIN).unwrap_or(solid.len());
+    let mut words = solid[begin..].split(u8::is_ascii_whitespace);
+    let is_broken = |word: &[u8]| {
+        let word = word.strip_prefix(b"-").or(word.strip_prefix(b"+")).unwrap_or(word);
+        word.starts_with(b"nan") || word.starts_with(b"inf") || word.starts_with(b"1.#")
+    };
+    if words.any(is_broken) {
+        solid.truncate(begin);
+    }
 }

@@ -22,12 +22,15 @@ const STATED: [(&str, Up); 8] = [
     ("up_axis y", Up::Y),
 ];
 /// Programs that write OBJ files with the axis of their own world, or turn it to +y unless the user states another one.
-const OBJ_WRITERS: [(&str, Up); 6] = [
+const OBJ_WRITERS: [(&str, Up); 8] = [
     ("openscad", Up::Z),
     ("freecad", Up::Z),
+    ("ifcopenshell", Up::Z),
     ("blender", Up::Y),
     ("3ds max", Up::Y),
     ("maya", Up::Y),
+    // The first line of files from Maya, which names no program.
+    ("centimeters as units for non-parametric", Up::Y),
     ("sketchup", Up::Y),
 ];
 /// The same for PLY files. Blender does not turn these unless the user says so.
@@ -41,6 +44,11 @@ const OTHER_SHARE: f32 = 0.2;
 const CARRIED_SHARE: f32 = 0.9;
 /// Thickness of a side of the bounding box, as a share of the box's longest edge.
 const THICKNESS: f32 = 0.005;
+
+/// Share of the rectangle around a mesh that is flat at the lowest z, if the mesh may stand on it.
+const FLAT_SHARE: f32 = 0.2;
+/// Least factor between the flat areas at the lowest z and at the lowest y of such a mesh.
+const FLATTER: f32 = 1.5;
 
 /// An axis, and why it points up.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -64,6 +72,9 @@ pub(super) fn guess(format: MeshFormat, head: &[u8], mesh: &Mesh) -> Guess {
         Some((_, Up::Y)) => usual(Up::Y),
         None if has_ground_along_z(mesh) => {
             noted("since a large flat surface at the lowest z is below everything else".to_owned())
+        }
+        None if may_lie_on_side(mesh) => {
+            Guess { up: Up::Y, why: Some("+y points up; --up z turns the picture if it lies on its side".to_owned()) }
         }
         None => usual(Up::Y),
     }
@@ -110,6 +121,22 @@ fn has_ground_along_z(mesh: &Mesh) -> bool {
     carried.x * carried.y <= CARRIED_SHARE * size.x * size.y
 }
 
+/// Returns whether a mesh looks as if it could stand on its lowest z: it is flat there, more than at its lowest y. A
+/// bookcase whose back is at the lowest z is like this, too, so it is no reason to turn the picture.
+fn may_lie_on_side(mesh: &Mesh) -> bool {
+    let corners = |face: &[u32; 3]| face.map(|ix| mesh.positions[ix as usize]);
+    let bounds = |(min, max): (Vec3, Vec3), p: Vec3| (min.min(p), max.max(p));
+    let (min, max) = mesh.faces.iter().flat_map(corners).fold((Vec3::INFINITY, Vec3::NEG_INFINITY), bounds);
+    let near = THICKNESS * (max - min).max_element();
+    // The area that faces down an axis at its least coordinate.
+    let area = |axis: usize| -> f32 {
+        let at_side = mesh.faces.iter().map(corners).filter(|face| face.iter().all(|p| p[axis] - min[axis] <= near));
+        at_side.map(|[a, b, c]| (-(b - a).cross(c - a)[axis]).max(0.0) / 2.0).sum()
+    };
+    let size = max - min;
+    size.z > near && area(2) >= FLAT_SHARE * size.x * size.y && area(2) >= FLATTER * area(1)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -153,6 +180,22 @@ mod tests {
         corner.faces.extend([[0, 1, 9], [0, 9, 8]]);
         assert!(!has_ground_along_z(&corner));
         assert!(!has_ground_along_z(&Mesh::default()));
+    }
+
+    #[test]
+    fn a_flat_back_is_worth_a_note() {
+        // A wedge that is flat at the lowest z, and at the lowest y an edge.
+        let mesh = |turn: fn(Vec3) -> Vec3| {
+            let points = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 2.0, 0.0], [-1.0, 2.0, 0.0], [0.0, 1.0, 1.0]];
+            let faces = vec![[0, 3, 2], [0, 2, 1], [0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]];
+            Mesh { positions: points.map(Vec3::from_array).map(turn).to_vec(), faces, ..Mesh::default() }
+        };
+        assert!(may_lie_on_side(&mesh(|p| p)));
+        assert!(!may_lie_on_side(&mesh(|p| Vec3::new(p.x, p.z, -p.y))));
+        assert!(!may_lie_on_side(&mesh(|p| -p)) && !may_lie_on_side(&Mesh::default()));
+        let note = guess(MeshFormat::Obj, b"", &mesh(|p| p)).why.unwrap();
+        assert!(note.contains("--up z"), "{note}");
+        assert_eq!(guess(MeshFormat::Obj, b"# Blender", &mesh(|p| p)), Guess { up: Up::Y, why: None });
     }
 
     #[test]

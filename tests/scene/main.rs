@@ -15,6 +15,7 @@ mod placed;
 mod progress;
 mod replaced;
 mod standard;
+mod strangers;
 #[path = "../support/mod.rs"]
 mod support;
 

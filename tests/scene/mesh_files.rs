@@ -191,13 +191,12 @@ fn mistakes_are_named() {
         (
             "element face 6\nproperty list uchar int vertex_indices",
             "element edge 6\nproperty list uchar int vertex_indices",
-            "no element `face`: clouds of points",
+            "no element `face`: it is a cloud of 8 points",
         ),
         ("element face 6", "element tristrips 7", "element `tristrips`: the file ends too early"),
         ("vertex_indices", "indices", "lacks the list `vertex_indices`"),
         ("property float z", "property float w", "lacks x, y or z"),
         ("element vertex 8", "element corner 8", "no element `vertex`"),
-        ("-1 -1 -1", "-1 -1 nan", "a vertex lies at"),
         ("1 -1 -1", "1 x -1", "element `vertex`"),
         ("format ascii 1.0", "format morse 1.0", "is no PLY file"),
     ] {
@@ -226,7 +225,6 @@ fn mistakes_are_named() {
     let stl = stl_text("", triangles());
     for (from, to, what) in [
         ("vertex -1e0 -1 -1", "vertex -1e0 -1", "the solid at line 1: vertex f32 f32 f32"),
-        ("vertex -1e0 -1 -1", "vertex -1e0 -1 inf", "expected finite"),
         ("endloop", "", "expected"),
         ("endsolid", "", "EOF"),
     ] {

@@ -20,18 +20,25 @@ use super::{
 };
 use crate::util::progress::Progress;
 use crate::{
-    scene::{error::Checked, needs::require_for_bytes, outside::Access, read::read_bytes},
+    scene::{
+        error::Checked,
+        files,
+        needs::require_for_bytes,
+        outside::{Access, NamedFile},
+        read::read_bytes,
+    },
     util::{memory::require, text::one_line},
 };
 
 /// Extensions that are read. A file that requires another one is refused.
-const SUPPORTED: [&str; 16] = [
+const SUPPORTED: [&str; 17] = [
     "EXT_meshopt_compression",
     "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_materials_clearcoat",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
+    "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_sheen",
     "KHR_materials_specular",
     "KHR_materials_transmission",
@@ -103,7 +110,8 @@ impl Document {
     pub fn read(path: &Path, bytes: Vec<u8>, access: Access) -> Checked<Self> {
         let (json, chunk) = split(&bytes)?;
         let json = &bytes[json];
-        let root: Root = json::deserialize::from_slice(json).map_err(|error| format!("the JSON: {error}"))?;
+        let root = json::deserialize::from_slice(json);
+        let root: Root = root.map_err(|error| version_error(json).unwrap_or_else(|| format!("the JSON: {error}")))?;
         let path = path.to_owned();
         let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
         let morph_targets = match primitives.flat_map(|primitive| &primitive.targets).next() {
@@ -129,7 +137,7 @@ impl Document {
         let asset = &self.root.asset;
         match asset.min_version.as_ref().unwrap_or(&asset.version) {
             version if version.starts_with("2.") => Ok(()),
-            version => Err(format!("asset: this is glTF {version}, and only glTF 2 is read")),
+            version => Err(refused_version(version)),
         }
     }
 
@@ -188,7 +196,7 @@ impl Document {
             Uri::Data(bytes) => return Ok(Rc::new(bytes)),
             Uri::File(name) => name,
         };
-        let path = self.access.beside(&self.path).exact(&name)?;
+        let path = self.named(&name)?;
         if let Some(content) = self.files.borrow().get(&path) {
             return Ok(content.clone());
         }
@@ -196,6 +204,16 @@ impl Document {
         let content = Rc::new(read_bytes(&path).map_err(|error| error.to_string())?);
         self.files.borrow_mut().insert(path, content.clone());
         Ok(content)
+    }
+
+    /// Returns the path of a file that the document names. Notes a name whose case is that of no file.
+    fn named(&self, name: &str) -> Checked<PathBuf> {
+        let NamedFile { path, is_other_case } = self.access.beside(&self.path).exact_or_alike(name)?;
+        if is_other_case {
+            let taken = format!("`{name}` ({} is taken)", path.display());
+            self.note("names of files that differ from those on disk in the case of letters", taken);
+        }
+        Ok(path)
     }
 
     /// Returns the indices of the elements that the sparse accessor at an index replaces. `read` reads them at the
@@ -217,7 +235,7 @@ impl Document {
             (Some(uri), _) if is_data(uri) => Ok(ImageSource::Uri(index.value())),
             (Some(uri), _) => match Uri::new(uri).map_err(failed)? {
                 Uri::Data(_) => unreachable!("data is another source"),
-                Uri::File(name) => self.access.beside(&self.path).exact(&name).map(ImageSource::File).map_err(failed),
+                Uri::File(name) => self.named(&name).map(ImageSource::File).map_err(failed),
             },
             (None, Some(view)) => Ok(ImageSource::View(view.value())),
             (None, None) => Err(failed("has neither uri nor bufferView".to_owned())),
@@ -238,6 +256,10 @@ impl Document {
                 require_for_bytes(path).map_err(|what| format!("{place}: {what}"))?;
                 match read_bytes(path) {
                     Ok(bytes) => Ok(Some(bytes.into())),
+                    Err(_) if !files::exists(path) => {
+                        self.note("image files that do not exist, without which materials are shown", path.display());
+                        Ok(None)
+                    }
                     Err(error) => {
                         self.note("images that cannot be read, without which materials are shown", error);
                         Ok(None)
@@ -285,6 +307,17 @@ impl Document {
     }
 }
 
+/// Returns what is wrong with JSON that is no glTF 2, if it is that of another version.
+fn version_error(json: &[u8]) -> Option<String> {
+    let root: json::Value = json::deserialize::from_slice(json).ok()?;
+    let version = root.get("asset")?.get("version")?.as_str()?;
+    (!version.starts_with("2.")).then(|| refused_version(version))
+}
+
+fn refused_version(version: &str) -> String {
+    format!("asset: this is glTF {version}, and only glTF 2 is read")
+}
+
 impl Buffer {
     fn bytes(&self) -> &[u8] {
         &self.content[self.part.clone()]
@@ -312,7 +345,7 @@ pub(in crate::scene) fn named_files(path: &Path, bytes: &[u8], access: Access) -
     let items = ["buffers", "images"].into_iter().filter_map(|list| root.get(list)?.as_array()).flatten();
     let uris = items.filter_map(|item| item.get("uri")?.as_str());
     uris.filter_map(|uri| match Uri::new(uri) {
-        Ok(Uri::File(name)) => access.beside(path).exact(&name).ok(),
+        Ok(Uri::File(name)) => access.beside(path).exact_or_alike(&name).ok().map(|file| file.path),
         _ => None,
     })
     .collect()

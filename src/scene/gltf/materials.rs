@@ -6,6 +6,7 @@ use hashbrown::HashMap;
 
 use super::{
     document::{Document, item},
+    glossiness::{self, SPECULAR_SCALE, SpecularGlossiness},
     textures::{TextureUse, Textures},
 };
 use crate::scene::{
@@ -74,9 +75,13 @@ impl Reader<'_> {
         (textures, replaced): (&mut Textures, &[MaterialChoice]),
     ) -> Checked<Material> {
         let name = json.name.clone().unwrap_or_else(|| self.path.clone());
-        let maps = if is_replaced(replaced, &name) { Maps::default() } else { self.maps(json, textures)? };
+        let glossy: Option<SpecularGlossiness> = self.extension(json, glossiness::NAME)?;
+        let maps = match is_replaced(replaced, &name) {
+            true => Maps::default(),
+            false => self.maps(json, glossy.as_ref(), textures)?,
+        };
         let pbr = &json.pbr_metallic_roughness;
-        let [r, g, b, opacity] = pbr.base_color_factor.0;
+        let [r, g, b, opacity] = glossy.as_ref().map_or(pbr.base_color_factor.0, |glossy| glossy.diffuse_factor);
         let kd = self.colour("baseColorFactor", [r, g, b])?;
         let extensions = json.extensions.as_ref();
         let ior = extensions.and_then(|it| it.ior.as_ref()).map_or(1.5, |it| it.ior.0);
@@ -89,7 +94,10 @@ impl Reader<'_> {
             name,
             ka: kd,
             kd,
-            ks: self.specular(json)?,
+            ks: match &glossy {
+                Some(glossy) => SPECULAR_SCALE * self.colour("specularFactor", glossy.specular_factor)?,
+                None => self.specular(json)?,
+            },
             // An unlit material shows its base colour alone.
             ke: if is_unlit { Vec3::ZERO } else { ke },
             tf: Vec3::ONE,
@@ -97,7 +105,10 @@ impl Reader<'_> {
             ni: if ior == 0.0 { MAX_IOR } else { self.within("ior", ior, 1.0, MAX_IOR)? },
             d: self.within("baseColorFactor[3]", opacity, 0.0, 1.0)?,
             lobes: Lobes::default(),
-            microfacet: Some(self.microfacet(json)?),
+            microfacet: Some(match &glossy {
+                Some(glossy) => self.dielectric(glossy)?,
+                None => self.microfacet(json)?,
+            }),
             alpha: match json.alpha_mode {
                 Valid(AlphaMode::Opaque) => Alpha::Opaque,
                 Valid(AlphaMode::Blend) => Alpha::Coverage,
@@ -120,6 +131,13 @@ impl Reader<'_> {
         let Some(specular) = extensions.and_then(|it| it.specular.as_ref()) else { return Ok(Vec3::ONE) };
         let factor = self.within("specularFactor", specular.specular_factor.0, 0.0, 1.0)?;
         Ok(factor * self.colour("specularColorFactor", specular.specular_color_factor.0)?)
+    }
+
+    fn dielectric(&self, glossy: &SpecularGlossiness) -> Checked<Microfacet> {
+        let glossiness = self.within("glossinessFactor", glossy.glossiness_factor, 0.0, 1.0)?;
+        // The image of the roughness has the factor.
+        let roughness = if glossy.specular_glossiness_texture.is_some() { 1.0 } else { 1.0 - glossiness };
+        Ok(Microfacet { metallic: 0.0, roughness, ..Microfacet::default() })
     }
 
     fn microfacet(&self, json: &json::Material) -> Checked<Microfacet> {
@@ -145,8 +163,8 @@ impl Reader<'_> {
     }
 
     fn clearcoat(&self, json: &json::Material) -> Checked<Clearcoat> {
-        let Some(raw) = self.extension(json, "KHR_materials_clearcoat")? else { return Ok(Clearcoat::default()) };
-        let Raw { factor, roughness, .. } = raw;
+        let raw = self.extension(json, "KHR_materials_clearcoat")?;
+        let Some(Raw { factor, roughness, .. }) = raw else { return Ok(Clearcoat::default()) };
         if factor > 0.0 {
             self.document.note("layers of clearcoat, which the integrator whitted does not show", &self.path);
         }
@@ -157,8 +175,8 @@ impl Reader<'_> {
     }
 
     fn sheen(&self, json: &json::Material) -> Checked<Sheen> {
-        let Some(raw) = self.extension(json, "KHR_materials_sheen")? else { return Ok(Sheen::default()) };
-        let Raw { colour, sheen_roughness, .. } = raw;
+        let raw = self.extension(json, "KHR_materials_sheen")?;
+        let Some(Raw { colour, sheen_roughness, .. }) = raw else { return Ok(Sheen::default()) };
         if colour != [0.0; 3] {
             self.document.note("sheen, which the integrator whitted does not show", &self.path);
         }
@@ -169,13 +187,18 @@ impl Reader<'_> {
     }
 
     /// Returns an extension that the crate `gltf` does not know.
-    fn extension(&self, json: &json::Material, name: &str) -> Checked<Option<Raw>> {
+    fn extension<T: serde::de::DeserializeOwned>(&self, json: &json::Material, name: &str) -> Checked<Option<T>> {
         let value = json.extensions.as_ref().and_then(|it| it.others.get(name));
         let read = |value: &Value| json::deserialize::from_value(value.clone());
         value.map(read).transpose().map_err(|error| format!("{}.extensions.{name}: {error}", self.path))
     }
 
-    fn maps(&self, json: &json::Material, textures: &mut Textures) -> Checked<Maps> {
+    fn maps(
+        &self,
+        json: &json::Material,
+        glossy: Option<&SpecularGlossiness>,
+        textures: &mut Textures,
+    ) -> Checked<Maps> {
         let pbr = &json.pbr_metallic_roughness;
         let mut map = |info: &Option<json::texture::Info>, name: &str, channel: Option<Channel>| {
             let path = format!("{}.{name}", self.path);
@@ -188,7 +211,15 @@ impl Reader<'_> {
             emission: map(&json.emissive_texture, "emissiveTexture", None)?,
             ..Maps::default()
         };
-        if let Some(extensions) = &json.extensions {
+        if let Some(glossy) = glossy {
+            maps.base_colour = map(&glossy.diffuse_texture, "diffuseTexture", None)?;
+            (maps.roughness, maps.metallic) = (None, None);
+            maps.specular = map(&glossy.specular_glossiness_texture, "specularGlossinessTexture", None)?;
+            if let Some(info) = &glossy.specular_glossiness_texture {
+                let (path, factor) = (format!("{}.specularGlossinessTexture", self.path), glossy.glossiness_factor);
+                maps.roughness = textures.roughness(&TextureUse::of(info), &path, factor.clamp(0.0, 1.0))?;
+            }
+        } else if let Some(extensions) = &json.extensions {
             if let Some(specular) = &extensions.specular {
                 maps.specular_factor = map(&specular.specular_texture, "specularTexture", Some(Channel::Alpha))?;
                 maps.specular = map(&specular.specular_color_texture, "specularColorTexture", None)?;

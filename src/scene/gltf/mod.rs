@@ -13,6 +13,7 @@ mod deform;
 mod document;
 mod geometry;
 mod glb;
+mod glossiness;
 mod lights;
 mod materials;
 mod meshopt;
@@ -190,7 +191,7 @@ impl<'a> Loader<'a> {
             scene.instances.push(instance);
         }
         if scene.instances.is_empty() {
-            return Err("has no triangles".to_owned());
+            return Err("has no triangles: points and lines are not shown".to_owned());
         }
         scene.meshes = self.meshes;
         scene.materials = self.materials.materials;

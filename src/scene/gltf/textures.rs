@@ -12,6 +12,7 @@ use hashbrown::HashMap;
 
 use super::{
     document::{Document, ImageSource, item},
+    glossiness::turn_into_roughness,
     uri::is_data,
 };
 use crate::scene::{
@@ -61,11 +62,14 @@ pub(super) struct Textures<'a> {
     /// Index into `encoded` by the place of the image's bytes, which several images can share; `None` if they cannot be
     /// read.
     known: HashMap<ImageSource, Option<u32>>,
+    /// Index into `encoded` of the images of roughness, by the index of the image of glossiness and the bits of the
+    /// factor of glossiness.
+    rough: HashMap<(u32, u32), u32>,
 }
 
 impl<'a> Textures<'a> {
     pub fn new(document: &'a Document) -> Self {
-        Self { document, encoded: Vec::new(), known: HashMap::new() }
+        Self { document, encoded: Vec::new(), known: HashMap::new(), rough: HashMap::new() }
     }
 
     /// Returns a texture: of the linear numbers of a channel, or without a channel of sRGB colours. `path` is the JSON
@@ -98,6 +102,17 @@ impl<'a> Textures<'a> {
         Ok(Some(texture))
     }
 
+    /// Returns a texture of roughness, from one whose opacity is the glossiness.
+    pub fn roughness(&mut self, used: &TextureUse, path: &str, factor: f32) -> Checked<Option<Texture>> {
+        let Some(texture) = self.texture(used, path, Some(Channel::Red))? else { return Ok(None) };
+        let known = self.rough.entry((texture.image_ix, factor.to_bits())).or_insert_with(|| {
+            let Encoded { name, bytes } = &self.encoded[texture.image_ix as usize];
+            self.encoded.push(Encoded { name: name.clone(), bytes: bytes.clone() });
+            (self.encoded.len() - 1) as u32
+        });
+        Ok(Some(Texture { image_ix: *known, ..texture }))
+    }
+
     /// Returns the index of a texture's image among those that are used.
     fn image(&mut self, texture: &json::Texture, texture_ix: usize) -> Checked<Option<u32>> {
         let path = format!("textures[{texture_ix}]");
@@ -125,10 +140,16 @@ impl<'a> Textures<'a> {
     /// `n_pixels`: the number of pixels that the scene has already.
     pub fn decode(self, materials: &mut [Material], n_pixels: u64) -> Vec<Image> {
         let names: Vec<_> = self.encoded.iter().map(|image| image.name.clone()).collect();
+        let factors: HashMap<u32, f32> =
+            self.rough.iter().map(|((_, bits), ix)| (*ix, f32::from_bits(*bits))).collect();
         let (mut images, mut new_ix) = (Vec::new(), Vec::new());
         for (name, decoded) in names.into_iter().zip(decode_all(self.encoded, n_pixels, &self.document.progress)) {
             match decoded {
-                Ok(image) => {
+                Ok(mut image) => {
+                    if let Some(factor) = factors.get(&(new_ix.len() as u32)) {
+                        turn_into_roughness(&mut image.pixels, *factor);
+                        image.is_linear = true;
+                    }
                     new_ix.push(Some(images.len() as u32));
                     images.push(image);
                 }

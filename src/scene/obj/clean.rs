@@ -7,7 +7,7 @@
 
 use std::{
     borrow::Cow,
-    collections::BTreeMap,
+    collections::{BTreeMap, HashSet},
     fmt::Write,
     io::{BufRead, Read},
 };
@@ -105,6 +105,9 @@ const IGNORED: [&str; 31] = [
     "call",
 ];
 
+/// Name that `usemtl` without a name gets for tobj, which would go on with the last material.
+const NO_MATERIAL: &str = "\u{1}";
+
 /// A checked OBJ file.
 #[derive(Debug, Default)]
 pub struct CleanObj {
@@ -122,6 +125,8 @@ pub struct CleanObj {
     pub unknown: Option<(usize, String)>,
     /// Line of the first normal or texture vertex that does not exist, and what is wrong with it, if there is any.
     pub missing: Option<(usize, String)>,
+    /// Line of the first face that is left out, and what is wrong with it, if there is any.
+    pub left_out: Option<(usize, String)>,
 }
 
 impl CleanObj {
@@ -129,7 +134,8 @@ impl CleanObj {
     pub fn bounds(&self) -> (Vec3, Vec3) {
         let point = |line: &str| {
             let mut numbers = line.split_ascii_whitespace().skip(1).flat_map(str::parse::<f32>);
-            Some(Vec3::new(numbers.next()?, numbers.next()?, numbers.next()?))
+            let point = Vec3::new(numbers.next()?, numbers.next()?, numbers.next()?);
+            point.is_finite().then_some(point)
         };
         bounds_of(self.text[0].par_lines().filter_map(point))
     }
@@ -144,11 +150,11 @@ impl CleanObj {
 /// Checks and rewrites the text of an OBJ file. `origin` is subtracted from its points. The error is a line, counted
 /// from 1, and what is wrong with it.
 pub fn clean_obj(text: &str, origin: DVec3) -> Result<CleanObj, (usize, String)> {
-    let (totals, largest_colour) = count(text);
+    let (totals, largest_colour, broken) = count(text);
     // Some writers state colours as 0 to 255.
     let colour_scale = if largest_colour.is_some_and(|largest| largest > 1.0) { 255.0 } else { 1.0 };
     let white = largest_colour.map(|_| colour_scale);
-    let mut cleaner = Cleaner { totals, white, origin, ..Cleaner::default() };
+    let mut cleaner = Cleaner { totals, white, broken, origin, ..Cleaner::default() };
     cleaner.out.colour_scale = colour_scale;
     for (line, statement) in statements(text) {
         cleaner.statement(line, &statement).map_err(|what| (line, what))?;
@@ -197,18 +203,55 @@ impl Counts {
     }
 }
 
-/// Returns the numbers of a file's elements, and the largest number in a point's colour if a point has one.
-fn count(text: &str) -> (Counts, Option<f32>) {
-    let (mut counts, mut largest_colour) = (Counts::default(), None);
+/// Elements with numbers such as NaN, which programs write for what they could not compute. Indices count from 1.
+#[derive(Clone, Debug, Default)]
+struct Broken {
+    positions: HashSet<usize>,
+    texcoords: HashSet<usize>,
+    normals: HashSet<usize>,
+}
+
+impl Broken {
+    /// Adds the element that has been counted last, if a number of it is NaN or infinite by its spelling.
+    fn add(&mut self, keyword: &str, rest: &str, counts: &Counts) {
+        if !is_broken(rest) {
+            return;
+        }
+        match keyword {
+            "v" => drop(self.positions.insert(counts.positions)),
+            "vt" => drop(self.texcoords.insert(counts.texcoords)),
+            "vn" => drop(self.normals.insert(counts.normals)),
+            _ => {}
+        }
+    }
+}
+
+/// Returns whether a number in `rest` is NaN or infinite by its spelling: `nan`, `-nan(ind)`, `inf`, `-1.#IND`.
+fn is_broken(rest: &str) -> bool {
+    let has_letters = |word: &str| word.bytes().any(|byte| matches!(byte | 0x20, b'n' | b'i'));
+    let is_broken = |word: &str| {
+        let word = word.trim_start_matches(['+', '-']).to_ascii_lowercase();
+        let of_windows = word.strip_prefix("1.#").is_some_and(|rest| rest.starts_with(['i', 'q', 's']));
+        of_windows || word == "inf" || word == "infinity" || word.starts_with("nan")
+    };
+    let words = || rest.split_whitespace().take_while(|word| !word.starts_with('#'));
+    has_letters(rest) && words().any(is_broken)
+}
+
+/// Returns the numbers of a file's elements, the largest number in a point's colour if a point has one, and the broken
+/// elements.
+fn count(text: &str) -> (Counts, Option<f32>, Broken) {
+    let (mut counts, mut largest_colour, mut broken) = (Counts::default(), None, Broken::default());
     for (_, statement) in statements(text) {
         let (keyword, rest) = split_keyword(&statement);
         counts.add(keyword);
+        broken.add(keyword, rest, &counts);
         if keyword == "v" && words(rest).count() >= 6 {
             let colour = words(rest).skip(3).take(3).flat_map(str::parse::<f32>);
             largest_colour = Some(colour.fold(largest_colour.unwrap_or(0.0), f32::max));
         }
     }
-    (counts, largest_colour)
+    (counts, largest_colour, broken)
 }
 
 /// Returns the words before a comment.
@@ -225,6 +268,7 @@ pub struct Cleaner {
     totals: Counts,
     /// The number that stands for 1 in colours, which points without colours get, if a point of the file has a colour.
     white: Option<f32>,
+    broken: Broken,
     /// Counts up to the current line, from which negative indices count back.
     seen: Counts,
     /// Point that is subtracted from all points.
@@ -247,6 +291,7 @@ impl Default for Cleaner {
         Self {
             totals: Counts::default(),
             white: None,
+            broken: Broken::default(),
             seen: Counts::default(),
             origin: DVec3::ZERO,
             flat: false,
@@ -266,19 +311,19 @@ impl Cleaner {
     pub fn statement(&mut self, line: usize, statement: &str) -> Checked<()> {
         let (keyword, rest) = split_keyword(statement);
         match keyword {
+            "v" | "vn" | "vt" if is_broken(rest) => self.broken_element(keyword),
             "v" => self.point(rest)?,
             "vn" => vector(&mut self.normals, "vn", rest, 3..=3)?,
             "vt" => self.texcoord(rest)?,
             "f" => self.face(line, words(rest))?,
             "s" => self.flat = matches!(rest, "off" | "0"),
-            "usemtl" if rest.is_empty() => return Err("usemtl names no material".to_owned()),
             "usemtl" => {
-                push(&mut self.faces, format_args!("usemtl {rest}\n"));
+                push(&mut self.faces, format_args!("usemtl {}\n", if rest.is_empty() { NO_MATERIAL } else { rest }));
                 if !self.out.used_materials.contains_key(rest) {
                     self.out.used_materials.insert(rest.to_owned(), line);
                 }
             }
-            "mtllib" if rest.is_empty() => return Err("mtllib names no file".to_owned()),
+            "mtllib" if rest.is_empty() => {}
             "mtllib" => self.out.libraries.push((line, rest.to_owned())),
             _ if IGNORED.contains(&keyword) => {}
             _ if statement.contains('\0') => return Err("this is no text file".to_owned()),
@@ -286,6 +331,18 @@ impl Cleaner {
         }
         self.seen.add(keyword);
         Ok(())
+    }
+
+    /// Adds an element that stands for a broken one, which no face uses.
+    fn broken_element(&mut self, keyword: &str) {
+        match (keyword, self.white) {
+            ("v", Some(white)) => {
+                push(&mut self.positions, format_args!("v nan nan nan {white} {white} {white}\n"));
+            }
+            ("v", None) => self.positions.push_str("v nan nan nan\n"),
+            ("vn", _) => self.normals.push_str("vn 0 0 0\n"),
+            _ => self.texcoords.push_str("vt 0 0\n"),
+        }
     }
 
     /// Adds a point. A weight (used by curves only) or a colour may follow it, and an opacity, which is ignored.
@@ -328,8 +385,15 @@ impl Cleaner {
             let corner = self.corner(line, word)?;
             self.corners.push(corner);
         }
-        if self.corners.len() < 3 {
-            return Err(format!("a face of {} corners: it needs 3 or more", self.corners.len()));
+        let broken = self.corners.iter().find(|(position, ..)| self.broken.positions.contains(position));
+        let what = match (self.corners.len(), broken) {
+            (0..3, _) => Some(format!("a face of {} corners: it needs 3 or more", self.corners.len())),
+            (_, Some((position, ..))) => Some(format!("vertex {position} is not finite")),
+            _ => None,
+        };
+        if let Some(what) = what {
+            self.out.left_out.get_or_insert((line, what));
+            return Ok(());
         }
         self.out.size.n_triangles += self.corners.len() as u64 - 2;
         let has_normals = self.corners.iter().all(|(.., normal)| normal.is_some());
@@ -391,6 +455,8 @@ impl Cleaner {
         };
         let texcoord = optional(texcoord, "texture vertex", (self.seen.texcoords, texcoords))?;
         let normal = optional(normal, "normal", (self.seen.normals, normals))?;
+        let texcoord = texcoord.filter(|ix| !self.broken.texcoords.contains(ix));
+        let normal = normal.filter(|ix| !self.broken.normals.contains(ix));
         Ok((position, texcoord, normal))
     }
 }
@@ -428,6 +494,9 @@ fn vector(out: &mut String, keyword: &str, rest: &str, counts: std::ops::RangeIn
         match word.parse::<f32>() {
             Ok(number) if number.is_finite() => {}
             Ok(_) => return Err(format!("`{word}` is not a finite number of single precision")),
+            Err(_) if word.replacen(',', ".", 1).parse::<f32>().is_ok() => {
+                return Err(format!("`{word}` is not a number: decimals need a point in place of the comma"));
+            }
             Err(_) => return Err(format!("`{word}` is not a number")),
         }
         if ix < n_written {

@@ -5,7 +5,9 @@ mod files;
 mod maps;
 mod model;
 mod mtl;
+mod polypaint;
 mod quick;
+mod two_sided;
 
 use std::{collections::HashMap, path::Path};
 
@@ -13,6 +15,7 @@ pub(super) use self::files::named_files;
 use self::{
     clean::{CleanObj, clean_obj},
     model::Model,
+    polypaint::with_polypaint,
     quick::{QuickObj, quick_obj},
 };
 use super::{
@@ -31,6 +34,13 @@ pub(super) struct ObjFile {
     content: ObjContent,
     /// The point of the file that is the origin of the points.
     origin: DVec3,
+}
+
+impl ObjFile {
+    /// Returns the number of points.
+    pub fn n_points(&self) -> usize {
+        self.content.clean().size.n_points as usize
+    }
 }
 
 /// What has been read in one of two ways.
@@ -55,6 +65,7 @@ pub(super) fn read_obj(
     origin: MeshOrigin,
     progress: &Progress,
 ) -> Result<ObjFile, SceneError> {
+    let text = with_polypaint(text);
     let first = origin.first();
     // The quick way keeps points as they are written.
     let quick = if first == DVec3::ZERO { quick_obj(&text, progress) } else { None };
@@ -106,6 +117,9 @@ pub(super) fn obj_mesh(path: &Path, file: ObjFile, loading: &mut Loading) -> Res
                 // The quick way has not found what is wrong with a number. The careful way finds it.
                 ObjContent::Quick(_) => careful(path, &text, origin)?,
             };
+            if let Some((line, what)) = &cleaned.left_out {
+                tracing::warn!("{}:{line}: {what}; such faces are left out", path.display());
+            }
             let models = parse(&cleaned, &by_name).map_err(|e| SceneError::file(path, e.to_string()))?;
             let models: Vec<Model> = models.iter().map(Model::of_tobj).collect();
             model::mesh(&models, no_material, by_kind)
@@ -124,7 +138,8 @@ fn used_materials(path: &Path, clean: &CleanObj, materials: &[Material]) -> Hash
         by_lower.entry(material.name.to_lowercase()).or_default().push(ix);
     }
     let (mut by_name, mut undefined, mut other_case) = (HashMap::new(), None, None);
-    for (name, line) in &clean.used_materials {
+    // `usemtl` without a name is for faces without a material.
+    for (name, line) in clean.used_materials.iter().filter(|(name, _)| !name.is_empty()) {
         let alike = by_lower.get(&name.to_lowercase()).map_or(&[][..], |alike| alike);
         // If several materials have the same name, the last one counts.
         let exact = alike.iter().rev().find(|ix| materials[**ix].name == *name);

@@ -27,6 +27,9 @@ use crate::util::text::escape_controls;
 /// Roughness of a material that states how metallic it is, and nothing about its roughness.
 const DEFAULT_ROUGHNESS: f32 = 0.5;
 
+/// Name of a material that has none.
+const NAMELESS: &str = "(nameless)";
+
 /// A material as its file describes it.
 #[derive(Debug)]
 struct Described {
@@ -90,8 +93,11 @@ pub fn load_libraries(
 
 fn load_library(reach: Reach, path: &Path, images: &mut Images) -> Result<Vec<Described>, SceneError> {
     let text = read_lossy(path)?;
-    let clean = clean_mtl(&text).map_err(|(line, what)| SceneError::line(path, line, what))?;
-    let more = read_more(reach, path, &text, images).map_err(|(line, what)| SceneError::line(path, line, what))?;
+    let (clean, left_out) = clean_mtl(&text);
+    for (line, what) in left_out {
+        tracing::warn!("{}:{line}: {}; the statement is left out", shown(path), what.escape_debug());
+    }
+    let more = read_more(reach, path, &text, images);
     let (materials, _) =
         tobj::load_mtl_buf(&mut clean.as_bytes()).map_err(|e| SceneError::file(path, e.to_string()))?;
     let described = |(material, more): (tobj::Material, More)| Described {
@@ -122,6 +128,7 @@ fn as_meant(path: &Path, described: &mut [Described]) {
             (spec.d, spec.tr) = (None, None);
             invisible.push(name.as_str());
         }
+        tint_glass(spec, more);
     }
     let warn = |names: &[&str], what: &str| {
         let Some(first) = names.first() else { return };
@@ -130,6 +137,30 @@ fn as_meant(path: &Path, described: &mut [Described]) {
     };
     warn(&invisible, "would be invisible by `d 0` or `Tr 1`: shown opaque");
     warn(&no_glass, "would be glass by `illum`, but no other term says so: shown opaque; `Ni 1.5` would make it glass");
+}
+
+/// Takes the diffuse and the ambient light from glass. Its `Kd` is the colour in which things are seen through it. A ray
+/// passes two boundaries, so each has the square root of that colour. Glass with an image keeps its `Kd`, since the
+/// image would be lost.
+fn tint_glass(spec: &mut MaterialSpec, more: &More) {
+    let is_glass = matches!(spec.illum, Some(4 | 6 | 7 | 9)) && !is_physically_based(more);
+    let has_image = more.maps.iter().any(|map| map.term == Term::BaseColour);
+    let kd = spec.kd.unwrap_or([0.0; 3]);
+    let is_in_range = kd.iter().all(|x| *x >= 0.0);
+    if !is_glass || has_image || !is_in_range {
+        return;
+    }
+    if spec.tf.is_none_or(|tf| tf == [1.0; 3]) && kd != [0.0; 3] {
+        spec.tf = Some(kd.map(|x| x.min(1.0).sqrt()));
+    }
+    (spec.kd, spec.ka) = (Some([0.0; 3]), Some([0.0; 3]));
+}
+
+/// Returns whether a material is one of microfacets.
+fn is_physically_based(more: &More) -> bool {
+    more.numbers.contains_key("Pr")
+        || more.numbers.contains_key("Pm")
+        || more.maps.iter().any(|map| matches!(map.term, Term::Roughness | Term::Metallic))
 }
 
 /// Returns the path of a file that another one names, without characters that a terminal would obey.
@@ -155,7 +186,7 @@ fn is_transparent(spec: &MaterialSpec, more: &More) -> bool {
 
 /// Reads the maps and the physically based terms, one entry for each material. Warns of terms and maps that are not
 /// shown: once for each kind, and once for each file that is missing or has another name.
-fn read_more(reach: Reach, path: &Path, text: &str, images: &mut Images) -> Result<Vec<More>, (usize, String)> {
+fn read_more(reach: Reach, path: &Path, text: &str, images: &mut Images) -> Vec<More> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let (mut materials, mut is_replaced): (Vec<More>, bool) = (Vec::new(), false);
     let mut told: HashSet<String> = HashSet::new();
@@ -173,7 +204,8 @@ fn read_more(reach: Reach, path: &Path, text: &str, images: &mut Images) -> Resu
         }
         let Some(material) = materials.last_mut() else { continue };
         if matches!(keyword, "Pr" | "Pm" | "Ps" | "Pc" | "Pcr") {
-            let number = fraction(keyword, rest).map_err(|what| (line, what))?;
+            // A number that is none has been told by `clean_mtl`.
+            let Ok(number) = fraction(keyword, rest) else { continue };
             material.numbers.insert(keyword.to_owned(), number);
             // The roughness of the clearcoat says nothing without a clearcoat.
             if matches!(keyword, "Ps" | "Pc") && number > 0.0 {
@@ -205,7 +237,7 @@ fn read_more(reach: Reach, path: &Path, text: &str, images: &mut Images) -> Resu
             }
         }
     }
-    Ok(materials)
+    materials
 }
 
 /// Returns the first number, clamped to 0 to 1.
@@ -237,14 +269,16 @@ fn warn_of_image(path: &Path, map: &Map, what: &str) {
     tracing::warn!("{}:{}: the image is not shown: {}", shown(path), map.line, what.escape_debug());
 }
 
-/// Makes a material. A colour that is stated by its map alone is white.
+/// Makes a material. A colour that is stated by its map alone is white. So is a black `Kd` or `Ke` beside its map, as
+/// the map would never be seen: Maya writes `Kd 0 0 0` for each material with an image.
 fn material(described: &Described, images: &mut Images) -> Checked<Material> {
     let Described { spec, name, path, more } = described;
     let mut spec = spec.clone();
     let maps = || more.maps.iter().filter(|map| images.get(map.file).is_ok());
     let has_map = |term: Term| maps().any(|map| map.term == term);
     let white = |colour: &mut Option<[f32; 3]>, term: Term| {
-        if colour.is_none() && has_map(term) {
+        let is_black = term != Term::Specular && *colour == Some([0.0; 3]);
+        if (colour.is_none() || is_black) && has_map(term) {
             *colour = Some([1.0; 3]);
         }
     };
@@ -287,31 +321,39 @@ fn material(described: &Described, images: &mut Images) -> Checked<Material> {
     Ok(material)
 }
 
-/// Returns the statements of the terms that are rendered. Numbers are checked and greys are written as three numbers.
-/// Maps and all other statements are left out.
-fn clean_mtl(text: &str) -> Result<String, (usize, String)> {
-    let mut clean = String::new();
+/// Returns the statements of the terms that are rendered. Greys are written as three numbers. Maps and all other
+/// statements are left out, and so are wrong ones, which are returned with their lines and what is wrong with them.
+fn clean_mtl(text: &str) -> (String, Vec<(usize, String)>) {
+    let (mut clean, mut left_out) = (String::new(), Vec::new());
     for (line, statement) in statements(text) {
         let (keyword, rest) = split_keyword(&statement);
         let cleaned = match keyword {
-            "newmtl" if rest.is_empty() => Err("newmtl names no material".to_owned()),
+            "newmtl" if rest.is_empty() => Ok(NAMELESS.to_owned()),
             "newmtl" => Ok(rest.to_owned()),
             "Ka" | "Kd" | "Ks" | "Ke" | "Tf" => rgb(keyword, rest),
             "Ns" | "Ni" | "d" | "Tr" => number(keyword, rest),
             "illum" => illum(rest),
+            "Pr" | "Pm" | "Ps" | "Pc" | "Pcr" => match fraction(keyword, rest) {
+                Ok(_) => continue,
+                Err(what) => Err(what),
+            },
             _ => continue,
         };
-        let cleaned = cleaned.map_err(|what| (line, what))?;
-        writeln!(clean, "{keyword} {cleaned}").expect("a String takes what it is given");
+        match cleaned {
+            Ok(cleaned) => writeln!(clean, "{keyword} {cleaned}").expect("a String takes what it is given"),
+            Err(what) => left_out.push((line, what)),
+        }
     }
-    Ok(clean)
+    (clean, left_out)
 }
 
 /// Returns `r g b`. One number alone is a grey.
 fn rgb(keyword: &str, rest: &str) -> Checked<String> {
     let parts: Vec<&str> = words(rest).collect();
     for part in &parts {
-        finite(keyword, part)?;
+        if finite(keyword, part)? < 0.0 {
+            return Err(format!("{keyword} `{part}` is below 0"));
+        }
     }
     match parts[..] {
         [grey] => Ok([grey, grey, grey].join(" ")),
@@ -323,14 +365,22 @@ fn rgb(keyword: &str, rest: &str) -> Checked<String> {
 fn number(keyword: &str, rest: &str) -> Checked<String> {
     let mut parts = words(rest);
     // `d -halo x` is an opacity that varies with the angle of view; x is its value where the surface faces the eye.
-    let number = parts.find(|part| *part != "-halo").unwrap_or_default();
-    finite(keyword, number)?;
-    Ok(number.to_owned())
+    let word = parts.find(|part| *part != "-halo").unwrap_or_default();
+    let number = finite(keyword, word)?;
+    let range = match keyword {
+        "Ns" => 0.0..=1e6,
+        "Ni" if number != 0.0 => 0.001..=100.0,
+        _ => 0.0..=1.0,
+    };
+    match range.contains(&number) {
+        true => Ok(word.to_owned()),
+        false => Err(format!("{keyword} = {number} is outside {} to {}", range.start(), range.end())),
+    }
 }
 
 fn illum(rest: &str) -> Checked<String> {
-    match words(rest).next().unwrap_or_default().parse::<u8>() {
-        Ok(illum @ 0..=10) => Ok(illum.to_string()),
+    match words(rest).next().unwrap_or_default().parse::<f32>() {
+        Ok(illum) if (0.0..=10.0).contains(&illum) && illum.fract() == 0.0 => Ok(illum.to_string()),
         _ => Err(format!("illum `{rest}` is not one of 0 to 10")),
     }
 }

@@ -513,8 +513,7 @@ mod tests {
             "f 1 2 99999999999999999999",
             "f 1 2 +3",
             "f 1 2 3 # a comment",
-            "usemtl",
-            "mtllib",
+            "vn nan 0 -nan(ind)",
         ] {
             assert!(quick_obj(&format!("{start}{unusual}\n"), &Progress::default()).is_none(), "{unusual}");
         }

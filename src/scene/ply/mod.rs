@@ -7,6 +7,7 @@ mod quick;
 mod vertex;
 
 use std::{
+    borrow::Cow,
     io::{self, BufRead, BufReader, Read},
     path::{Path, PathBuf},
 };
@@ -17,7 +18,7 @@ use serde::Deserialize;
 use serde_ply::{DeserializeError, ElementDef, PlyFormat, PlyHeader, PlyProperty, PlyReader, PropertyType, ScalarType};
 
 use self::{
-    quick::{quick_triangles, quick_vertices},
+    quick::{header_bytes, quick_triangles, quick_vertices},
     vertex::{Vertices, upper_left},
 };
 use super::{
@@ -65,6 +66,8 @@ const INDICES: [&str; 2] = ["vertex_indices", "vertex_index"];
 /// The rest of a file's content. It reports the bytes that have been read.
 struct Counted<'a> {
     rest: &'a [u8],
+    /// What follows `rest`.
+    then: &'a [u8],
     meter: Meter<'a>,
     n_unreported: usize,
 }
@@ -73,8 +76,17 @@ impl<'a> Counted<'a> {
     /// Number of bytes between two reports.
     const REPORTED_BYTES: usize = 1 << 20;
 
-    fn new(bytes: &'a [u8], progress: &'a Progress) -> Self {
-        Self { rest: bytes, meter: progress.begin(Work::Reading, bytes.len() as u64), n_unreported: 0 }
+    /// Joins two parts. Numbers in binary form must not be cut by the parts.
+    fn new(first: &'a [u8], then: &'a [u8], progress: &'a Progress) -> Self {
+        let n_bytes = (first.len() + then.len()) as u64;
+        Self { rest: first, then, meter: progress.begin(Work::Reading, n_bytes), n_unreported: 0 }
+    }
+
+    /// Goes on to the second part at the end of the first one.
+    fn go_on(&mut self) {
+        if self.rest.is_empty() {
+            self.rest = std::mem::take(&mut self.then);
+        }
     }
 
     fn count(&mut self, n: usize) {
@@ -87,12 +99,14 @@ impl<'a> Counted<'a> {
 
 impl Read for Counted<'_> {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        self.go_on();
         let n = self.rest.read(out)?;
         self.count(n);
         Ok(n)
     }
 
     fn read_exact(&mut self, out: &mut [u8]) -> io::Result<()> {
+        self.go_on();
         self.rest.read_exact(out)?;
         self.count(out.len());
         Ok(())
@@ -101,6 +115,7 @@ impl Read for Counted<'_> {
 
 impl BufRead for Counted<'_> {
     fn fill_buf(&mut self) -> io::Result<&[u8]> {
+        self.go_on();
         Ok(self.rest)
     }
 
@@ -127,6 +142,10 @@ pub(super) struct PlyMesh {
     names: Vec<String>,
     /// Whether normals depend on the crease angle.
     uses_crease: bool,
+    /// Number of faces that are left out, since their corners are not finite.
+    n_left_out: usize,
+    /// As in [`Vertices`].
+    would_be_invisible: bool,
 }
 
 /// Makes a mesh of a file's content. `n_loaded`: the number of triangles that the scene has already.
@@ -136,7 +155,8 @@ pub(super) fn ply_mesh(
     n_loaded: usize,
     progress: &Progress,
 ) -> Checked<PlyMesh> {
-    let mut reader = PlyReader::from_reader(Counted::new(bytes, progress))
+    let (head, rest) = widened(bytes);
+    let mut reader = PlyReader::from_reader(Counted::new(&head, rest, progress))
         .map_err(|error| format!("is no PLY file: {}", text(&error)))?;
     let header = reader.header().clone();
     check(&header.elem_defs)?;
@@ -146,8 +166,29 @@ pub(super) fn ply_mesh(
     require_for_mesh(n_loaded as u64, &elements.size())?;
     let names: Vec<String> = texture_files(&header.comments).map(str::to_owned).collect();
     let uses_crease = shading.smooth && elements.vertices.normals.is_empty();
-    let mesh = mesh(elements, names.len(), shading)?;
-    Ok(PlyMesh { mesh, names, uses_crease })
+    let would_be_invisible = elements.vertices.would_be_invisible;
+    let (mesh, n_left_out) = mesh(elements, names.len(), shading)?;
+    Ok(PlyMesh { mesh, names, uses_crease, n_left_out, would_be_invisible })
+}
+
+/// Returns a file in two parts, the first of which is the header or empty. In a text, coordinates may have more digits
+/// than single precision holds, whatever their type, as maps have. So the header declares them as double precision.
+fn widened(bytes: &[u8]) -> (Cow<'_, [u8]>, &[u8]) {
+    let as_it_is = (Cow::Borrowed(&bytes[..0]), bytes);
+    let Some(header) = header_bytes(bytes).and_then(|n| str::from_utf8(&bytes[..n]).ok()) else { return as_it_is };
+    let is_text = header.lines().any(|line| line.split_ascii_whitespace().take(2).eq(["format", "ascii"]));
+    if !is_text {
+        return as_it_is;
+    }
+    let widened = |line: &str| {
+        let words: Vec<&str> = line.split_ascii_whitespace().collect();
+        match words[..] {
+            ["property", kind @ ("float" | "float32"), "x" | "y" | "z"] => line.replacen(kind, "double", 1),
+            _ => line.to_owned(),
+        }
+    };
+    let head: String = header.split_inclusive('\n').map(widened).collect();
+    (Cow::Owned(head.into_bytes()), &bytes[header.len()..])
 }
 
 impl PlyMesh {
@@ -158,7 +199,13 @@ impl PlyMesh {
 
     /// Reads the images that the file names.
     pub fn with_materials(self, path: &Path, access: Access, images: &mut Images) -> Loaded {
-        let Self { mesh, names, uses_crease } = self;
+        let Self { mesh, names, uses_crease, n_left_out, would_be_invisible } = self;
+        if would_be_invisible {
+            tracing::warn!("{}: the opacity of all vertices is 0: shown opaque", path.display());
+        }
+        if n_left_out > 0 {
+            tracing::warn!("{}: {n_left_out} faces are left out, since their corners are not finite", path.display());
+        }
         let materials = if mesh.uvs[0].is_empty() { Vec::new() } else { materials(path, &names, access, images) };
         Loaded { mesh, origin: DVec3::ZERO, materials, uses_crease }
     }
@@ -289,12 +336,20 @@ fn check(elements: &[ElementDef]) -> Checked<()> {
     }
     match element("face").or(element("tristrips")) {
         Some(_) => Ok(()),
-        None => Err("has no element `face`: clouds of points have no triangles".to_owned()),
+        None if vertex.has_property("f_dc_0") => {
+            Err("has Gaussian splats, which are not shown: no element `face`".to_owned())
+        }
+        None => Err(format!(
+            "has no element `face`: it is a cloud of {} points, without triangles to show. MeshLab, for example, \
+             makes a mesh of it",
+            vertex.count
+        )),
     }
 }
 
-/// Makes the mesh. `n_images`: the number of images that polygons can show.
-fn mesh(elements: Elements, n_images: usize, shading: Shading) -> Checked<Mesh> {
+/// Makes the mesh, without faces whose corners are not finite, and returns their number. `n_images`: the number of
+/// images that polygons can show.
+fn mesh(elements: Elements, n_images: usize, shading: Shading) -> Checked<(Mesh, usize)> {
     let Elements { vertices, triangles, polygons, strips } = elements;
     let mut mesh = Mesh { slots: vec![0; triangles.len()], faces: triangles, ..Mesh::default() };
     let has_own_uvs = |polygon: &Polygon| polygon.texcoord.len() == 2 * polygon.vertex_indices.len();
@@ -343,12 +398,13 @@ fn mesh(elements: Elements, n_images: usize, shading: Shading) -> Checked<Mesh> 
     if !vertices.colours.is_empty() {
         mesh.colours = mesh.faces.par_iter().map(|face| face.map(|ix| vertices.colours[ix as usize])).collect();
     }
+    mesh.positions = vertices.positions;
+    let n_left_out = mesh.leave_out_broken_faces();
     mesh.normals = match shading.smooth && !vertices.normals.is_empty() {
         true => mesh.faces.par_iter().map(|face| face.map(|ix| vertices.normals[ix as usize])).collect(),
-        false => smooth_normals(&vertices.positions, &mesh.faces, shading),
+        false => smooth_normals(&mesh.positions, &mesh.faces, shading),
     };
-    mesh.positions = vertices.positions;
-    Ok(mesh)
+    Ok((mesh, n_left_out))
 }
 
 /// Refuses indices that are no vertices.

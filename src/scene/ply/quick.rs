@@ -120,7 +120,7 @@ fn is_usual(face: &ElementDef) -> bool {
 }
 
 /// Returns the number of bytes of the header.
-fn header_bytes(bytes: &[u8]) -> Option<usize> {
+pub fn header_bytes(bytes: &[u8]) -> Option<usize> {
     const END: &[u8] = b"\nend_header";
     let end = bytes.windows(END.len()).position(|part| part == END)? + END.len();
     match bytes[end..] {
@@ -184,7 +184,7 @@ mod tests {
         ] {
             let bytes = vertices(&properties, &numbers(16)[..2 * n_bytes]);
             let progress = Progress::default();
-            let mut reader = PlyReader::from_reader(Counted::new(&bytes, &progress)).unwrap();
+            let mut reader = PlyReader::from_reader(Counted::new(&bytes, &[], &progress)).unwrap();
             let header = reader.header().clone();
             let slow = Vertices::read(&mut reader, &header.elem_defs[0], origin).unwrap();
             let quick = quick_vertices(&bytes, &header, origin).unwrap();

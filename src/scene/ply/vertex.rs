@@ -21,6 +21,8 @@ pub struct Vertices {
     pub normals: Vec<Vec3>,
     /// Linear RGB and opacity.
     pub colours: Vec<Vec4>,
+    /// Whether all opacities of the file are 0, which then count as 1: the surface would never be seen.
+    pub would_be_invisible: bool,
     /// Texture coordinates, (0, 0) at the upper left corner of the image.
     pub uvs: Vec<Vec2>,
 }
@@ -135,6 +137,8 @@ impl Vertices {
         if let Some(red) = red {
             let has_alpha = ["alpha", "diffuse_alpha", "a"].iter().any(has);
             let colours = painted.iter().map(|p| Vec4::from_slice(&p.1[Property::Red as usize..]));
+            vertices.would_be_invisible = has_alpha && colours.clone().all(|colour| colour.w == 0.0);
+            let has_alpha = has_alpha && !vertices.would_be_invisible;
             let one = largest_colour(element, red, colours.clone());
             let linear = |colour: Vec4| {
                 let rgb = Vec3::from_array((colour.truncate() / one).to_array().map(linear_of_srgb));
