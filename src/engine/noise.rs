@@ -70,8 +70,7 @@ pub struct NoisePicture {
 /// Draws samples of tiles, all of which get equally many.
 pub(super) type DrawTiles<'a> = dyn FnMut(&[TileSamples]) -> Result<DrawnTiles, GpuError> + 'a;
 
-/// Number of tiles with which a device has enough to do: 16 samples of each of their pixels are two million paths, as
-/// many as a frame traces together.
+/// Number of tiles with which a device has enough to do: 16 samples of each of their pixels are two million paths.
 const ENOUGH_TILES: usize = 512;
 
 /// Returns into how many blocks the samples of each tile are divided, which are drawn together: a power of two.

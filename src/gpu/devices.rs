@@ -66,6 +66,10 @@ pub struct Limits {
     pub target_size: u32,
     /// Greatest number of workgroups along x in a dispatch.
     pub n_groups: u32,
+    /// Size of the memory that is local to the device, bytes.
+    pub memory_bytes: u64,
+    /// Whether the device is a CPU.
+    pub is_cpu: bool,
 }
 
 impl Limits {
@@ -86,6 +90,8 @@ impl Limits {
                 .min(limits.max_framebuffer_height)
                 .min(limits.max_image_dimension2_d),
             n_groups: limits.max_compute_work_group_count[0],
+            memory_bytes: memory_bytes(instance, device),
+            is_cpu: all.properties.device_type == vk::PhysicalDeviceType::CPU,
         }
     }
 

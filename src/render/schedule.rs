@@ -12,8 +12,15 @@ use crate::{
 /// Upper limit of the queue's capacity, in rays, unless the caller sets the capacity. This number of rays keeps any
 /// device busy. They take some 100 bytes each, 1.7 GB together, which fits well into memory.
 const MOST_RAYS: u64 = 1 << 24;
-/// The same limit for paths, which take some 140 bytes each. A dispatch traces all of them, and their segments.
-const MOST_PATHS: u64 = 1 << 21;
+/// The same limit for paths. A dispatch traces all of them, and their segments. On an H200, batches of 2^24 paths are
+/// 10 to 40 % faster than those of 2^21: a dispatch ends with its slowest paths, and late bounces have few paths.
+const MOST_PATHS: u64 = 1 << 24;
+/// The number of paths of a batch on a device without much memory, or on a CPU, which has no use for more.
+const FEW_PATHS: u64 = 1 << 21;
+/// What a path takes in the queue's buffers, bytes.
+const PATH_BYTES: u64 = 140;
+/// The part of a device's memory that paths may take is 1 / this.
+const MEMORY_PER_PATHS: u64 = 8;
 
 /// The batches of a frame, and the objects whose size depends on their number.
 pub struct Schedule {
@@ -118,7 +125,7 @@ impl QueueSizing {
             let most = limits.storage_range / size_of::<PathRay>() as u64;
             let most_in_groups = u64::from(limits.n_groups) * u64::from(RAY_GROUP_SIZE) / 2;
             let wanted = n_pixels << MOST_SAMPLES_LOG2;
-            return wanted.min(MOST_PATHS).min(most).min(most_in_groups).max(1 << MOST_SAMPLES_LOG2) as u32;
+            return wanted.min(most_paths(limits)).min(most).min(most_in_groups).max(1 << MOST_SAMPLES_LOG2) as u32;
         }
         // The largest buffer of the queue is `rays` or `light_visibility`.
         let bytes_per_ray = mem::size_of::<PathRay>().max(4 * constants.n_lights as usize) as u64;
@@ -150,19 +157,45 @@ impl QueueSizing {
     }
 }
 
+/// Returns the number of paths of a batch that the device should get, if the picture has so many. Pictures have the same
+/// bits whatever it is.
+fn most_paths(limits: &Limits) -> u64 {
+    if limits.is_cpu {
+        return FEW_PATHS;
+    }
+    (limits.memory_bytes / MEMORY_PER_PATHS / PATH_BYTES).clamp(FEW_PATHS, MOST_PATHS)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    const LIMITS: Limits = Limits {
+        storage_range: 1 << 27,
+        n_texels: 1 << 27,
+        buffer_bytes: u64::MAX,
+        target_size: 16_384,
+        n_groups: 65_535,
+        memory_bytes: 1 << 33,
+        is_cpu: false,
+    };
+
+    #[test]
+    fn a_batch_of_paths_grows_with_the_memory() {
+        let capacity = |memory_bytes: u64, is_cpu: bool| {
+            let limits = Limits { storage_range: u64::MAX, n_groups: u32::MAX, memory_bytes, is_cpu, ..LIMITS };
+            let sizing = QueueSizing { fixed_capacity: None, branches: false, of_paths: true };
+            sizing.queue_capacity(&limits, &Frame { width: 1024, height: 1024, ..Frame::default() })
+        };
+        assert_eq!(capacity(1 << 40, false), 1 << 24);
+        assert_eq!(capacity(1 << 33, false), ((1_u64 << 30) / PATH_BYTES) as u32);
+        assert_eq!(capacity(1 << 28, false), 1 << 21);
+        assert_eq!(capacity(1 << 40, true), 1 << 21);
+    }
+
     #[test]
     fn batches_have_room_for_their_rays() {
-        let limits = Limits {
-            storage_range: 1 << 27,
-            n_texels: 1 << 27,
-            buffer_bytes: u64::MAX,
-            target_size: 16_384,
-            n_groups: 65_535,
-        };
+        let limits = LIMITS;
         for (width, height, max_depth) in [(1, 1, 1), (1024, 768, 5), (3840, 2160, 8), (7, 9, 64)] {
             for (branches, fixed_capacity) in [(false, None), (true, None), (true, Some(50))] {
                 let budget = QueueSizing { fixed_capacity, branches, of_paths: false };
