@@ -80,7 +80,7 @@ impl Limits {
         let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut of_1_1).push_next(&mut of_1_3);
         // SAFETY: the device belongs to the instance, and Vulkan 1.3 defines both structs.
         unsafe { instance.raw.get_physical_device_properties2(device, &mut all) };
-        let limits = all.properties.limits;
+        let vk::PhysicalDeviceProperties { limits, device_type, .. } = all.properties;
         Self {
             storage_range: u64::from(limits.max_storage_buffer_range),
             n_texels: limits.max_texel_buffer_elements,
@@ -91,7 +91,7 @@ impl Limits {
                 .min(limits.max_image_dimension2_d),
             n_groups: limits.max_compute_work_group_count[0],
             memory_bytes: memory_bytes(instance, device),
-            is_cpu: all.properties.device_type == vk::PhysicalDeviceType::CPU,
+            is_cpu: device_type == vk::PhysicalDeviceType::CPU,
         }
     }
 
