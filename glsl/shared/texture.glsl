@@ -103,8 +103,8 @@ vec4 sample_texture(Texture map, vec2 uv, float lod) {
     uint steps = lod > 0.0 ? uint(min(lod, float(map.n_levels - 1u)) * 256.0 + 0.5) : 0u;
     uint level = steps >> 8u;
     float share = float(steps & 255u) * (1.0 / 256.0);
-    // Where the share is 0, the second level need not exist. Paths leave its turn of the loop out there. Whitted's shadow
-    // rays are 7 % faster with two turns in any case, which the driver unrolls.
+    // Where the share is 0, the second level need not exist. Paths leave its turn of the loop out there. Whitted's
+    // shadow rays are 7 % faster with two turns in any case, which the driver unrolls.
     bool needs_one = share == 0.0;
     uint n_turns = PATHS && needs_one ? 1u : 2u;
     vec4 levels[2];

@@ -16,8 +16,8 @@ impl<T> Part<'_, T> {
     }
 }
 
-/// Splits an array into the parts that the chunks of a list of paths need. `live`: indices of paths, in ascending order.
-/// `chunk_size`: number of paths of each chunk but the last.
+/// Splits an array into the parts that the chunks of a list of paths need. `live`: indices of paths, in ascending
+/// order. `chunk_size`: number of paths of each chunk but the last.
 ///
 /// # Panics
 /// The indices do not ascend from chunk to chunk, or the array is too short for one.

@@ -15,7 +15,8 @@ use crate::{
     layout::{Hit, NO_TRIANGLE, PathRay, PathState, SEGMENT_NONE, Segment},
 };
 
-/// Writes the closest hits of the paths `live`, which are in ascending order, to `hits`. Returns how many of them hit something.
+/// Writes the closest hits of the paths `live`, which are in ascending order, to `hits`. Returns how many of them hit
+/// something.
 pub fn closest_hits(
     inputs: &KernelInputs,
     traversal: Traversal,
@@ -48,8 +49,8 @@ pub fn closest_hits_by<T: Tracer>(
     chunks.map_init(|| T::new(inputs, traversal), |tracer, (live, hits)| trace(tracer, live, hits)).sum()
 }
 
-/// Tests the segments of the paths `live`, which were alive at the bounce before and are in ascending order. Light that arrives is added to the
-/// paths' states, and the segments are removed. Returns how many there were.
+/// Tests the segments of the paths `live`, which were alive at the bounce before and are in ascending order. Light that
+/// arrives is added to the paths' states, and the segments are removed. Returns how many there were.
 pub fn segments(
     inputs: &KernelInputs,
     traversal: Traversal,

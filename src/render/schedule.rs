@@ -157,8 +157,8 @@ impl QueueSizing {
     }
 }
 
-/// Returns the number of paths of a batch that the device should get, if the picture has so many. Pictures have the same
-/// bits whatever it is.
+/// Returns the number of paths of a batch that the device should get, if the picture has so many. Pictures have the
+/// same bits whatever it is.
 fn most_paths(limits: &Limits) -> u64 {
     if limits.is_cpu {
         return FEW_PATHS;

@@ -103,7 +103,8 @@ void set_lambert(inout BsdfTerms terms, GgxAlbedo albedo, float roughness) {
     if ((material.flags & MATERIAL_SINGLE_SCATTERING) == 0u && mean.loss > 0.0) {
         later = later_bounces(mean_reflectance(at_normal, at_grazing), mean.loss);
         later_metal = later_bounces(mean_reflectance(metal_fresnel(material, 1.0), vec3(1.0)), mean.loss);
-        terms.between = with_metal(material, (1.0 - material.transmission) * later, later_metal) * (albedo.loss / mean.loss);
+        vec3 share = with_metal(material, (1.0 - material.transmission) * later, later_metal);
+        terms.between = share * (albedo.loss / mean.loss);
     }
     terms.dielectric = vec3(largest_of(at_normal), at_grazing.x, largest_of(later));
     float left = 1.0 - dielectric_albedo(terms.dielectric, albedo);

@@ -1,5 +1,5 @@
-// The kinds of emitters of a scene. What depends on a kind that the scene lacks is left out when the driver compiles the
-// kernel, which saves registers, and time on drivers that run both sides of a branch.
+// The kinds of emitters of a scene. What depends on a kind that the scene lacks is left out when the driver compiles
+// the kernel, which saves registers, and time on drivers that run both sides of a branch.
 //
 // Needs nothing. Provides `has_emitters`, `has_shapes` and `HAS_ENVIRONMENT_MAP`.
 #ifndef KDRAY_EMITTER_KINDS

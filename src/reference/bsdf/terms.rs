@@ -1,5 +1,5 @@
-//! What all lobes need that depends on the material and the viewer: the layers' shares, and the probabilities with which
-//! the lobes are chosen. Twin of `bsdf/terms.glsl`.
+//! What all lobes need that depends on the material and the viewer: the layers' shares, and the probabilities with
+//! which the lobes are chosen. Twin of `bsdf/terms.glsl`.
 
 use glam::{Vec3, Vec4};
 

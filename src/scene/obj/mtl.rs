@@ -139,8 +139,8 @@ fn as_meant(path: &Path, described: &mut [Described]) {
     warn(&no_glass, "would be glass by `illum`, but no other term says so: shown opaque; `Ni 1.5` would make it glass");
 }
 
-/// Takes the diffuse and the ambient light from glass. Its `Kd` is the colour in which things are seen through it. A ray
-/// passes two boundaries, so each has the square root of that colour. Glass with an image keeps its `Kd`, since the
+/// Takes the diffuse and the ambient light from glass. Its `Kd` is the colour in which things are seen through it. A
+/// ray passes two boundaries, so each has the square root of that colour. Glass with an image keeps its `Kd`, since the
 /// image would be lost.
 fn tint_glass(spec: &mut MaterialSpec, more: &More) {
     let is_glass = matches!(spec.illum, Some(4 | 6 | 7 | 9)) && !is_physically_based(more);
