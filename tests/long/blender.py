@@ -1,7 +1,7 @@
-"""What `cycles.py` and `geometry.py` share: Blender as a module, runs of kdray, and the command line.
+"""What the scripts with Blender share: Blender as a module, runs of kdray, and the command line.
 
 This module has to be imported before `bpy`. Blender has a module `cycles` of its own, and would otherwise find the
-script of that name, which is in the same folder.
+script of that name, which is in the same folder. A script that needs other modules of the folder imports them before.
 """
 
 import argparse
