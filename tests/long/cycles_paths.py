@@ -5,7 +5,7 @@ Needs from PyPI, in Python 3.11: bpy==4.5.15, numpy, OpenEXR, pillow. Usage:
     python3 tests/long/cycles_paths.py KDRAY [--keep FOLDER] [--cpu] [--only NAME,NAME]
 
 Each case is a small scene that this script makes in Blender, with all light: any number of reflections, soft shadows,
-rough glass. Blender exports its meshes and materials as .glb, and `path_scenes.py` writes camera, lights and
+rough glass. Blender exports its meshes and materials as .glb, and `path_files.py` writes camera, lights and
 environment into a scene file of kdray's. With --keep, the files and the pictures stay in FOLDER. NAME.png shows kdray
 on the left, the reference in the middle, and on the right where kdray is brighter (red) or darker (blue), with full
 colour from 5 % on.
@@ -20,7 +20,22 @@ numerically: a ball in white surroundings shows its albedo. All others are compa
 not the same by definition, a case allows for a relative difference of tiles:
 
 | cases | allowed | reason |
-|---|---|---|
+|---|---:|---|
+| `coat` | 2 % | glTF and kdray have Schlick's approximation of the coat's reflectance, Cycles has the exact one. Where the view and the normal enclose 55 degrees, the coat's albedo differs by 18 % |
+| `metal` | 0.5 % | light that bounces between microfacets is added by approximations of each program's own |
+| `metal_albedo` | 0.2 % | kdray's albedos of microfacets are polynomials |
+
+Further differences of the models, and what the cases do about them:
+
+| cases | difference |
+|---|---|
+| `area` | light passes through lamps in Cycles, and not in kdray. A black card is behind the lamp |
+| `spot` | glTF's edge is soft over 0.001 of the cosine, Cycles's is sharp. Cycles gets a cone of the same light |
+| `metal` | Cycles spreads the light of further bounces as the first one's, kdray as a Lambertian surface does, so that a ball by daylight differs by up to 7 %. In white surroundings, only the sum counts |
+| `thin_glass` | Cycles's material has no thin sheets. The case makes one of Cycles's simple closures, after glTF's formula |
+| `glass` | a rough boundary of Cycles's passes on more light than the formula of single scattering: with roughness 0.4 by 0.8 % to 4 % from inside. The case has roughness 0.2, and `glass_albedo` and `glass_inside` compare a rougher boundary with the formula |
+| `glass` | Cycles's formula of absorption has another parameter, which is computed from glTF's |
+| `sheen_albedo` | glTF and kdray have the fibres of Estevez and Kulla. Cycles has those of Zeltner, Burley, Chiang (2022) and of Ashikhmin, but not these |
 """
 
 import math
@@ -32,11 +47,13 @@ from functools import partial
 # These imports have to come first.
 from reference.statistics import compare
 import path_albedos
+import path_files
 import path_scenes
 from in_blender import absorption_of_gltf, encoded, principled, read_exr, render_cycles, write_sheet
-from path_albedos import clear_layer, dielectric, metal, sheen
-from path_albedos import thin_sheet as thin_sheet_albedo
-from path_scenes import SIZE, coated, gold, in_white, on_floor, plastic, cloth, FROSTED, GOLD, PLASTIC
+from path_albedos import boundary, clear_layer, dielectric, metal, of_ball, of_plane, sheen, sheet
+from path_scenes import FROSTED, GOLD, PLASTIC, SIZE
+from path_scenes import black_coat, clear_glass, cloth, coated, frosted, gold, in_white, on_floor
+from path_scenes import plane_in_white, plastic
 
 import blender
 from blender import report
@@ -56,10 +73,10 @@ class Case:
     build: object
     # Changes Blender's scene after the export, or returns the albedo with an error.
     plant: object
-    # Returns the albedo of the ball in place of Cycles.
+    # Returns the albedo of a ball or a plane in white surroundings, in place of Cycles.
     closed: object = None
     # Cosines at which `closed` is seen.
-    view: object = path_albedos.of_ball
+    view: object = of_ball
     # Changes Blender's scene after the export, where the exported file says something else.
     change: object = None
     # Relative difference of a tile that is not counted.
@@ -74,7 +91,13 @@ def lamp():
 
 def scale(thing, name, factor):
     """Returns a change that multiplies an attribute of what `thing` returns."""
-    return lambda: setattr(thing(), name, factor * getattr(thing(), name))
+
+    def change():
+        setattr(thing(), name, factor * getattr(thing(), name))
+        # Blender does not notice changes of a lens by itself.
+        thing().id_data.update_tag()
+
+    return change
 
 
 def scale_input(material, name, factor, node="Principled BSDF"):
@@ -99,8 +122,8 @@ def soften_spot():
 
 
 def thin_sheet():
-    """Replaces the pane's material by what glTF states of a thin sheet: by Schlick's formula, light is reflected as by a
-    mirror, and the rest passes straight on, tinted."""
+    """Replaces the pane's material by what glTF states of a thin sheet: light is reflected as by a mirror, by Schlick's
+    formula, and the rest passes straight on, tinted."""
     nodes, links, node = principled(bpy.data.materials["pane"])
     mirror, passing, mix = (nodes.new(f"ShaderNode{kind}") for kind in ("BsdfGlossy", "BsdfTransparent", "MixShader"))
     mirror.inputs["Roughness"].default_value = 0.0
@@ -145,31 +168,39 @@ def seen():
 
 
 CASES = {
-    "area": Case(path_scenes.area, scale(lamp, "size", 1.05)),
-    "sun": Case(path_scenes.sun, scale(lamp, "angle", 1.05)),
+    "area": Case(path_scenes.area, scale(lamp, "energy", 1.02)),
+    "sun": Case(path_scenes.sun, scale(lamp, "energy", 1.02)),
     "sky": Case(path_scenes.sky_light, turn_environment),
-    "sphere": Case(path_scenes.sphere_light, scale(lamp, "shadow_soft_size", 1.05)),
+    "sphere": Case(path_scenes.sphere_light, scale(lamp, "energy", 1.02)),
     "spot": Case(path_scenes.spot, scale(lamp, "spot_size", 1.02), change=soften_spot),
     "textured_lamp": Case(path_scenes.textured_lamp, scale_input("glowing", "Emission Strength", 1.02)),
-    "coat": Case(on_floor(coated), scale_input("coated", "Coat Weight", 1.05)),
-    "plastic": Case(on_floor(plastic), scale_input("plastic", "Roughness", 1.05)),
-    "metal": Case(on_floor(gold), scale_input("gold", "Roughness", 1.05)),
-    "glass": Case(path_scenes.glass, scale_input("glass", "Roughness", 1.05), change=absorption_of_gltf),
-    "thin_glass": Case(path_scenes.thin_glass, scale_input("pane", "Color", 0.98, "Transparent BSDF"), change=thin_sheet),
+    "coat": Case(on_floor(coated), scale_input("coated", "Base Color", 1.05), allowed=0.02),
+    "plastic": Case(on_floor(plastic), scale_input("plastic", "Base Color", 0.97)),
+    "metal": Case(in_white(gold), scale_input("gold", "Base Color", 0.98), allowed=0.005),
+    "glass": Case(
+        path_scenes.glass,
+        scale_input("glass", "Base Color", 0.95),
+        change=absorption_of_gltf,
+    ),
+    "thin_glass": Case(
+        path_scenes.thin_glass,
+        scale_input("pane", "Color", 0.98, "Transparent BSDF"),
+        change=thin_sheet,
+    ),
     "coverage": Case(path_scenes.coverage, denser_card),
     "lens": Case(path_scenes.lens, scale(lambda: seen().dof, "aperture_fstop", 0.95)),
     "orthographic": Case(path_scenes.orthographic, scale(seen, "ortho_scale", 1.02)),
-    "coat_albedo": Case(
-        in_white(lambda: coated((0.0, 0.0, 0.0))), partial(clear_layer, 0.8, 0.42), partial(clear_layer, 0.8, 0.4)
-    ),
+    # The planted errors are of the roughness.
+    "coat_albedo": Case(in_white(black_coat), partial(clear_layer, 0.8, 0.42), partial(clear_layer, 0.8, 0.4)),
     "sheen_albedo": Case(in_white(cloth), partial(sheen, 0.52), partial(sheen, 0.5)),
     "plastic_albedo": Case(in_white(plastic), partial(dielectric, PLASTIC, 0.52), partial(dielectric, PLASTIC, 0.5)),
     "metal_albedo": Case(in_white(gold), partial(metal, GOLD, 0.82), partial(metal, GOLD, 0.8), allowed=0.002),
-    "thin_albedo": Case(
-        path_scenes.sheet_in_white,
-        partial(thin_sheet_albedo, FROSTED, 0.52),
-        partial(thin_sheet_albedo, FROSTED, 0.5),
-        view=path_albedos.of_plane,
+    "thin_albedo": Case(plane_in_white(frosted), partial(sheet, FROSTED, 0.52), partial(sheet, FROSTED, 0.5), of_plane),
+    "glass_albedo": Case(
+        plane_in_white(clear_glass), partial(boundary, 0.42, 1 / 1.5), partial(boundary, 0.4, 1 / 1.5), of_plane
+    ),
+    "glass_inside": Case(
+        plane_in_white(clear_glass, is_front=False), partial(boundary, 0.42, 1.5), partial(boundary, 0.4, 1.5), of_plane
     ),
 }
 
@@ -212,10 +243,11 @@ def check(name, case, arguments, folder):
     os.chdir(place)
     path_scenes.reset()
     case.build()
-    path, options = path_scenes.export()
+    path, options = path_files.export()
     ours = by_kdray(arguments, path, options, case.n_samples)
     if case.closed:
-        theirs, planted = ([path_albedos.picture(albedo(), SIZE, case.view)] * N_RUNS for albedo in (case.closed, case.plant))
+        albedos = case.closed(), case.plant()
+        theirs, planted = ([path_albedos.picture(albedo, SIZE, case.view)] * N_RUNS for albedo in albedos)
     else:
         if case.change:
             case.change()

@@ -95,7 +95,7 @@ def metal(colour, roughness):
     return np.stack([compensated(part, *lobes) for part in colour])
 
 
-def thin_sheet(colour, roughness):
+def sheet(colour, roughness):
     """A sheet that reflects by a dielectric's Fresnel term, and lets the rest pass, tinted by `colour`. Light that
     bounces between microfacets more than once is shared out like the other."""
     whole, grazing = ggx(roughness)
@@ -122,6 +122,42 @@ def sheen(roughness):
         return distribution / (1.0 + smith_lambda(light) + smith_lambda(view)) / (4.0 * light * view)
 
     return integrals(reflectance)
+
+
+def exact_fresnel(cosine, eta):
+    """Returns the reflectance of a smooth dielectric, and the cosine of the refracted light, 0 in total reflection.
+    `eta`: index on the viewer's side divided by that beyond."""
+    refracted = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - cosine**2), 0.0))
+    cosine = np.maximum(cosine, 1e-9)
+    across = (eta * cosine - refracted) / (eta * cosine + refracted)
+    along = (cosine - eta * refracted) / (cosine + eta * refracted)
+    return np.where(refracted > 0.0, 0.5 * (across**2 + along**2), 1.0), refracted
+
+
+def boundary(roughness, eta):
+    """The rough boundary of a clear solid, without anything behind it (Walter et al., 2007). Light that bounces between
+    microfacets is lost. Radiance changes by `eta` squared where light is refracted."""
+    squared = roughness**4
+    half, weight = half_sphere()
+    distribution = squared / (np.pi * (1.0 + (squared - 1.0) * half[..., 2] ** 2) ** 2)
+
+    def smith_lambda(cosine):
+        return 0.5 * (np.sqrt(1.0 + squared * (1.0 / np.maximum(cosine**2, 1e-12) - 1.0)) - 1.0)
+
+    sums = []
+    for cosine in COSINES:
+        view = np.array([np.sqrt(1.0 - cosine**2), 0.0, cosine])
+        at = half @ view
+        reflectance, refracted = exact_fresnel(np.maximum(at, 0.0), eta)
+        mirrored = 2.0 * at * half[..., 2] - cosine
+        passed = (eta * at - refracted) * half[..., 2] - eta * cosine
+        visible = distribution * np.maximum(at, 0.0) / cosine * weight
+        masking = [1.0 / (1.0 + smith_lambda(cosine) + smith_lambda(light)) for light in (mirrored, passed)]
+        sums.append(
+            np.sum(visible * reflectance * masking[0], where=mirrored > 0.0)
+            + eta**2 * np.sum(visible * (1.0 - reflectance) * masking[1], where=passed < 0.0)
+        )
+    return np.array(sums)
 
 
 def of_ball(size):

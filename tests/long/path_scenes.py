@@ -1,14 +1,4 @@
-"""The scenes of `cycles_paths.py`, made in Blender, and the scene files of kdray that show the same.
-
-Units. No factor is fitted. P is the power in watts that Blender states for a lamp, and E the irradiance of its sun.
-
-| lamp | physical quantity in Cycles | value in kdray's scene file |
-|---|---|---|
-| sphere of radius r | radiance P / (4 pi^2 r^2) | the same |
-| rectangle of area A | radiance P / (pi A) | the same |
-| spot | intensity P / (4 pi) | divided by pi, as of all lights without an area |
-| sun | irradiance E | divided by pi |
-"""
+"""The scenes of `cycles_paths.py`, made in Blender. `path_files.py` writes them for kdray."""
 
 import math
 from pathlib import Path
@@ -27,7 +17,6 @@ from in_blender import (
     sphere,
     take,
     texture,
-    yup,
 )
 from path_albedos import FOV, HEIGHT, PITCH
 from reference.description import ENVIRONMENT_HEIGHT, environment_image
@@ -36,9 +25,6 @@ from reference.scenes import sky
 import bpy
 import numpy as np
 import OpenEXR
-
-# This module exists once `bpy` has been imported.
-from mathutils import Vector
 
 SIZE = 96  # width and height of the pictures, pixels
 MAX_DEPTH = 25  # surfaces that a path meets at most
@@ -106,6 +92,11 @@ def block(made, centre=(0.2, 0.1, 0.6), edge=1.2):
     return take(made, False)
 
 
+def sphere_lamp():
+    """Adds a light that is a sphere. With "soft falloff", it would be a disk that faces each point."""
+    light("POINT", 500.0, (-1.5, -0.5, 4.0), shadow_soft_size=0.5, use_soft_falloff=False)
+
+
 def room():
     """Adds a matt room that is open at the front, with a block, and a camera that does not see the ceiling."""
     white, red, green = (material(*of) for of in (
@@ -146,7 +137,7 @@ def sky_light():
 def sphere_light():
     floor()
     block(material("matt", (0.3, 0.5, 0.7)))
-    light("POINT", 500.0, (-1.5, -0.5, 4.0), shadow_soft_size=0.5)
+    sphere_lamp()
 
 
 def spot():
@@ -166,8 +157,12 @@ def textured_lamp():
     block(material("matt", (0.8, 0.8, 0.8)), (0.5, -0.6, 0.3), 0.6)
 
 
-def coated(colour=(0.5, 0.1, 0.1)):
+def coated(colour=(0.1, 0.03, 0.03)):
     return material("coated", colour, Coat_Weight=0.8, Coat_Roughness=0.4, Coat_IOR=1.5)
+
+
+def black_coat():
+    return coated((0.0, 0.0, 0.0))
 
 
 def with_multiple_scattering(made):
@@ -203,9 +198,9 @@ def on_floor(make):
 
 
 def glass():
-    """A ball and a block of rough glass that absorbs light."""
+    """A ball and a block of slightly rough glass that absorbs light."""
     floor()
-    made = absorbing_glass(1.5, 0.4)
+    made = absorbing_glass(1.5, 0.2)
     ball(made, (-0.8, 0.0, 0.9), 0.8)
     block(made, (1.0, -0.2, 0.7), 1.2)
     daylight()
@@ -232,7 +227,7 @@ def coverage():
     links.new(shown.outputs["Alpha"], node.inputs["Alpha"])
     made.surface_render_method = "BLENDED"
     rectangle("card", (-1.2, 0.0, 0.3), (2.4, 0, 0), (0, 0.6, 1.8), made)
-    light("POINT", 500.0, (-1.5, -0.5, 4.0), shadow_soft_size=0.5)
+    sphere_lamp()
 
 
 def balls():
@@ -244,13 +239,17 @@ def balls():
 
 
 def lens():
-    """A lens of the radius 0.25, whose focus is at the ball in the middle."""
+    """A lens of the radius 0.5, whose focus is at the ball in the middle. A small lamp near the lens shows as a disk,
+    whose brightness depends on the lens's radius."""
     balls()
+    made = material("lamp", (0.0, 0.0, 0.0), Emission_Color=(1.0, 0.9, 0.8, 1.0), Emission_Strength=60.0)
+    made.cycles.emission_sampling = "FRONT"
+    sphere(made, (-0.5, -3.0, 1.9), 0.05, segments=12, smooth=False)
     seen = bpy.context.scene.camera.data
     seen.dof.use_dof = True
     seen.dof.focus_distance = 6.4
     # Blender states the lens by its focal length in millimetres, divided by its diameter.
-    seen.dof.aperture_fstop = seen.lens / 1000.0 / (2 * 0.25)
+    seen.dof.aperture_fstop = seen.lens / 1000.0 / (2 * 0.5)
 
 
 def orthographic():
@@ -272,74 +271,21 @@ def in_white(make):
     return build
 
 
-def sheet_in_white():
-    """A thin sheet in white surroundings, as large as the picture. Behind it is nothing else."""
-    rectangle("sheet", (-200, -200, 0), (400, 0, 0), (0, 400, 0), frosted())
-    environment(np.ones((16, 32, 3), np.float32))
-    pitch = math.radians(PITCH)
-    camera((0.0, 0.0, 1.0), (0.0, math.cos(pitch), 1.0 - math.sin(pitch)), FOV)
+def plane_in_white(make, is_front=True):
+    """Returns a case of a plane's front or back in white surroundings, with nothing behind it."""
+
+    def build():
+        edges = (400, 0, 0), (0, 400, 0)
+        rectangle("plane", (-200, -200, 0), *(edges if is_front else edges[::-1]), make())
+        environment(np.ones((16, 32, 3), np.float32))
+        pitch = math.radians(PITCH)
+        camera((0.0, 0.0, 1.0), (0.0, math.cos(pitch), 1.0 - math.sin(pitch)), FOV)
+
+    return build
 
 
-# --- Files for kdray ----------------------------------------------------------------------------------------------
-
-
-def lamp_keys(lamp):
-    """Returns the keys of a lamp in a scene file."""
-    data, matrix = lamp.data, lamp.matrix_world
-    power = data.energy * np.array(data.color)
-    place = {"position": yup(matrix.translation)}
-    direction = {"direction": yup(matrix.to_3x3() @ Vector((0.0, 0.0, -1.0)))}
-    match data.type:
-        case "SUN":
-            angle = math.degrees(data.angle)
-            return {"kind": "directional", **direction, "irradiance": power / math.pi, "angle": angle}
-        case "POINT":
-            radius = data.shadow_soft_size
-            radiance = power / (4.0 * math.pi**2 * radius**2)
-            return {"kind": "sphere", **place, "radius": radius, "radiance": radiance}
-        case "AREA":
-            radiance = power / (math.pi * data.size * data.size_y)
-            up = {"up": yup(matrix.to_3x3() @ Vector((0.0, 1.0, 0.0)))}
-            shape = {"width": data.size, "height": data.size_y}
-            return {"kind": "rectangle", **place, **direction, **up, **shape, "radiance": radiance}
-        case "SPOT":
-            outer = math.degrees(data.spot_size / 2.0)
-            angles = {"inner_angle": outer * (1.0 - data.spot_blend), "outer_angle": outer}
-            return {"kind": "spot", **place, **direction, **angles, "intensity": power / (4.0 * math.pi**2)}
-
-
-def camera_keys():
-    """Returns the keys of Blender's camera in a scene file."""
-    seen = bpy.context.scene.camera
-    eye, towards = seen.matrix_world.translation, seen.matrix_world.to_3x3() @ Vector((0.0, 0.0, -1.0))
-    keys = {"eye": yup(eye), "target": yup(eye + towards)}
-    if seen.data.type == "ORTHO":
-        return keys | {"orthographic_height": seen.data.ortho_scale}
-    return keys | {"vertical_fov": math.degrees(seen.data.angle)}
-
-
-def table(header, keys):
-    """Returns a table of a TOML file."""
-    lines = [f"{key} = {value!r}\n" if isinstance(value, str) else f"{key} = {np.array(value).tolist()}\n"
-             for key, value in keys.items()]  # fmt: skip
-    return f"{header}\n{''.join(lines)}"
-
-
-def export():
-    """Writes Blender's scene into the working directory, and returns the scene file for kdray and options of it."""
-    bpy.context.view_layer.update()
-    bpy.ops.export_scene.gltf(filepath=str(Path.cwd() / "scene.glb"), export_format="GLB")
-    tables = [
-        table("[render]", {"integrator": "path", "width": SIZE, "height": SIZE, "max_depth": MAX_DEPTH}),
-        table("[camera]", camera_keys()),
-        table("[[mesh]]", {"file": "scene.glb"}),
-        *(table("[[light]]", lamp_keys(lamp)) for lamp in bpy.data.objects if lamp.type == "LIGHT"),
-    ]
-    if bpy.context.scene.world:
-        # The middle of the picture is the direction +x in Blender, and -z, which is Blender's +y, in kdray.
-        tables.append(table("[environment]", {"file": "environment.exr", "rotation": TURNED - 90.0}))
-    path = Path.cwd() / "scene.toml"
-    path.write_text("\n".join(tables))
-    dof = bpy.context.scene.camera.data.dof
-    radius = bpy.context.scene.camera.data.lens / 1000.0 / (2.0 * dof.aperture_fstop)
-    return path, ["--aperture", radius, "--focus", dof.focus_distance] if dof.use_dof else []
+def clear_glass():
+    made = absorbing_glass(1.5, 0.4)
+    principled(made)[2].inputs["Base Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    principled(made)[0]["Volume Absorption"].inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    return made
