@@ -49,6 +49,12 @@ from dataclasses import dataclass
 from functools import partial
 
 # This import has to come first.
+import blender
+from blender import camera_matrix, link, report
+
+import bpy
+import numpy as np
+
 from in_blender import (
     absorbing_glass,
     absorption_of_gltf,
@@ -71,12 +77,6 @@ from in_blender import (
     write_sheet,
     yup,
 )
-
-import blender
-from blender import camera_matrix, link, report
-
-import bpy
-import numpy as np
 
 # This module exists once `bpy` has been imported.
 from mathutils import Vector

@@ -16,8 +16,8 @@ each case. `worst tile` is the greatest deviation of a tile in units of the one 
 5 % is planted into the reference, which must be found: `planted` is the worst tile with that error.
 
 References. Cases with a `closed` form are compared with `path_albedos.py`, which integrates the papers' formulas
-numerically: a ball in white surroundings shows its albedo. All others are compared with Cycles. Where the models are
-not the same by definition, a case allows for a relative difference of tiles:
+numerically: a ball in white surroundings shows its albedo. All others are compared with Cycles. The planted errors are
+in `CASES`. Where the models are not the same by definition, a case allows for a relative difference of tiles:
 
 | cases | allowed | reason |
 |---|---:|---|
@@ -33,7 +33,7 @@ Further differences of the models, and what the cases do about them:
 | `spot` | glTF's edge is soft over 0.001 of the cosine, Cycles's is sharp. Cycles gets a cone of the same light |
 | `metal` | Cycles spreads the light of further bounces as the first one's, kdray as a Lambertian surface does, so that a ball by daylight differs by up to 7 %. In white surroundings, only the sum counts |
 | `thin_glass` | Cycles's material has no thin sheets. The case makes one of Cycles's simple closures, after glTF's formula |
-| `glass` | a rough boundary of Cycles's passes on more light than the formula of single scattering: with roughness 0.4 by 0.8 % to 4 % from inside. The case has roughness 0.2, and `glass_albedo` and `glass_inside` compare a rougher boundary with the formula |
+| `glass` | a rough boundary of Cycles's passes on more light than the formula of single scattering: with roughness 0.4 by 0.7 % to 5 % from inside. The case has roughness 0.2, and `glass_albedo` and `glass_inside` compare a rougher boundary with the formula |
 | `glass` | Cycles's formula of absorption has another parameter, which is computed from glTF's |
 | `sheen_albedo` | glTF and kdray have the fibres of Estevez and Kulla. Cycles has those of Zeltner, Burley, Chiang (2022) and of Ashikhmin, but not these |
 """
@@ -44,8 +44,13 @@ import sys
 from dataclasses import dataclass
 from functools import partial
 
-# These imports have to come first.
-from reference.statistics import compare
+# This import has to come first.
+import blender
+from blender import report
+
+import bpy
+import numpy as np
+
 import path_albedos
 import path_files
 import path_scenes
@@ -54,12 +59,7 @@ from path_albedos import boundary, clear_layer, dielectric, metal, of_ball, of_p
 from path_scenes import FROSTED, GOLD, PLASTIC, SIZE
 from path_scenes import black_coat, clear_glass, cloth, coated, frosted, gold, in_white, on_floor
 from path_scenes import plane_in_white, plastic
-
-import blender
-from blender import report
-
-import bpy
-import numpy as np
+from reference.statistics import compare
 
 FALSE_ALARMS = 0.01
 N_RUNS = 8
@@ -218,13 +218,14 @@ def by_kdray(arguments, path, options, n_samples):
     return pictures
 
 
-def by_cycles(place, n_samples):
-    """Returns the pictures of all runs."""
+def by_cycles(stem, n_samples):
+    """Returns the pictures of all runs. The names of their files begin with `stem`."""
     cycles = bpy.context.scene.cycles
     cycles.samples = n_samples
     pictures = []
-    for cycles.seed in range(N_RUNS):
-        pictures.append(render_cycles(place / f"cycles{cycles.seed}.exr"))
+    for run in range(N_RUNS):
+        cycles.seed = run
+        pictures.append(render_cycles(stem.with_name(f"{stem.name}{run}.exr")))
     return pictures
 
 
@@ -251,9 +252,9 @@ def check(name, case, arguments, folder):
     else:
         if case.change:
             case.change()
-        theirs = by_cycles(place, case.n_samples)
+        theirs = by_cycles(place / "cycles", case.n_samples)
         case.plant()
-        planted = by_cycles(place, case.n_samples)
+        planted = by_cycles(place / "planted", case.n_samples)
     show(folder / f"{name}.png", ours, theirs)
     worst, difference, error = compare(ours, theirs, FALSE_ALARMS, case.allowed)
     found, _, _ = compare(ours, planted, FALSE_ALARMS, case.allowed)

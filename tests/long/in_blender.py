@@ -1,6 +1,6 @@
 """What `cycles.py` and `cycles_paths.py` share: scenes that a script makes in Blender, and pictures of Cycles.
 
-This module has to be imported before `bpy`, as `blender.py` says.
+Either this module or `blender.py` has to be imported before `bpy`.
 """
 
 import math
