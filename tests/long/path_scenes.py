@@ -239,12 +239,12 @@ def balls():
 
 
 def lens():
-    """A lens of the radius 0.5, whose focus is at the ball in the middle. A small lamp near the lens shows as a disk,
+    """A lens of the radius 0.5, whose focus is at the ball in the middle. A lamp near the lens shows as a soft disk,
     whose brightness depends on the lens's radius."""
     balls()
-    made = material("lamp", (0.0, 0.0, 0.0), Emission_Color=(1.0, 0.9, 0.8, 1.0), Emission_Strength=60.0)
+    made = material("lamp", (0.0, 0.0, 0.0), Emission_Color=(1.0, 0.9, 0.8, 1.0), Emission_Strength=4.0)
     made.cycles.emission_sampling = "FRONT"
-    sphere(made, (-0.5, -3.0, 1.9), 0.05, segments=12, smooth=False)
+    sphere(made, (-0.5, -3.0, 1.9), 0.2, segments=32, smooth=False)
     seen = bpy.context.scene.camera.data
     seen.dof.use_dof = True
     seen.dof.focus_distance = 6.4
