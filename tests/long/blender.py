@@ -1,4 +1,4 @@
-"""What `cycles.py` and `geometry.py` share: Blender as a module, runs of kdray, and the command line.
+"""What the scripts with Blender share: Blender as a module, runs of kdray, and the command line.
 
 This module has to be imported before `bpy`. Blender has a module `cycles` of its own, and would otherwise find the
 script of that name, which is in the same folder.
@@ -11,10 +11,14 @@ import sys
 import tempfile
 from pathlib import Path
 
-sys.path[:] = [path for path in sys.path if Path(path).resolve() != Path(__file__).resolve().parent]
+FOLDER = Path(__file__).resolve().parent
+sys.path[:] = [path for path in sys.path if Path(path).resolve() != FOLDER]
 
 import bpy
 import numpy as np
+
+# Blender has found its own module, and other scripts of the folder may be imported.
+sys.path.append(str(FOLDER))
 
 # This module exists once `bpy` has been imported.
 import bmesh

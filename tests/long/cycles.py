@@ -47,15 +47,36 @@ import os
 import sys
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 
 # This import has to come first.
 import blender
-from blender import YUP, camera_matrix, link, report, triangulate
+from blender import camera_matrix, link, report
 
 import bpy
 import numpy as np
-import OpenEXR
+
+from in_blender import (
+    absorbing_glass,
+    absorption_of_gltf,
+    camera,
+    empty,
+    encoded,
+    gltf_output,
+    gradient,
+    image,
+    letters,
+    light,
+    material,
+    principled,
+    read_exr,
+    rectangle,
+    render_cycles,
+    sphere,
+    take,
+    texture,
+    write_sheet,
+    yup,
+)
 
 # This module exists once `bpy` has been imported.
 from mathutils import Vector
@@ -74,69 +95,14 @@ FRONT, SIDE = (-0.6, -6.0, 4.0), (-2.5, -3.0, 5.0)
 
 def reset():
     """Empties Blender and sets Cycles up for direct light, one sample at each pixel's centre."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    scene = bpy.context.scene
-    scene.render.engine = "CYCLES"
-    scene.render.resolution_x, scene.render.resolution_y = SIZE
-    scene.render.resolution_percentage = 100
-    scene.render.film_transparent = False
-    scene.render.image_settings.file_format = "OPEN_EXR"
-    scene.render.image_settings.color_mode = "RGB"
-    scene.render.image_settings.color_depth = "32"
-    cycles = scene.cycles
-    cycles.device = "CPU"
+    cycles = empty(SIZE)
     cycles.samples = 1
-    cycles.use_adaptive_sampling = False
-    cycles.use_denoising = False
     cycles.max_bounces = 0
     cycles.transparent_max_bounces = 16
-    cycles.light_sampling_threshold = 0.0
-    cycles.sample_clamp_direct = 0.0
-    cycles.blur_glossy = 0.0
     # A filter of almost no width: all samples are at the pixel's centre.
     cycles.pixel_filter_type = "GAUSSIAN"
     cycles.filter_width = 0.01
     camera((0.0, -6.0, 3.0), (0.0, 0.0, 0.6))
-
-
-def look(thing, eye, target):
-    """Puts an object at `eye` and turns its -z axis towards `target`."""
-    thing.location = eye
-    thing.rotation_euler = (Vector(target) - Vector(eye)).to_track_quat("-Z", "Y").to_euler()
-
-
-def add(name, data):
-    """Adds an object to the scene."""
-    return without_offsets(link(name, data))
-
-
-def without_offsets(thing):
-    """Returns an object after it has told Cycles not to move the origins of shadow rays away from smooth surfaces."""
-    thing.cycles.shadow_terminator_geometry_offset = 0.0
-    thing.cycles.shadow_terminator_offset = 0.0
-    return thing
-
-
-def camera(eye, target, degrees=40.0):
-    """Sets the scene's camera; `degrees` is its horizontal field of view."""
-    data = bpy.data.cameras.new("camera")
-    data.angle = math.radians(degrees)
-    thing = add("camera", data)
-    look(thing, eye, target)
-    bpy.context.scene.camera = thing
-
-
-def light(kind, power, eye, target=(0.0, 0.0, 0.0), colour=(1.0, 1.0, 1.0), **values):
-    """Adds a light of radius 0. `power`: watts, or of a sun watts per square metre."""
-    data = bpy.data.lights.new("light", kind)
-    data.energy, data.color = power, colour
-    if kind == "SUN":
-        data.angle = 0.0
-    else:
-        data.shadow_soft_size = 0.0
-    for key, value in values.items():
-        setattr(data, key, value)
-    look(add("light", data), eye, target)
 
 
 def point_light():
@@ -144,72 +110,9 @@ def point_light():
     light("POINT", 600.0, SIDE, colour=(1.0, 0.9, 0.7))
 
 
-def material(name, colour=(0.8, 0.8, 0.8), specular=0.0, **values):
-    """Makes a material of the Principled BSDF without multiple scattering. `specular`: 0.5 for a dielectric as it is.
-
-    Further values are inputs of the node, with underscores for the spaces of their names. Returns the material.
-    """
-    made = bpy.data.materials.new(name)
-    made.use_nodes = True
-    made.cycles.emission_sampling = "NONE"
-    node = made.node_tree.nodes["Principled BSDF"]
-    node.distribution = "GGX"
-    node.inputs["Base Color"].default_value = (*colour, 1.0)
-    node.inputs["Roughness"].default_value = 1.0
-    node.inputs["Specular IOR Level"].default_value = specular
-    for key, value in values.items():
-        node.inputs[key.replace("_", " ")].default_value = value
-    return made
-
-
-def principled(made):
-    """Returns the nodes, the links and the Principled BSDF of a material."""
-    tree = made.node_tree
-    return tree.nodes, tree.links, tree.nodes["Principled BSDF"]
-
-
-def mesh(name, points, faces, made, uvs=None):
-    """Adds a mesh of polygons. `uvs`: one for each point."""
-    data = bpy.data.meshes.new(name)
-    data.from_pydata(points, [], faces)
-    if uvs is not None:
-        layer = data.uv_layers.new(name="UVMap")
-        for loop in data.loops:
-            layer.data[loop.index].uv = uvs[loop.vertex_index]
-    data.materials.append(made)
-    return add(name, data)
-
-
-def rectangle(name, origin, along, up, made, inset=0.0):
-    """Adds a parallelogram with texture coordinates from (0, 0) at `origin` to (1, 1), less `inset` at each side."""
-    o, a, u = np.array(origin), np.array(along), np.array(up)
-    points = [tuple(map(float, p)) for p in (o, o + a, o + a + u, o + u)]
-    a, b = inset, 1.0 - inset
-    return mesh(name, points, [(0, 1, 2, 3)], made, [(a, a), (b, a), (b, b), (a, b)])
-
-
 def floor(made=None):
     """Adds a square of 8 by 8 in the plane z = 0."""
     return rectangle("floor", (-4, -4, 0), (8, 0, 0), (0, 8, 0), made or material("floor", (0.6, 0.6, 0.6)))
-
-
-def take(made, smooth):
-    """Takes the object that an operator has just made: gives it a material and smooth or flat faces.
-
-    Faces become triangles, since the exporter gives a flat, bent quadrangle one normal, and Cycles two.
-    """
-    thing = bpy.context.object
-    triangulate(thing.data)
-    for polygon in thing.data.polygons:
-        polygon.use_smooth = smooth
-    thing.data.materials.append(made)
-    return without_offsets(thing)
-
-
-def sphere(made, centre=(0.0, 0.0, 1.0), radius=1.0, segments=64, smooth=True):
-    """Adds a sphere of `segments` by half as many faces."""
-    bpy.ops.mesh.primitive_uv_sphere_add(segments=segments, ring_count=segments // 2, radius=radius, location=centre)
-    return take(made, smooth)
 
 
 def monkey(made, centre=(0.0, 0.0, 1.0), scale=(1.0, 1.0, 1.0), smooth=False):
@@ -217,43 +120,6 @@ def monkey(made, centre=(0.0, 0.0, 1.0), scale=(1.0, 1.0, 1.0), smooth=False):
     bpy.ops.mesh.primitive_monkey_add(location=centre)
     bpy.context.object.scale = scale
     return take(made, smooth)
-
-
-def image(name, pixels, linear=False):
-    """Saves an array of rows from the top, of RGBA from 0 to 1, as a PNG in the working directory, and loads it."""
-    height, width = pixels.shape[:2]
-    made = bpy.data.images.new(name, width, height, alpha=True)
-    made.colorspace_settings.name = "Non-Color" if linear else "sRGB"
-    made.pixels.foreach_set(np.ascontiguousarray(pixels[::-1], dtype=np.float32).ravel())
-    made.filepath_raw, made.file_format = str(Path.cwd() / name), "PNG"
-    made.save()
-    loaded = bpy.data.images.load(str(Path.cwd() / name))
-    loaded.colorspace_settings.name = "Non-Color" if linear else "sRGB"
-    # Colours would otherwise be multiplied by opacity, and rounded.
-    loaded.alpha_mode = "CHANNEL_PACKED"
-    return loaded
-
-
-def texture(made, loaded, filtering="Linear", extension="REPEAT"):
-    """Adds a node that shows an image to a material, and returns it."""
-    nodes, _, _ = principled(made)
-    node = nodes.new("ShaderNodeTexImage")
-    node.image, node.interpolation, node.extension = loaded, filtering, extension
-    return node
-
-
-def letters():
-    """Returns an image of 8 by 8 pixels without any symmetry: an F, and corners of different colours."""
-    rows = ["#......g", "..####..", "..#.....", "..###...", "..#.....", "..#.....", "..#.....", "b......w"]
-    colours = {".": (0.35, 0.30, 0.25), "#": (0.9, 0.2, 0.1), "w": (1.0, 1.0, 1.0)}
-    colours |= {"g": (0.1, 0.8, 0.2), "b": (0.1, 0.2, 0.9)}
-    return np.array([[(*colours[c], 1.0) for c in row] for row in rows])
-
-
-def gradient(n=64):
-    """Returns an image whose red grows to the right, whose green grows downwards, and whose blue is 0.5."""
-    y, x = np.mgrid[0:n, 0:n] / (n - 1)
-    return np.stack([0.15 + 0.8 * x, 0.15 + 0.8 * y, np.full_like(x, 0.5), np.ones_like(x)], axis=-1)
 
 
 def waves(n=64):
@@ -481,14 +347,6 @@ def occlusion():
     links.new(mix.outputs["Result"], group.inputs["Occlusion"])
     rectangle("card", (-1.6, 0.0, -0.6), (3.2, 0, 0), (0, 0.8, 2.3), made)
     light("SUN", 1.0, (-2.0, -3.0, 4.0))
-
-
-def gltf_output():
-    """Makes the group of nodes that tells the exporter of glTF what Blender's own nodes do not have."""
-    group = bpy.data.node_groups.new("glTF Material Output", "ShaderNodeTree")
-    for name in ("Occlusion", "Thickness"):
-        group.interface.new_socket(name, in_out="INPUT", socket_type="NodeSocketFloat")
-    return group
 
 
 def ambient_emission():
@@ -726,33 +584,13 @@ def solid_glass(ior, samples):
 
     def build():
         wall()
-        made = material("glass", (0.9, 0.8, 0.95), Roughness=0.0, IOR=ior, Transmission_Weight=1.0)
-        nodes, links, _ = principled(made)
-        group, volume = nodes.new("ShaderNodeGroup"), nodes.new("ShaderNodeVolumeAbsorption")
-        group.node_tree = gltf_output()
-        group.inputs["Thickness"].default_value = 1.0
-        volume.inputs["Color"].default_value = (0.3, 0.8, 0.5, 1.0)
-        volume.inputs["Density"].default_value = 0.6
-        links.new(volume.outputs["Volume"], nodes["Material Output"].inputs["Volume"])
+        made = absorbing_glass(ior, 0.0)
         sphere(made, (-0.7, -1.2, 0.8), 0.6)
         bpy.ops.mesh.primitive_cube_add(size=1.0, location=(0.8, -1.3, 0.8), rotation=(0.3, 0.2, 0.5))
         take(made, False)
         see_through(4, samples)
 
     return build
-
-
-def absorption_of_gltf():
-    """Gives the volume in Cycles the absorption that glTF's formula states: exp(-s t) = colour^(t / distance).
-
-    Cycles's own s is density * (1 - colour).
-    """
-    volume = principled(bpy.data.materials["glass"])[0]["Volume Absorption"]
-    colour, density = volume.inputs["Color"], volume.inputs["Density"]
-    absorbed = -np.log(np.array(colour.default_value)[:3]) * density.default_value
-    density.default_value = absorbed.max()
-    colour.default_value = (*(1.0 - absorbed / absorbed.max()), 1.0)
-    return 1.0
 
 
 def skin():
@@ -1035,27 +873,6 @@ PLANTED = [
 ]
 
 
-def read_exr(path):
-    """Reads the colours of an EXR file, of any names of their layer, as an array of height, width, 3."""
-    channels = OpenEXR.File(str(path)).channels()
-    for name in ("RGB", "RGBA", "Combined", "ViewLayer.Combined"):
-        if name in channels:
-            return np.asarray(channels[name].pixels, dtype=np.float64)[..., :3]
-    return np.stack([np.asarray(channels[c].pixels, dtype=np.float64) for c in "RGB"], axis=-1)
-
-
-def render_cycles(path):
-    """Renders Blender's scene by Cycles into an EXR file and returns its colours."""
-    bpy.context.scene.render.filepath = str(path)
-    bpy.ops.render.render(write_still=True)
-    return read_exr(path)
-
-
-def yup(vector):
-    """Returns a vector of Blender's in the axes of the exported files, as a list."""
-    return (YUP @ np.array(vector)).tolist()
-
-
 def export(kind, stem):
     """Exports Blender's scene and returns the file for kdray."""
     if not kind.startswith("glb"):
@@ -1111,16 +928,8 @@ def differences(ours, theirs, share):
 
 def contact_sheet(path, ours, theirs, relative):
     """Writes both pictures and their relative difference side by side."""
-    white = np.percentile(np.maximum(ours, theirs), 99.5) or 1.0
-    encoded = [np.clip(picture / white, 0.0, 1.0) ** (1.0 / 2.2) for picture in (ours, theirs)]
-    encoded.append(np.repeat(np.clip(relative / 0.2, 0.0, 1.0)[..., None], 3, axis=-1))
-    sheet = np.concatenate(encoded, axis=1).repeat(2, axis=0).repeat(2, axis=1)
-    pixels = np.concatenate([sheet, np.ones((*sheet.shape[:2], 1))], axis=-1)
-    made = bpy.data.images.new("sheet", sheet.shape[1], sheet.shape[0])
-    made.pixels.foreach_set(np.ascontiguousarray(pixels[::-1], dtype=np.float32).ravel())
-    made.filepath_raw, made.file_format = str(path), "PNG"
-    made.save()
-    bpy.data.images.remove(made)
+    difference = np.repeat(np.clip(relative / 0.2, 0.0, 1.0)[..., None], 3, axis=-1)
+    write_sheet(path, np.concatenate([*encoded(ours, theirs), difference], axis=1))
 
 
 def compare(name, case, planted, arguments, folder):

@@ -1,5 +1,6 @@
 """Builds a scene for Mitsuba 3, and renders it."""
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 
@@ -9,11 +10,57 @@ if mi.variant() is None:
     mi.set_variant("llvm_ad_rgb", "scalar_rgb")
 
 
+class HeightCorrelated(mi.BSDF):
+    """Rough metal or glass of Mitsuba's, with masking and shadowing that are correlated in height.
+
+    Mitsuba has the product of both, 1 / ((1 + a) (1 + b)) with Smith's Lambda of each direction, which darkens rough
+    surfaces. kdray has 1 / (1 + a + b) (Heitz, Understanding the Masking-Shadowing Function, JCGT 2014). The
+    densities of directions do not depend on it.
+    """
+
+    def __init__(self, properties):
+        super().__init__(properties)
+        self.separable, self.alpha = properties["separable"], properties["alpha"]
+        self.m_components = [self.separable.flags(i) for i in range(self.separable.component_count())]
+        self.m_flags = self.separable.flags()
+
+    def smith_lambda(self, direction):
+        squared = dr.square(mi.Frame3f.cos_theta(direction))
+        return 0.5 * (dr.sqrt(1 + self.alpha**2 * dr.maximum(1 / squared - 1, 0)) - 1)
+
+    def ratio(self, si, wo):
+        a, b = self.smith_lambda(si.wi), self.smith_lambda(wo)
+        return (1 + a) * (1 + b) / (1 + a + b)
+
+    def sample(self, context, si, sample1, sample2, active=True):
+        sampled, weight = self.separable.sample(context, si, sample1, sample2, active)
+        return sampled, weight * self.ratio(si, sampled.wo)
+
+    def eval(self, context, si, wo, active=True):
+        return self.separable.eval(context, si, wo, active) * self.ratio(si, wo)
+
+    def pdf(self, context, si, wo, active=True):
+        return self.separable.pdf(context, si, wo, active)
+
+    def eval_pdf(self, context, si, wo, active=True):
+        return self.eval(context, si, wo, active), self.pdf(context, si, wo, active)
+
+    def to_string(self):
+        return f"HeightCorrelated[alpha={self.alpha}]"
+
+
+mi.register_bsdf("heightcorrelated", HeightCorrelated)
+
+
+def rough(separable, alpha, is_own):
+    return separable if is_own else {"type": "heightcorrelated", "alpha": alpha, "separable": separable}
+
+
 def rgb(colour):
     return {"type": "rgb", "value": [float(part) for part in colour]}
 
 
-def bsdf(material):
+def bsdf(material, is_own):
     match material:
         case Diffuse(texture=None):
             return {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": rgb(material.reflectance)}}
@@ -24,9 +71,11 @@ def bsdf(material):
             return {"type": "diffuse", "reflectance": rgb((0, 0, 0))}
         case Metal():
             conductor = {"type": "roughconductor", "material": "none", "distribution": "ggx", "alpha": material.alpha}
-            return {"type": "twosided", "bsdf": conductor}
+            return rough({"type": "twosided", "bsdf": conductor}, material.alpha, is_own)
         case Glass():
-            return {"type": "roughdielectric", "distribution": "ggx", "alpha": material.alpha, "int_ior": material.ior}
+            alpha = material.alpha
+            glass = {"type": "roughdielectric", "distribution": "ggx", "alpha": alpha, "int_ior": material.ior}
+            return rough(glass, alpha, is_own)
 
 
 def both_sides(mesh):
@@ -39,10 +88,10 @@ def both_sides(mesh):
     return vertices, np.arange(len(vertices)).reshape(-1, 3)
 
 
-def shape(mesh):
+def shape(mesh, is_own):
     vertices, faces = (mesh.vertices, mesh.faces)
     properties = mi.Properties()
-    properties["bsdf"] = mi.load_dict(bsdf(mesh.material))
+    properties["bsdf"] = mi.load_dict(bsdf(mesh.material, is_own))
     if isinstance(mesh.material, Emitting):
         vertices, faces = both_sides(mesh)
         properties["emitter"] = mi.load_dict({"type": "area", "radiance": rgb(mesh.material.radiance)})
@@ -57,7 +106,8 @@ def shape(mesh):
     return made
 
 
-def build(scene):
+def build(scene, is_own=False):
+    """`is_own`: whether rough surfaces are Mitsuba's own, in place of `HeightCorrelated`."""
     camera = mi.ScalarTransform4f().look_at(list(scene.eye), list(scene.target), [0, 1, 0])
     parts = {
         "type": "scene",
@@ -75,7 +125,7 @@ def build(scene):
         },
     }  # fmt: skip
     for mesh in scene.meshes:
-        parts[mesh.name] = shape(mesh)
+        parts[mesh.name] = shape(mesh, is_own)
     for i, light in enumerate(scene.lights):
         parts[f"light{i}"] = {
             "type": "sphere", "center": list(light.centre), "radius": light.radius,

@@ -33,10 +33,11 @@ def critical_t(degrees, probability):
     return high
 
 
-def compare(ours, theirs, false_alarms):
+def compare(ours, theirs, false_alarms, allowed=0.0):
     """Compares lists of independent pictures. Returns the largest deviation of a tile in units of what chance would
     exceed with the probability `false_alarms` anywhere in the picture (above 1: they differ), the relative difference
-    of the whole picture, and the standard error of that difference."""
+    of the whole picture, and the standard error of that difference. `allowed`: relative difference of a tile that is
+    not counted."""
     a, b = (np.array([tiles(picture) for picture in pictures]) for pictures in (ours, theirs))
     error = np.sqrt(a.var(0, ddof=1) / len(a) + b.var(0, ddof=1) / len(b))
     # The fewest degrees of freedom that Welch's test can have: a bound that errs on the side of fewer alarms.
@@ -44,6 +45,6 @@ def compare(ours, theirs, false_alarms):
     least = critical_t(degrees, false_alarms / a.shape[1])
     # Both interpolate the environment's picture, whose pixels are at different places: not the errors of samples alone.
     error = np.maximum(error, INTERPOLATION * b.mean(0) + 1e-12)
-    deviation = np.abs(a.mean(0) - b.mean(0)) / error
+    deviation = np.maximum(np.abs(a.mean(0) - b.mean(0)) - allowed * b.mean(0), 0) / error
     whole = b[:, -1].mean()
     return deviation.max() / least, (a[:, -1].mean() - whole) / whole, error[-1] / whole
