@@ -224,7 +224,7 @@ fn what_no_library_defines_is_the_default() {
     }
     // One line names two libraries, and the faces have several materials.
     let obj = format!(
-        "mtllib a.mtl b.mtl\n{TRIANGLE}usemtl b\nf 1 2 3\nusemtl a\nf 1 2 3\nusemtl c\nf 3 2 1\nusemtl b\nf 1 2 3"
+        "mtllib a.mtl b.mtl\n{TRIANGLE}v 0 0 1\nusemtl b\nf 1 2 3\nusemtl a\nf 1 2 4\nusemtl c\nf 3 2 1\nusemtl b\nf 1 2 3"
     );
     let files: [(&str, &[u8]); 3] =
         [("m.obj", obj.as_bytes()), ("a.mtl", b"newmtl a\n"), ("b.mtl", b"newmtl b\nd 0.5")];
