@@ -148,8 +148,8 @@ fn as_meant(path: &Path, described: &mut [Described]) {
     warn(&no_glass, "would be glass by `illum`, but no other term says so: shown opaque; `Ni 1.5` would make it glass");
 }
 
-/// Reads the opacity of a material of Maya, which writes `illum 4`, `Ni 1.00`, no `d`, and 1 minus the transparency as `Tf`: an
-/// opaque material has `Tf 1 1 1`. Glass of Maya has an `Ni` that is not 1.
+/// Reads the opacity of a material of Maya, which writes `illum 4`, `Ni 1.00`, no `d`, and 1 minus the transparency as
+/// `Tf`: an opaque material has `Tf 1 1 1`. Glass of Maya has an `Ni` that is not 1.
 fn take_opacity_of_maya(spec: &mut MaterialSpec) {
     let is_thin = spec.illum == Some(4) && spec.ni == Some(1.0) && spec.d.is_none_or(|d| d == 1.0);
     if let (true, Some(tf)) = (is_thin, spec.tf)
