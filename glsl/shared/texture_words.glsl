@@ -37,7 +37,7 @@ MaterialMaps maps_of(uint material_ix) {
         load_texture_words(at + 4u), load_texture_words(at + 5u), load_texture_words(at + 6u),
         load_texture_words(at + 7u), load_texture_words(at + 8u), load_texture_words(at + 9u),
         load_float(at + 10u), load_float(at + 11u), load_float(at + 12u), load_float(at + 13u),
-        load_texture_words(at + 14u), 0u
+        load_texture_words(at + 14u), load_float(at + 15u)
     );
 }
 

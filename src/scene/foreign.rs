@@ -3,7 +3,7 @@
 use std::path::Path;
 
 /// First bytes of other files, and what these files are.
-const FOREIGN: [(&[u8], &str); 10] = [
+const FOREIGN: [(&[u8], &str); 15] = [
     (
         b"version https://git-lfs",
         "is a pointer of Git LFS, which stands for a larger file: `git lfs pull` fetches that file",
@@ -17,6 +17,11 @@ const FOREIGN: [(&[u8], &str); 10] = [
     (b"PXR-USDC", "is a USD file, which is not read: Blender, for example, saves it as glTF"),
     (b"ISO-10303-21", "is a STEP file, which has no triangles: FreeCAD, for example, saves it as OBJ or STL"),
     (b"%PDF", "is a PDF document"),
+    (b"//Maya ASCII", "is a file of Maya: export it from there as OBJ"),
+    (b"#usda", "is a USD file, which is not read: Blender, for example, saves it as glTF"),
+    (b"#VRML", "is a VRML file, which is not read: MeshLab, for example, saves it as PLY"),
+    (b"OFF\n", "is an OFF file, which is not read: MeshLab, for example, saves it as PLY"),
+    (b"OFF\r", "is an OFF file, which is not read: MeshLab, for example, saves it as PLY"),
 ];
 
 /// Returns what a file is instead of a scene, if its first bytes tell.
@@ -39,9 +44,21 @@ pub(super) fn what_it_is(bytes: &[u8]) -> Option<&'static str> {
     })
 }
 
+/// Returns what a file is whose content does not tell by its first bytes, as those of an archive, by its name's ending.
+fn of_name(path: &Path) -> Option<&'static str> {
+    match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
+        "3mf" => Some("is a 3MF file, which is not read: PrusaSlicer, for example, saves it as STL"),
+        "usdz" => Some("is a USD file, which is not read: Blender, for example, saves it as glTF"),
+        "3ds" => Some("is a 3DS file, which is not read: Assimp, for example, saves it as glTF"),
+        "dxf" => Some("is a DXF file, which is not read: FreeCAD, for example, saves it as OBJ or STL"),
+        "igs" | "iges" => Some("is an IGES file, which has no triangles: FreeCAD, for example, saves it as OBJ or STL"),
+        _ => None,
+    }
+}
+
 /// Returns why a file whose name has another ending than those of scenes is no scene.
 pub(super) fn of_other_name(path: &Path, bytes: &[u8]) -> String {
-    match what_it_is(bytes) {
+    match of_name(path).or_else(|| what_it_is(bytes)) {
         Some(what) => what.to_owned(),
         None if path.is_dir() => "is a folder: name a file in it".to_owned(),
         None => {
@@ -75,6 +92,9 @@ mod tests {
     #[test]
     fn the_other_name_counts_if_the_content_does_not_tell() {
         assert!(of_other_name(Path::new("a.txt"), b"hello").contains("ends in none of .toml"));
+        assert!(of_other_name(Path::new("a.3MF"), b"PK\x03\x04").contains("a 3MF file"));
+        assert!(of_other_name(Path::new("a.zip"), b"PK\x03\x04").contains("a ZIP archive"));
+        assert!(of_other_name(Path::new("a.off"), b"OFF\n3 1 0\n").contains("an OFF file"));
         assert!(of_other_name(Path::new("a.fbx"), b"Kaydara FBX Binary  \0").contains("FBX"));
         assert!(of_other_name(Path::new("/"), b" ").contains("a folder"));
     }

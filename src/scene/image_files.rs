@@ -113,6 +113,15 @@ impl Images {
         }
     }
 
+    /// Returns the image of a texture, if it is that of a file which has been decoded.
+    pub fn shown_image(&self, image_ix: u32) -> Option<&Image> {
+        match self.shown.get(image_ix as usize)? {
+            Shown::OfFile(file, View::Plain) => self.get(*file).ok().map(Examined::image),
+            Shown::OfFile(..) => None,
+            Shown::Own(image) => Some(image),
+        }
+    }
+
     /// Returns the image of a file that has been decoded. An error is a message that names the file.
     pub fn get(&self, file: usize) -> Result<&Examined, &str> {
         let image = self.files[file].image.as_ref().expect("files are decoded before they are shown");

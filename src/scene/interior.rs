@@ -1,7 +1,8 @@
 //! Interiors: scenes whose outer walls are made to be seen from inside. Seen from outside, they would show the backs of
 //! their walls, or nothing but these. Rays from the middle tell them from bodies: a body's outermost surface turns its
 //! front outwards, that of a room without thickness turns it inwards, and walls with thickness have a front on the
-//! inside as well.
+//! inside as well. A plain box whose sides face outwards counts, too, if there are things in it, which nobody would see
+//! from outside.
 //!
 //! Few rays meet all triangles here, without an acceleration structure, since the rays come before the structure is
 //! chosen and built.
@@ -40,6 +41,11 @@ const VIEW_RAYS: (usize, usize) = (6, 4);
 /// Least share of a view's rays that meet the fronts of surfaces. Where there are fewer, the eye is in a body.
 const FREE: f32 = 0.5;
 
+/// A hit is on the bounding box if it lies beyond this share of the ray's way to it.
+const ON_BOX: f32 = 0.999;
+/// Least number of the rays that meet a thing in a closed box.
+const LEAST_HITS_OF_THINGS: usize = 3;
+
 /// Returns whether walls surround the middle of a scene.
 pub(super) fn is_interior(scene: &Scene, (min, max): (Vec3, Vec3)) -> bool {
     let (centre, half) = ((min + max) / 2.0, (max - min) / 2.0);
@@ -49,23 +55,46 @@ pub(super) fn is_interior(scene: &Scene, (min, max): (Vec3, Vec3)) -> bool {
     let ray = |ix: usize| Ray { origin: centre, direction: on_sphere(ix) * half };
     // Few rays are enough to tell most bodies, of which some have millions of triangles.
     let few: Vec<Ray> = (0..N_RAYS).step_by(N_RAYS / N_FIRST_RAYS).map(ray).collect();
-    if n_walls(scene, half, &few) < N_FIRST_RAYS / 2 {
+    let hits_of_few = hits(scene, &few);
+    let may_be_closed = hides_things(half, &few, &hits_of_few, 0);
+    if n_walls(half, &few, &hits_of_few) < N_FIRST_RAYS / 2 && !may_be_closed {
         return false;
     }
     let rays: Vec<Ray> = (0..N_RAYS).map(ray).collect();
-    n_walls(scene, half, &rays) as f32 >= ENCLOSED * N_RAYS as f32
+    let hits = hits(scene, &rays);
+    n_walls(half, &rays, &hits) as f32 >= ENCLOSED * N_RAYS as f32
+        || may_be_closed && hides_things(half, &rays, &hits, LEAST_HITS_OF_THINGS)
 }
 
 /// Returns the number of rays from the middle of a box with half extents that meet a wall.
-fn n_walls(scene: &Scene, half: Vec3, rays: &[Ray]) -> usize {
-    let hits = hits(scene, rays);
-    // In half extents, the ray leaves the box where its largest coordinate is 1.
+fn n_walls(half: Vec3, rays: &[Ray], hits: &[Hits]) -> usize {
     let is_wall = |(ray, hits): &(&Ray, &Hits)| {
-        let exit = (ray.direction / half).abs().max_element().recip();
+        let exit = exit(ray, half);
         let is_wall = |hit: Option<Hit>| hit.is_some_and(|hit| hit.is_front && hit.t >= WALLS_BEGIN * exit);
         is_wall(hits.last) || is_wall(hits.first)
     };
-    rays.iter().zip(&hits).filter(is_wall).count()
+    rays.iter().zip(hits).filter(is_wall).count()
+}
+
+/// Returns whether each ray from the middle at last meets the back of the bounding box with half extents, at most meets
+/// fronts before, and whether at least `n_things` rays meet such a front.
+fn hides_things(half: Vec3, rays: &[Ray], hits: &[Hits], n_things: usize) -> bool {
+    let mut n_found = 0;
+    for (ray, hits) in rays.iter().zip(hits) {
+        let (Some(first), Some(last)) = (hits.first, hits.last) else { return false };
+        let is_thing = first.t < WALLS_BEGIN * last.t;
+        if last.is_front || last.t < ON_BOX * exit(ray, half) || is_thing && !first.is_front {
+            return false;
+        }
+        n_found += usize::from(is_thing);
+    }
+    n_found >= n_things
+}
+
+/// Returns where a ray from the middle of a box with half extents leaves it.
+fn exit(ray: &Ray, half: Vec3) -> f32 {
+    // In half extents, its largest coordinate is 1 there.
+    (ray.direction / half).abs().max_element().recip()
 }
 
 /// Returns a camera for an interior. If a side is open, the camera is outside and sees the whole interior through it.
@@ -107,9 +136,12 @@ fn camera_inside(scene: &Scene, (min, max): (Vec3, Vec3), frame: &Frame) -> Opti
     let hits = hits(scene, &rays);
     let diagonal = 2.0 * half.length();
     let mut best: Option<(f32, Camera)> = None;
-    for (camera, hits) in cameras.into_iter().zip(hits.chunks(VIEW_RAYS.0 * VIEW_RAYS.1)) {
-        let distances =
-            hits.iter().filter_map(|hits| hits.first.filter(|hit| hit.is_front)).map(|hit| hit.t / diagonal);
+    const N: usize = VIEW_RAYS.0 * VIEW_RAYS.1;
+    for (camera, (rays, hits)) in cameras.into_iter().zip(rays.chunks(N).zip(hits.chunks(N))) {
+        let is_on_box = |p: Vec3| ((p - centre) / half).abs().max_element() >= ON_BOX;
+        let is_seen = |ray: &Ray, hit: &Hit| hit.is_front || is_on_box(ray.origin + hit.t * ray.direction);
+        let seen = |(ray, hits): (&Ray, &Hits)| hits.first.filter(|hit| is_seen(ray, hit));
+        let distances = rays.iter().zip(hits).filter_map(seen).map(|hit| hit.t / diagonal);
         let (n, sum) = distances.fold((0, 0.0), |(n, sum): (usize, f32), distance| (n + 1, sum + distance.min(1.0)));
         if n as f32 >= FREE * hits.len() as f32 && best.is_none_or(|(most, _)| sum > most * 1.01) {
             best = Some((sum, camera));

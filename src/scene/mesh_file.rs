@@ -18,6 +18,7 @@ use super::{
     outside::Access,
     ply::{PlyMesh, ply_mesh},
     read::{lossy_text, read_bytes},
+    scan_colours,
     smooth::Shading,
     stl::{is_binary_stl, is_stl_text, parse_stl},
 };
@@ -163,11 +164,12 @@ impl Shape {
             ShapeKind::Ply(ply) => ply.mesh().positions.len(),
             ShapeKind::Stl(mesh) => mesh.positions.len(),
         };
-        let loaded = match kind {
+        let mut loaded = match kind {
             ShapeKind::Obj(file) => obj_mesh(path, file, loading)?,
             ShapeKind::Ply(ply) => Loaded { origin, ..ply.with_materials(path, loading.access, loading.images) },
             ShapeKind::Stl(mesh) => Loaded { mesh, origin, materials: Vec::new(), uses_crease: loading.shading.smooth },
         };
+        scan_colours::leave_out(path, &mut loaded, loading.images);
         match (loaded.mesh.faces.is_empty(), n_points) {
             (false, _) => Ok(loaded),
             (true, 0) => Err(SceneError::file(path, "has no triangles")),

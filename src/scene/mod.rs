@@ -40,6 +40,7 @@ mod ply;
 mod polygon;
 mod preset;
 mod read;
+mod scan_colours;
 mod sky;
 mod smooth;
 mod sources;
@@ -338,7 +339,7 @@ fn load_mesh_file(path: &Path, options: &LoadOptions) -> Result<(Scene, Lacks), 
         scene.origin = origin;
         extent::note(path, origin);
     }
-    let guess = up::guess(format, &head, &mesh);
+    let guess = up::guess(format, &head, (&mesh, origin));
     if let (Some(why), None) = (&guess.why, options.look.up) {
         tracing::info!("{}: {why}", path.display());
     }

@@ -1,11 +1,16 @@
 //! The axis that points up in a bare mesh file, as far as its content tells.
 //!
-//! OBJ and PLY files state no axis. What decides is a comment of a program whose axis is known, or else a ground: a
-//! large flat surface below everything else. In doubt it is +y.
+//! OBJ and PLY files state no axis. What decides is a comment of a program whose axis is known, or else the
+//! coordinates of a map, or a ground: a large flat surface below everything else. In doubt it is +y.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
-use super::{look::Up, mesh::Mesh, mesh_file::MeshFormat};
+use super::{
+    look::Up,
+    mesh::Mesh,
+    mesh_file::{MeshFormat, bounds_of},
+};
 
 /// Bytes at the beginning of a file in which comments are looked for.
 pub(super) const HEAD_BYTES: usize = 4096;
@@ -50,6 +55,11 @@ const FLAT_SHARE: f32 = 0.2;
 /// Least factor between the flat areas at the lowest z and at the lowest y of such a mesh.
 const FLATTER: f32 = 1.5;
 
+/// Least distance to the east and to the north from the origin of a country's map, metres. Half a million is usual.
+const LEAST_ON_A_MAP: f64 = 1e5;
+/// Greatest height of a place on Earth, metres, with some to spare.
+const GREATEST_HEIGHT: f64 = 1e4;
+
 /// An axis, and why it points up.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Guess {
@@ -58,8 +68,8 @@ pub(super) struct Guess {
     pub why: Option<String>,
 }
 
-/// Returns the axis that points up in a mesh file.
-pub(super) fn guess(format: MeshFormat, head: &[u8], mesh: &Mesh) -> Guess {
+/// Returns the axis that points up in a mesh file. `origin` is the point of the file that is the origin of the mesh.
+pub(super) fn guess(format: MeshFormat, head: &[u8], (mesh, origin): (&Mesh, DVec3)) -> Guess {
     let usual = |up| Guess { up, why: None };
     let noted = |why: String| Guess { up: Up::Z, why: Some(format!("+z points up, {why}; --up y turns the picture")) };
     match format {
@@ -70,6 +80,9 @@ pub(super) fn guess(format: MeshFormat, head: &[u8], mesh: &Mesh) -> Guess {
     match of_comments(format, head) {
         Some((word, Up::Z)) => noted(format!("as a comment of the file says (`{word}`)")),
         Some((_, Up::Y)) => usual(Up::Y),
+        None if is_on_a_map(mesh, origin) => {
+            noted("since x and y are as large as coordinates on a map, and z is not".to_owned())
+        }
         None if has_ground_along_z(mesh) => {
             noted("since a large flat surface at the lowest z is below everything else".to_owned())
         }
@@ -88,6 +101,13 @@ fn of_comments(format: MeshFormat, head: &[u8]) -> Option<(&'static str, Up)> {
     let writers = if format == MeshFormat::Ply { &PLY_WRITERS[..] } else { &OBJ_WRITERS[..] };
     let is_said = |word: &str| comments.iter().any(|comment| comment.contains(word));
     STATED.iter().chain(writers).find(|(word, _)| is_said(word)).copied()
+}
+
+/// Returns whether a mesh has the coordinates of a map: metres to the east, metres to the north, and a height.
+fn is_on_a_map(mesh: &Mesh, origin: DVec3) -> bool {
+    let (min, max) = bounds_of(mesh.positions.par_iter().copied());
+    let middle = origin + (min.as_dvec3() + max.as_dvec3()) / 2.0;
+    middle.x.abs() >= LEAST_ON_A_MAP && middle.y.abs() >= LEAST_ON_A_MAP && middle.z.abs() <= GREATEST_HEIGHT
 }
 
 /// Returns whether a ground at the lowest z carries everything else, and nothing suggests another axis.
@@ -193,9 +213,19 @@ mod tests {
         assert!(may_lie_on_side(&mesh(|p| p)));
         assert!(!may_lie_on_side(&mesh(|p| Vec3::new(p.x, p.z, -p.y))));
         assert!(!may_lie_on_side(&mesh(|p| -p)) && !may_lie_on_side(&Mesh::default()));
-        let note = guess(MeshFormat::Obj, b"", &mesh(|p| p)).why.unwrap();
+        let note = guess(MeshFormat::Obj, b"", (&mesh(|p| p), DVec3::ZERO)).why.unwrap();
         assert!(note.contains("--up z"), "{note}");
-        assert_eq!(guess(MeshFormat::Obj, b"# Blender", &mesh(|p| p)), Guess { up: Up::Y, why: None });
+        assert_eq!(guess(MeshFormat::Obj, b"# Blender", (&mesh(|p| p), DVec3::ZERO)), Guess { up: Up::Y, why: None });
+    }
+
+    #[test]
+    fn coordinates_of_a_map_tell_the_axis() {
+        let mesh = on_ground(1.0, [0, 1, 2]);
+        let at = |x, y, z| guess(MeshFormat::Obj, b"", (&mesh, DVec3::new(x, y, z))).up;
+        assert_eq!(at(512_345.0, 5_412_345.0, 431.0), Up::Z);
+        // A height points up along +y.
+        assert_eq!(at(512_345.0, 431.0, -5_412_345.0), Up::Y);
+        assert_eq!([at(0.0, 0.0, 0.0), at(5e5, 5e5, 5e5)], [Up::Y; 2]);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 mod convert;
 mod errors;
+mod exporters;
 mod extent;
 mod far;
 mod generators;

@@ -238,7 +238,7 @@ fn what_is_not_shown_is_told_once() {
 
 #[test]
 fn names_in_the_wrong_case_are_taken() {
-    let obj = format!("mtllib M.MTL\nusemtl Leaf\n{QUAD}usemtl twin\nf 1 2 3\nusemtl two\nf 1 2 3\n");
+    let obj = format!("mtllib M.MTL\nusemtl Leaf\n{QUAD}usemtl twin\nf 1 2 3\nusemtl two\nf 1 2 4\n");
     let mtl = b"newmtl leaf\nKd 0 1 0\nnewmtl Twin\nnewmtl TWIN\nnewmtl Two\nnewmtl two\n";
     let (scene, warnings) = load_scene(&[("m.obj", obj.as_bytes()), ("m.mtl", mtl)]);
     let scene = scene.unwrap();

@@ -223,9 +223,8 @@ fn what_no_library_defines_is_the_default() {
         assert_eq!((scene.material_names, scene.triangle_materials), (vec!["(default)".to_owned()], vec![0]));
     }
     // One line names two libraries, and the faces have several materials.
-    let obj = format!(
-        "mtllib a.mtl b.mtl\n{TRIANGLE}usemtl b\nf 1 2 3\nusemtl a\nf 1 2 3\nusemtl c\nf 3 2 1\nusemtl b\nf 1 2 3"
-    );
+    let faces = "usemtl b\nf 1 2 3\nusemtl a\nf 1 2 4\nusemtl c\nf 3 2 1\nusemtl b\nf 1 2 3";
+    let obj = format!("mtllib a.mtl b.mtl\n{TRIANGLE}v 0 0 1\n{faces}");
     let files: [(&str, &[u8]); 3] =
         [("m.obj", obj.as_bytes()), ("a.mtl", b"newmtl a\n"), ("b.mtl", b"newmtl b\nd 0.5")];
     let scene = load(&files).unwrap();

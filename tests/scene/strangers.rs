@@ -11,14 +11,14 @@ const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
 const UVS: &str = "vt 0 0\nvt 1 0\nvt 0 1\n";
 
 /// Loads files, which must load, and returns the scene and the warnings.
-fn loaded(files: &[(&str, &[u8])]) -> (Scene, Vec<String>) {
+pub(super) fn loaded(files: &[(&str, &[u8])]) -> (Scene, Vec<String>) {
     let (scene, warnings) = load_scene(files);
     (scene.unwrap_or_else(|error| panic!("{error}")), warnings)
 }
 
 /// Returns the material of a triangle with texture coordinates, from the statements of an MTL file beside an image
 /// `a.png` of one colour.
-fn material_of(mtl: &str, pixel: [u8; 4]) -> (Material, Vec<String>) {
+pub(super) fn material_of(mtl: &str, pixel: [u8; 4]) -> (Material, Vec<String>) {
     let obj = format!("mtllib m.mtl\nusemtl m\n{TRIANGLE}{UVS}f 1/1 2/2 3/3\n");
     let mtl = format!("newmtl m\n{mtl}\n");
     let files = [("m.obj", obj.as_bytes()), ("m.mtl", mtl.as_bytes()), ("a.png", &png(|_, _| pixel))];

@@ -8,6 +8,7 @@
 //! files that are wrong. Errors name the JSON path.
 
 mod accessor;
+mod camera_start;
 mod cameras;
 mod deform;
 mod document;

@@ -1,9 +1,14 @@
 //! The nodes of a scene, and where they stand in the world.
 
+use std::borrow::Cow;
+
 use glam::{DMat4, DQuat, DVec3, Mat4, Quat};
 use gltf::json::{self, Index, Node};
 
-use super::document::{Document, item};
+use super::{
+    camera_start::camera_starts,
+    document::{Document, item},
+};
 use crate::scene::error::Checked;
 
 /// The nodes of a scene, each with its transform.
@@ -16,12 +21,17 @@ pub(super) struct Nodes {
 
 impl Nodes {
     /// Follows the nodes of a scene: the one that `name` says by its name or index, else the default one, else the
-    /// first. A document without scenes shows all nodes.
+    /// first. A document without scenes shows all nodes. Animated cameras are where their animations begin.
     ///
     /// # Errors
     /// The scene or a node does not exist, or a node is reached twice: the nodes are not a tree.
     pub fn new(document: &Document, name: Option<&str>) -> Checked<Self> {
-        let all = &document.root.nodes;
+        let mut all = Cow::Borrowed(&document.root.nodes);
+        let starts = camera_starts(document);
+        if !starts.is_empty() {
+            starts.into_iter().for_each(|(ix, node)| all.to_mut()[ix] = node);
+        }
+        let all = &all[..];
         let mut nodes = Self { shown: Vec::new(), world_from_node: vec![None; all.len()] };
         let roots = match scene(document, name)? {
             Some(ix) => indices(&document.root.scenes[ix].nodes),

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::{
     clean::{FaceKind, FaceShading},
-    two_sided::{move_apart, two_sided_faces},
+    two_sided::{Coincident, CoincidentTriangles},
 };
 use crate::scene::{
     mesh::Mesh,
@@ -135,20 +135,15 @@ pub fn mesh(models: &[Model], no_material: u32, (shading, colour_scale): (Shadin
     let mut mesh = Mesh::default();
     let mut to_smooth = Vec::new();
     let mut triangulator = Triangulator::default();
-    let (two_sided, mut to_move) = (two_sided_faces(models), Vec::new());
-    for (model, two_sided) in models.iter().zip(two_sided) {
+    let mut coincident = CoincidentTriangles::new(Coincident::of(models));
+    for (model_ix, model) in models.iter().enumerate() {
         let triangles = model.triangles(&mut triangulator);
         let part = model.part(&triangles, (shading, colour_scale));
         let n_faces = part.faces.len();
         let is_smoothed = shading.smooth && model.kind.shading == FaceShading::Smooth;
         to_smooth.resize(to_smooth.len() + n_faces, is_smoothed);
-        if !two_sided.is_empty() {
-            let mut is_two_sided = vec![false; model.corners[0].len()];
-            two_sided.into_iter().for_each(|corners| is_two_sided[corners].fill(true));
-            let of_faces = triangles.each(|corner| is_two_sided[corner]);
-            let first_face = mesh.faces.len();
-            to_move.extend((0..n_faces).filter(|ix| of_faces[*ix][0]).map(|ix| first_face + ix));
-        }
+        let first_corners = || triangles.each(|corner| corner).iter().map(|[first, ..]| *first).collect();
+        coincident.add((model_ix, model), mesh.faces.len(), first_corners);
         let slot = model.material_ix.map_or(no_material, |ix| ix as u32);
         mesh.append(Mesh { slots: vec![slot; n_faces], ..part });
     }
@@ -162,6 +157,6 @@ pub fn mesh(models: &[Model], no_material: u32, (shading, colour_scale): (Shadin
         };
         mesh.normals.par_iter_mut().zip(computed).zip(&to_smooth).for_each(replace);
     }
-    move_apart(&mut mesh, &to_move);
+    coincident.separate(&mut mesh);
     (mesh, uses_crease)
 }

@@ -45,6 +45,8 @@ struct More {
     /// Pr, Pm, Ps, Pc and Pcr by their keywords.
     numbers: HashMap<String, f32>,
     maps: Vec<Map>,
+    /// Whether the first statement is `illum`, as Maya writes it.
+    begins_with_illum: bool,
 }
 
 /// A map of a material.
@@ -119,6 +121,13 @@ fn as_meant(path: &Path, described: &mut [Described]) {
         if spec.ka.is_some_and(is_exporters_ambient) {
             spec.ka = None;
         }
+        // Nothing would pass such a filter, so it says nothing of what passes.
+        if spec.tf == Some([0.0; 3]) {
+            spec.tf = None;
+        }
+        if more.begins_with_illum {
+            take_opacity_of_maya(spec);
+        }
         if matches!(spec.illum, Some(4 | 6 | 9)) && !is_transparent(spec, more) {
             // The default of `illum` depends on `Ks`.
             spec.illum = None;
@@ -137,6 +146,19 @@ fn as_meant(path: &Path, described: &mut [Described]) {
     };
     warn(&invisible, "would be invisible by `d 0` or `Tr 1`: shown opaque");
     warn(&no_glass, "would be glass by `illum`, but no other term says so: shown opaque; `Ni 1.5` would make it glass");
+}
+
+/// Reads the opacity of a material of Maya, which writes `illum 4`, `Ni 1.00`, no `d`, and 1 minus the transparency as
+/// `Tf`: an opaque material has `Tf 1 1 1`. Glass of Maya has an `Ni` that is not 1.
+fn take_opacity_of_maya(spec: &mut MaterialSpec) {
+    let is_thin = spec.illum == Some(4) && spec.ni == Some(1.0) && spec.d.is_none_or(|d| d == 1.0);
+    if let (true, Some(tf)) = (is_thin, spec.tf)
+        && tf.iter().all(|x| *x <= 1.0)
+        && tf != [1.0; 3]
+    {
+        let opacity = tf.iter().sum::<f32>() / 3.0;
+        (spec.illum, spec.tf, spec.d) = (None, None, Some(opacity));
+    }
 }
 
 /// Takes the diffuse and the ambient light from glass. Its `Kd` is the colour in which things are seen through it. A
@@ -188,7 +210,7 @@ fn is_transparent(spec: &MaterialSpec, more: &More) -> bool {
 /// shown: once for each kind, and once for each file that is missing or has another name.
 fn read_more(reach: Reach, path: &Path, text: &str, images: &mut Images) -> Vec<More> {
     let folder = path.parent().unwrap_or(Path::new(""));
-    let (mut materials, mut is_replaced): (Vec<More>, bool) = (Vec::new(), false);
+    let (mut materials, mut is_replaced, mut is_first): (Vec<More>, bool, bool) = (Vec::new(), false, false);
     let mut told: HashSet<String> = HashSet::new();
     let mut warn = |line: usize, key: &str, what: String| {
         if told.insert(key.to_owned()) {
@@ -201,8 +223,12 @@ fn read_more(reach: Reach, path: &Path, text: &str, images: &mut Images) -> Vec<
         if keyword == "newmtl" {
             materials.push(More::default());
             is_replaced = images.is_replaced(rest);
+            is_first = true;
+            continue;
         }
         let Some(material) = materials.last_mut() else { continue };
+        material.begins_with_illum |= is_first && keyword == "illum";
+        is_first = false;
         if matches!(keyword, "Pr" | "Pm" | "Ps" | "Pc" | "Pcr") {
             // A number that is none has been told by `clean_mtl`.
             let Ok(number) = fraction(keyword, rest) else { continue };

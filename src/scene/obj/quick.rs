@@ -461,7 +461,8 @@ mod tests {
     fn both_ways_give_the_same_mesh_however_the_text_is_cut() {
         for text in [usual(false), usual(true)] {
             let expected = by_tobj(&text);
-            assert_eq!(expected.slots, [0, 0, 0, 0, 0, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2]);
+            // Faces that are there again have the slot of the first one.
+            assert_eq!(expected.slots, [0, 0, 0, 0, 0, 1, 0, 1, 2, 2, 2, 2, 2, 2, 0]);
             for chunk_bytes in [1, 10, 40, 100, 200, CHUNK_BYTES] {
                 assert_eq!(quickly(&text, chunk_bytes), expected, "{chunk_bytes}");
                 let (quick, careful) =

@@ -1,8 +1,13 @@
-//! Faces that are there twice, once for each side, with a material for each: SketchUp writes walls like this.
-//! Both lie in one plane, so that chance would decide which of the two a ray hits. Each is therefore moved to its own
-//! side, by a distance that no picture shows.
+//! Faces that are there several times. All of them lie in one plane, so that chance would decide which one a ray hits.
+//!
+//! SketchUp writes a wall twice, once for each side, if both sides have a material. Each is moved to its own side, by a
+//! distance that no picture shows. Of faces with the same side, the first one in the file counts: the others become
+//! copies of it.
 
-use std::{collections::HashMap, ops::Range};
+use std::{
+    collections::{HashMap, HashSet},
+    ops::Range,
+};
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -14,28 +19,52 @@ use crate::scene::{mesh::Mesh, mesh_file::bounds_of};
 /// steps of single precision.
 const SHARE: f32 = 2e-6;
 
-/// Returns the corners of the faces which are there twice with opposite sides and other materials, as ranges for each
-/// model.
-pub fn two_sided_faces(models: &[Model]) -> Vec<Vec<Range<usize>>> {
-    let mut found = vec![Vec::new(); models.len()];
-    if models.iter().all(|model| model.material_ix == models[0].material_ix) {
-        return found;
+/// The faces of models that are there several times.
+#[derive(Debug, Default)]
+pub struct Coincident {
+    /// The faces that have an opposite one with another material.
+    pub two_sided: HashSet<FacePlace>,
+    /// Faces that are there again with the same side, each with the first of its kind.
+    pub repeated: Vec<(FacePlace, FacePlace)>,
+}
+
+/// The place of a face: the index of its model, and its first corner there.
+pub type FacePlace = (usize, usize);
+
+impl Coincident {
+    /// Finds the faces that are there several times with different materials.
+    pub fn of(models: &[Model]) -> Self {
+        let mut found = Self::default();
+        if models.iter().all(|model| model.material_ix == models[0].material_ix) {
+            return found;
+        }
+        let mut all: Vec<Face> = models.par_iter().enumerate().flat_map_iter(faces_of).collect();
+        all.par_sort_unstable();
+        for alike in all.chunk_by(|a, b| a.key == b.key).filter(|alike| alike.len() > 1) {
+            found.add(models, alike);
+        }
+        found
     }
-    let mut all: Vec<Face> = models.par_iter().enumerate().flat_map_iter(faces_of).collect();
-    all.par_sort_unstable();
-    for alike in all.chunk_by(|a, b| a.key == b.key).filter(|alike| alike.len() > 1) {
+
+    /// Adds those of a few faces, ordered by their places, that have the points of the first one.
+    fn add(&mut self, models: &[Model], alike: &[Face]) {
         let material = |face: &Face| models[face.model_ix].material_ix;
         let first = alike[0].polygon(models);
-        let sides: Vec<_> = alike.iter().map(|face| is_turned(&first, &face.polygon(models))).collect();
-        let is_other =
-            |(face, side): (&Face, &Option<bool>)| *side == Some(true) && material(face) != material(&alike[0]);
-        if !alike.iter().zip(&sides).any(is_other) {
-            continue;
+        let (mut same, mut opposite) = (Vec::new(), Vec::new());
+        for face in alike {
+            match is_turned(&first, &face.polygon(models)) {
+                Some(false) => same.push(face),
+                Some(true) => opposite.push(face),
+                None => {}
+            }
         }
-        let of_pair = alike.iter().zip(sides).filter(|(_, side)| side.is_some());
-        of_pair.for_each(|(face, _)| found[face.model_ix].push(face.corners()));
+        if opposite.iter().any(|face| material(face) != material(&alike[0])) {
+            self.two_sided.extend(same.iter().chain(&opposite).map(|face| face.place()));
+        }
+        for side in [same, opposite] {
+            self.repeated.extend(side.iter().skip(1).map(|face| (face.place(), side[0].place())));
+        }
     }
-    found
 }
 
 /// A face of a model.
@@ -52,6 +81,10 @@ impl Face {
     /// Returns its points.
     fn polygon(&self, models: &[Model]) -> Vec<Vec3> {
         self.corners().map(|corner| point(&models[self.model_ix], corner)).collect()
+    }
+
+    fn place(&self) -> FacePlace {
+        (self.model_ix, self.first_corner)
     }
 
     fn corners(&self) -> Range<usize> {
@@ -104,8 +137,67 @@ fn is_turned(a: &[Vec3], b: &[Vec3]) -> Option<bool> {
     }
 }
 
+/// Returns the first corner of the face to which each corner of a model belongs.
+fn first_corners(model: &Model) -> Vec<usize> {
+    faces(model).flat_map(|(first, n)| std::iter::repeat_n(first, n)).collect()
+}
+
+/// The triangles of a mesh that come from faces which are there several times.
+pub struct CoincidentTriangles {
+    faces: Coincident,
+    /// Indices of triangles by their faces.
+    triangles: HashMap<FacePlace, Vec<usize>>,
+}
+
+impl CoincidentTriangles {
+    /// Returns no triangles of these faces.
+    pub fn new(faces: Coincident) -> Self {
+        let places = faces.repeated.iter().flat_map(|(again, first)| [*again, *first]);
+        let triangles = places.chain(faces.two_sided.iter().copied()).map(|place| (place, Vec::new())).collect();
+        Self { faces, triangles }
+    }
+
+    /// Adds the triangles of a model. `first_triangle`: the index of the first one in the mesh. `corners`: the first
+    /// corner of each triangle in the model.
+    pub fn add(&mut self, (model_ix, model): (usize, &Model), first_triangle: usize, corners: impl Fn() -> Vec<usize>) {
+        if self.triangles.is_empty() {
+            return;
+        }
+        let first_corners = first_corners(model);
+        for (ix, corner) in corners().into_iter().enumerate() {
+            if let Some(triangles) = self.triangles.get_mut(&(model_ix, first_corners[corner])) {
+                triangles.push(first_triangle + ix);
+            }
+        }
+    }
+
+    /// Makes copies of the first faces of their kinds, and moves opposite faces apart.
+    pub fn separate(&self, mesh: &mut Mesh) {
+        for (again, first) in &self.faces.repeated {
+            self.triangles[again].iter().zip(&self.triangles[first]).for_each(|(to, from)| copy(mesh, *from, *to));
+        }
+        let mut to_move: Vec<usize> =
+            self.faces.two_sided.iter().flat_map(|place| &self.triangles[place]).copied().collect();
+        to_move.sort_unstable();
+        move_apart(mesh, &to_move);
+    }
+}
+
+/// Makes a triangle of a mesh a copy of another one.
+fn copy(mesh: &mut Mesh, from: usize, to: usize) {
+    mesh.faces[to] = mesh.faces[from];
+    mesh.normals[to] = mesh.normals[from];
+    mesh.slots[to] = mesh.slots[from];
+    for uvs in mesh.uvs.iter_mut().filter(|uvs| !uvs.is_empty()) {
+        uvs[to] = uvs[from];
+    }
+    if !mesh.colours.is_empty() {
+        mesh.colours[to] = mesh.colours[from];
+    }
+}
+
 /// Moves faces along their normals. They get points of their own.
-pub fn move_apart(mesh: &mut Mesh, faces: &[usize]) {
+fn move_apart(mesh: &mut Mesh, faces: &[usize]) {
     if faces.is_empty() {
         return;
     }
