@@ -14,7 +14,6 @@ column is kdray's divided by Mitsuba's.
 import argparse
 import dataclasses
 import json
-import subprocess
 import tempfile
 import time
 from pathlib import Path
