@@ -29,12 +29,13 @@ const BsdfSample BSDF_ABSORBED = BsdfSample(vec3(0.0, 0.0, 1.0), vec3(0.0), 0.0,
 
 // A direction that is sampled for one lobe.
 struct LobeSample {
-    // In the frame of the surface.
+    // A unit vector in the frame of the surface.
     vec3 local;
     // 1: the lobe is on the viewer's side; -1: on the other side; 0: there is no lobe.
     float side;
     bool is_delta;
-    // Of a delta lobe: the share of light that it scatters, and the probability with which it was chosen.
+    // The share of light that a delta lobe scatters, and the probability with which it was chosen. Other lobes have
+    // no use for them.
     vec3 share;
     float probability;
 };

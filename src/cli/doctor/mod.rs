@@ -73,7 +73,7 @@ pub fn run(args: &DoctorArgs) -> Result<(), CliError> {
 
 /// A processor that was found.
 struct Processor {
-    /// None if it cannot be used.
+    /// The engine that draws on the processor. `None` if the processor cannot be used.
     engine: Option<Engine>,
     findings: ProcessorFindings,
 }

@@ -35,11 +35,12 @@ const BSDF_ABSORBED: BsdfSample = BsdfSample { direction: Vec3::Z, weight: Vec3:
 /// A direction that is sampled for one lobe.
 #[derive(Clone, Copy, Debug)]
 struct LobeSample {
-    /// In the frame of the surface.
+    /// A unit vector in the frame of the surface.
     local: Vec3,
     /// 1: the lobe is on the viewer's side; -1: on the other side; 0: there is no lobe.
     side: f32,
-    /// Of a delta lobe: the share of light that it scatters, and the probability with which it was chosen.
+    /// The share of light that a delta lobe scatters, and the probability with which it was chosen. `None` if the lobe
+    /// is not a delta lobe.
     delta: Option<(Vec3, f32)>,
 }
 

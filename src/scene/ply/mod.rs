@@ -144,7 +144,7 @@ pub(super) struct PlyMesh {
     uses_crease: bool,
     /// Number of faces that are left out, since their corners are not finite.
     n_left_out: usize,
-    /// As in [`Vertices`].
+    /// Whether all vertices would be invisible, as [`Vertices`] states it.
     would_be_invisible: bool,
 }
 
