@@ -44,9 +44,6 @@ impl ContextOptions {
     }
 }
 
-/// The [`DeviceInfo::kind`] of a driver that computes on the CPU.
-const SOFTWARE: &str = "CPU";
-
 /// A Vulkan device with one queue for graphics and compute.
 pub struct Context {
     pub(super) device: ash::Device,
@@ -232,7 +229,7 @@ impl Context {
             timestamp_valid_bits: families[family].timestamp_valid_bits,
             queue,
             allocator: ManuallyDrop::new(Arc::new(Mutex::new(allocator))),
-            predicates_branches: info.kind == SOFTWARE && overrides.n_lanes.is_none(),
+            predicates_branches: info.is_software() && overrides.n_lanes.is_none(),
             info,
             fuses_fma: OnceLock::new(),
             n_lanes: overrides.n_lanes.map_or_else(OnceLock::new, OnceLock::from),
@@ -260,7 +257,7 @@ impl Context {
 
     /// Whether the driver computes on the CPU.
     pub fn is_software(&self) -> bool {
-        self.info.kind == SOFTWARE
+        self.info.is_software()
     }
 
     /// Whether the driver predicates branches: if any lane takes a side of a branch, all lanes execute that side.

@@ -66,10 +66,6 @@ pub struct Limits {
     pub target_size: u32,
     /// Greatest number of workgroups along x in a dispatch.
     pub n_groups: u32,
-    /// Size of the memory that is local to the device, bytes.
-    pub memory_bytes: u64,
-    /// Whether the device is a CPU.
-    pub is_cpu: bool,
 }
 
 impl Limits {
@@ -80,7 +76,7 @@ impl Limits {
         let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut of_1_1).push_next(&mut of_1_3);
         // SAFETY: the device belongs to the instance, and Vulkan 1.3 defines both structs.
         unsafe { instance.raw.get_physical_device_properties2(device, &mut all) };
-        let vk::PhysicalDeviceProperties { limits, device_type, .. } = all.properties;
+        let limits = all.properties.limits;
         Self {
             storage_range: u64::from(limits.max_storage_buffer_range),
             n_texels: limits.max_texel_buffer_elements,
@@ -90,8 +86,6 @@ impl Limits {
                 .min(limits.max_framebuffer_height)
                 .min(limits.max_image_dimension2_d),
             n_groups: limits.max_compute_work_group_count[0],
-            memory_bytes: memory_bytes(instance, device),
-            is_cpu: device_type == vk::PhysicalDeviceType::CPU,
         }
     }
 

@@ -343,15 +343,7 @@ mod tests {
     use crate::frame::Denoise;
 
     fn limits(storage_range: u64) -> Limits {
-        Limits {
-            storage_range,
-            n_texels: 0,
-            buffer_bytes: u64::MAX,
-            target_size: 1 << 14,
-            n_groups: 65_535,
-            memory_bytes: 1 << 34,
-            is_cpu: false,
-        }
+        Limits { storage_range, n_texels: 0, buffer_bytes: u64::MAX, target_size: 1 << 14, n_groups: 65_535 }
     }
 
     /// Each pixel of the picture is in one band, whose window fits the device.

@@ -126,7 +126,7 @@ impl Renderer {
         constants.n_lanes = lanes_to_share(&context, options)?;
         let of_paths = options.integrator == Integrator::Path;
         let budget = QueueSizing { fixed_capacity, branches, of_paths };
-        constants.queue_capacity = budget.queue_capacity(context.limits(), &constants);
+        constants.queue_capacity = budget.queue_capacity(context.limits(), context.info(), &constants);
         let spans = budget.spans(&constants, None);
         let schedule = Schedule::new(&context, &constants, spans, options)?;
         let uploading = info_span!("upload scene").entered();

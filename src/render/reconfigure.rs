@@ -129,7 +129,7 @@ impl Renderer {
     /// Creates the buffers and the batches for options that need other ones, such as another size or number of
     /// bounces. Buffers that are large enough are shared with the current resources.
     fn with_room(&self, constants: Frame, options: &RenderOptions) -> Result<(Resources, Schedule), GpuError> {
-        let queue_capacity = self.budget.queue_capacity(self.context.limits(), &constants);
+        let queue_capacity = self.budget.queue_capacity(self.context.limits(), self.context.info(), &constants);
         let n_lanes = lanes_to_share(&self.context, options)?;
         let constants = Frame { queue_capacity, n_lanes, ..constants };
         let spans = self.budget.spans(&constants, self.most_pixels);

@@ -5,7 +5,7 @@ use std::{mem, sync::Arc};
 
 use crate::{
     frame::{FrameKind, Integrator, Plan, RenderOptions},
-    gpu::{Buffer, BufferUse, Context, GpuError, Limits, Timer},
+    gpu::{Buffer, BufferUse, Context, DeviceInfo, GpuError, Limits, Timer},
     layout::{Batch, Bounce, Frame, MOST_SAMPLES_LOG2, PathRay, RAY_GROUP_SIZE, ROUND_BEGIN},
 };
 
@@ -116,7 +116,7 @@ pub struct QueueSizing {
 impl QueueSizing {
     /// Returns the capacity that the queue should have: the caller's, if it is set. Otherwise the rays that the whole
     /// picture is expected to make, but no more than [`MOST_RAYS`] and no more than the device's limits allow.
-    pub fn queue_capacity(&self, limits: &Limits, constants: &Frame) -> u32 {
+    pub fn queue_capacity(&self, limits: &Limits, info: &DeviceInfo, constants: &Frame) -> u32 {
         if let Some(capacity) = self.fixed_capacity {
             return capacity;
         }
@@ -125,7 +125,7 @@ impl QueueSizing {
             let most = limits.storage_range / size_of::<PathRay>() as u64;
             let most_in_groups = u64::from(limits.n_groups) * u64::from(RAY_GROUP_SIZE) / 2;
             let wanted = n_pixels << MOST_SAMPLES_LOG2;
-            return wanted.min(most_paths(limits)).min(most).min(most_in_groups).max(1 << MOST_SAMPLES_LOG2) as u32;
+            return wanted.min(most_paths(info)).min(most).min(most_in_groups).max(1 << MOST_SAMPLES_LOG2) as u32;
         }
         // The largest buffer of the queue is `rays` or `light_visibility`.
         let bytes_per_ray = mem::size_of::<PathRay>().max(4 * constants.n_lights as usize) as u64;
@@ -159,11 +159,11 @@ impl QueueSizing {
 
 /// Returns the number of paths of a batch that the device should get, if the picture has so many. Pictures have the
 /// same bits whatever it is.
-fn most_paths(limits: &Limits) -> u64 {
-    if limits.is_cpu {
+fn most_paths(info: &DeviceInfo) -> u64 {
+    if info.is_software() {
         return FEW_PATHS;
     }
-    (limits.memory_bytes / MEMORY_PER_PATHS / PATH_BYTES).clamp(FEW_PATHS, MOST_PATHS)
+    (info.memory_bytes / MEMORY_PER_PATHS / PATH_BYTES).clamp(FEW_PATHS, MOST_PATHS)
 }
 
 #[cfg(test)]
@@ -176,21 +176,27 @@ mod tests {
         buffer_bytes: u64::MAX,
         target_size: 16_384,
         n_groups: 65_535,
-        memory_bytes: 1 << 33,
-        is_cpu: false,
     };
+
+    fn info(memory_bytes: u64, kind: &str) -> DeviceInfo {
+        let text = String::new;
+        let (name, driver, api_version) = (text(), text(), text());
+        let kind = kind.to_owned();
+        DeviceInfo { index: 0, name, kind, driver, api_version, subgroup_size: 32, memory_bytes, missing: Vec::new() }
+    }
 
     #[test]
     fn a_batch_of_paths_grows_with_the_memory() {
-        let capacity = |memory_bytes: u64, is_cpu: bool| {
-            let limits = Limits { storage_range: u64::MAX, n_groups: u32::MAX, memory_bytes, is_cpu, ..LIMITS };
+        let capacity = |memory_bytes: u64, kind: &str| {
+            let limits = Limits { storage_range: u64::MAX, n_groups: u32::MAX, ..LIMITS };
             let sizing = QueueSizing { fixed_capacity: None, branches: false, of_paths: true };
-            sizing.queue_capacity(&limits, &Frame { width: 1024, height: 1024, ..Frame::default() })
+            let constants = Frame { width: 1024, height: 1024, ..Frame::default() };
+            sizing.queue_capacity(&limits, &info(memory_bytes, kind), &constants)
         };
-        assert_eq!(capacity(1 << 40, false), 1 << 24);
-        assert_eq!(capacity(1 << 33, false), ((1_u64 << 30) / PATH_BYTES) as u32);
-        assert_eq!(capacity(1 << 28, false), 1 << 21);
-        assert_eq!(capacity(1 << 40, true), 1 << 21);
+        assert_eq!(capacity(1 << 40, "discrete GPU"), 1 << 24);
+        assert_eq!(capacity(1 << 33, "discrete GPU"), ((1_u64 << 30) / PATH_BYTES) as u32);
+        assert_eq!(capacity(1 << 28, "integrated GPU"), 1 << 21);
+        assert_eq!(capacity(1 << 40, "CPU"), 1 << 21);
     }
 
     #[test]
@@ -200,7 +206,7 @@ mod tests {
             for (branches, fixed_capacity) in [(false, None), (true, None), (true, Some(50))] {
                 let budget = QueueSizing { fixed_capacity, branches, of_paths: false };
                 let mut constants = Frame { width, height, max_depth, n_lights: 3, ..Frame::default() };
-                constants.queue_capacity = budget.queue_capacity(&limits, &constants);
+                constants.queue_capacity = budget.queue_capacity(&limits, &info(1 << 33, "discrete GPU"), &constants);
                 assert!(u64::from(constants.queue_capacity) * 48 <= limits.storage_range);
                 for most_pixels in [None, Some(0), Some(10), Some(u32::MAX)] {
                     let spans = budget.spans(&constants, most_pixels);
