@@ -63,7 +63,7 @@ impl Watcher for &mut Samples {
     }
 }
 
-/// Pictures of all kinds have the bits of one device's: those whose samples are shared, and those whose rows are.
+/// Pictures of all kinds have the bits of one device's: those whose samples are shared, and those whose columns are.
 #[test]
 fn pictures_have_the_bits_of_one_device() {
     let of_paths = RenderOptions { integrator: Integrator::Path, max_depth: 3, ..RenderOptions::default() };
@@ -136,7 +136,7 @@ fn a_device_that_fails_leaves_its_work_to_the_others() {
     }
 }
 
-/// Pictures of few samples, whose rows are shared, and of many, whose samples are, may follow each other.
+/// Pictures of few samples, whose columns are shared, and of many, whose samples are, may follow each other.
 #[test]
 fn numbers_of_samples_may_alternate() {
     let options = RenderOptions { integrator: Integrator::Path, denoise: Denoise::Off, ..RenderOptions::default() };

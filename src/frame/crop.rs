@@ -2,6 +2,9 @@
 
 use std::{borrow::Cow, fmt, str::FromStr};
 
+use bytemuck::{Pod, allocation::zeroed_vec};
+use rayon::prelude::*;
+
 use super::{Denoise, RenderOptions};
 use crate::layout::EDGE_BORDER;
 
@@ -47,24 +50,25 @@ impl Crop {
 
     /// Copies the pixels of `crop` out of those of this rectangle, which must contain it. `pixels`: the pixels of
     /// this rectangle, rows from the top.
-    pub(crate) fn part<'a, T: Copy + 'a>(&self, pixels: impl Into<Cow<'a, [T]>>, crop: &Crop) -> Vec<T> {
+    pub(crate) fn part<'a, T: Pod + Send + Sync + 'a>(&self, pixels: impl Into<Cow<'a, [T]>>, crop: &Crop) -> Vec<T> {
         let pixels = pixels.into();
         if self == crop {
             return pixels.into_owned();
         }
         let (left, width) = ((crop.x0 - self.x0) as usize, crop.width() as usize);
-        let rows = pixels.chunks_exact(self.width() as usize).skip((crop.y0 - self.y0) as usize);
-        rows.take(crop.height() as usize).flat_map(|row| &row[left..left + width]).copied().collect()
+        let mut part = zeroed_vec(width * crop.height() as usize);
+        let rows = pixels.par_chunks_exact(self.width() as usize).skip((crop.y0 - self.y0) as usize);
+        let parts = part.par_chunks_exact_mut(width);
+        parts.zip(rows).for_each(|(part, row)| part.copy_from_slice(&row[left..left + width]));
+        part
     }
 
     /// Copies the pixels of `crop` to their places in those of this rectangle, which must contain it. `pixels`: the
     /// pixels of this rectangle, rows from the top.
-    pub(crate) fn place<T: Copy>(&self, pixels: &mut [T], crop: &Crop, part: &[T]) {
+    pub(crate) fn place<T: Copy + Send + Sync>(&self, pixels: &mut [T], crop: &Crop, part: &[T]) {
         let (left, width) = ((crop.x0 - self.x0) as usize, crop.width() as usize);
-        let rows = pixels.chunks_exact_mut(self.width() as usize).skip((crop.y0 - self.y0) as usize);
-        for (row, part) in rows.zip(part.chunks_exact(width)) {
-            row[left..left + width].copy_from_slice(part);
-        }
+        let rows = pixels.par_chunks_exact_mut(self.width() as usize).skip((crop.y0 - self.y0) as usize);
+        rows.zip(part.par_chunks_exact(width)).for_each(|(row, part)| row[left..left + width].copy_from_slice(part));
     }
 }
 

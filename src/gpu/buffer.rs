@@ -9,10 +9,12 @@ use rayon::prelude::*;
 
 use super::{Access, Context, GpuError};
 
-/// Greatest size of one part of an upload, bytes. It bounds the memory that an upload takes beside the buffer's own.
-const MOST_STAGING_BYTES: usize = 64 << 20;
+/// Greatest size of one part of an upload or download, bytes. Staging buffers of this size are cut from a block of
+/// memory that the allocator keeps. Memory for larger ones would be mapped and pinned for each copy, which takes longer
+/// than the copy itself.
+const MOST_STAGING_BYTES: usize = 8 << 20;
 /// Number of bytes that a thread copies at a time.
-const COPIED_BYTES: usize = 1 << 20;
+const COPIED_BYTES: usize = 1 << 18;
 /// Size of a vector of four words, bytes. Kernels that read by address load one such vector at a time.
 const ROW_BYTES: u64 = 16;
 
@@ -117,7 +119,7 @@ impl<T: Pod> Buffer<T> {
     }
 
     /// Creates a buffer of `len` elements and fills it part by part. Each call of `write(first, part)` has to set
-    /// `part` to the elements from index `first` on. At most 64 MiB of the elements are in the host's memory at a
+    /// `part` to the elements from index `first` on. At most 8 MiB of the elements are in the host's memory at a
     /// time.
     ///
     /// # Errors
@@ -210,16 +212,23 @@ impl<T: Pod> Buffer<T> {
             return Ok(());
         }
         let context = &self.any.context;
-        let mut staging = AnyBuffer::staging(context, &self.any.name, to.len() as u64, MemoryLocation::GpuToCpu)?;
-        context.run("download", |commands| {
-            commands.barrier(Access::ComputeWrite, Access::TransferRead); // the buffer
-            commands.copy_buffer_part((&self.any, first as u64), (&staging, 0), to.len() as u64);
-            commands.barrier(Access::TransferWrite, Access::HostRead); // staging
-        })?;
-        // Fresh pages are mapped one by one when they are first written, which several threads do faster.
-        let from = &staging.mapped()[..to.len()];
-        let parts = to.par_chunks_mut(COPIED_BYTES).zip(from.par_chunks(COPIED_BYTES));
-        parts.for_each(|(to, from)| to.copy_from_slice(from));
+        let staging_bytes = MOST_STAGING_BYTES.min(to.len());
+        let location = MemoryLocation::GpuToCpu;
+        let mut staging = AnyBuffer::staging(context, &self.any.name, staging_bytes as u64, location)?;
+        let mut begin = first as u64;
+        for part in to.chunks_mut(staging_bytes) {
+            let n_bytes = part.len() as u64;
+            context.run("download", |commands| {
+                commands.barrier(Access::ComputeWrite, Access::TransferRead); // the buffer
+                commands.copy_buffer_part((&self.any, begin), (&staging, 0), n_bytes);
+                commands.barrier(Access::TransferWrite, Access::HostRead); // staging
+            })?;
+            begin += n_bytes;
+            // Fresh pages are mapped one by one when they are first written, which several threads do faster.
+            let from = &staging.mapped()[..part.len()];
+            let copied = part.par_chunks_mut(COPIED_BYTES).zip(from.par_chunks(COPIED_BYTES));
+            copied.for_each(|(to, from)| to.copy_from_slice(from));
+        }
         Ok(())
     }
 

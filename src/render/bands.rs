@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::Renderer;
+use super::{JoinedPicture, Renderer};
 use crate::{
     buffers::Pixels,
     frame::{Crop, Drawn, Goal, Integrator, Pacer, PathOptions, Picture, Profile, RenderOptions, Watcher},
@@ -111,9 +111,10 @@ impl BandedRenderer {
         if let [_] = self.bands[..] {
             return self.draw_band(goal, watcher);
         }
-        let mut all = Drawn::default();
-        let mut joined = self.room_for_all(&mut all)?;
-        let whole = self.whole();
+        self.joined = None;
+        // A lack of memory is found before the first band is drawn.
+        let mut joined = JoinedPicture::new(self.whole(), self.renderer.options())?;
+        let (mut n_samples, mut profile) = (0, Profile::default());
         let mut goal = match goal {
             Goal::Time(time) => Goal::Time(time / self.n_bands()),
             samples => samples,
@@ -122,18 +123,12 @@ impl BandedRenderer {
             self.renderer.set_crop(band)?;
             let drawn = self.draw_band(goal, watcher)?;
             goal = Goal::Samples(drawn.n_samples);
-            let picture = self.renderer.picture()?;
-            whole.place(&mut joined.radiance, &band, &picture.radiance);
-            whole.place(&mut joined.display, &band, &picture.display);
-            if !drawn.features.is_empty() {
-                whole.place(&mut all.features, &band, &drawn.features);
-            }
-            all.light.place(&whole, &band, &drawn.light);
-            all.n_samples = drawn.n_samples;
-            all.profile.append(drawn.profile);
+            joined.place(&band, &self.renderer.picture()?, &drawn);
+            n_samples = drawn.n_samples;
+            profile.append(drawn.profile);
         }
-        self.joined = Some(joined);
-        Ok(all)
+        self.joined = Some(joined.picture);
+        Ok(Drawn { n_samples, profile, ..joined.drawn })
     }
 
     /// Returns the mean of the samples before the noise filter, of the crop and the border that the filter reads.
@@ -171,25 +166,6 @@ impl BandedRenderer {
             Some(picture) => Ok(Cow::Borrowed(picture)),
             None => self.renderer.picture().map(Cow::Owned),
         }
-    }
-
-    /// Copies the picture that was drawn last into slices of its pixels, rows from the top. Memory that has been used
-    /// before is filled sooner than new memory.
-    ///
-    /// # Panics
-    /// A slice does not have one element for each pixel.
-    ///
-    /// # Errors
-    /// A copy from the device fails.
-    pub fn picture_into(&self, radiance: &mut [[f32; 4]], display: &mut [[u8; 4]]) -> Result<(), GpuError> {
-        let options = self.renderer.options();
-        if self.joined.is_none() && options.window() == options.crop_or_whole() {
-            return self.renderer.picture_into(radiance, display);
-        }
-        let picture = self.picture()?;
-        radiance.copy_from_slice(&picture.radiance);
-        display.copy_from_slice(&picture.display);
-        Ok(())
     }
 
     /// Copies the displayed picture into an image that the caller owns, as [`Renderer::copy_picture_to`] does.
@@ -263,38 +239,6 @@ impl BandedRenderer {
         let (first, last) = (self.bands[0], self.bands[self.bands.len() - 1]);
         Crop { x1: last.x1, y1: last.y1, ..first }
     }
-
-    /// Makes room for the joined picture, and for the features and layers of all bands, so that a lack of memory is
-    /// found before the first band is drawn. Returns the joined picture, which is black.
-    fn room_for_all(&mut self, drawn: &mut Drawn) -> Result<Picture, GpuError> {
-        self.joined = None;
-        let whole = self.whole();
-        let n_pixels = whole.width() as usize * whole.height() as usize;
-        let picture = Picture {
-            width: whole.width(),
-            height: whole.height(),
-            radiance: room("picture's radiance", n_pixels)?,
-            display: room("displayed picture", n_pixels)?,
-        };
-        if self.renderer.options().features {
-            drawn.features = room("picture's features", n_pixels)?;
-        }
-        if self.renderer.options().has_light_layers() {
-            for layer in &mut drawn.light.0 {
-                *layer = room("picture's layers of light", n_pixels)?;
-            }
-        }
-        Ok(picture)
-    }
-}
-
-/// Returns `len` elements, or an error if there is no memory for them.
-fn room<T: Clone + Default>(object: &'static str, len: usize) -> Result<Vec<T>, GpuError> {
-    let mut elements = Vec::new();
-    let bytes = (len * size_of::<T>()) as u64;
-    elements.try_reserve_exact(len).map_err(|_| GpuError::HostMemory { object, bytes })?;
-    elements.resize(len, T::default());
-    Ok(elements)
 }
 
 /// The most bands side by side.

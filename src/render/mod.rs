@@ -17,6 +17,7 @@
 mod bands;
 mod given;
 mod incremental;
+mod joined;
 mod noise_tiles;
 mod profile;
 mod reconfigure;
@@ -26,7 +27,7 @@ use std::sync::Arc;
 
 use tracing::info_span;
 
-pub use self::{bands::BandedRenderer, incremental::Displayed};
+pub use self::{bands::BandedRenderer, incremental::Displayed, joined::JoinedPicture};
 use self::{
     incremental::{Part, PartialSample, Traced, Until},
     schedule::{QueueSizing, Schedule},
@@ -35,7 +36,7 @@ use crate::{
     buffers::{Needs, Resources},
     frame::{
         Denoise, FrameKind, Integrator, LightLayers, Pass, Picture, Plan, Primary, Profile, RenderOptions, Step,
-        make_opaque, opaque, plan,
+        opaque, plan,
     },
     gpu::{Access, AnyBuffer, CommandBuffer, Commands, Context, GpuError},
     layout::{Batch, FalseColor, Feature, MATERIAL_REFLECT, MATERIAL_REFRACT},
@@ -253,29 +254,22 @@ impl Renderer {
         Ok(self.picture_from(radiance, self.display()?))
     }
 
-    /// Does what [`Renderer::picture`] does, into slices of the pixels of a window without border.
-    fn picture_into(&self, radiance: &mut [[f32; 4]], display: &mut [[u8; 4]]) -> Result<(), GpuError> {
-        let (pixels, n_pixels) = (&self.resources.pixels, self.resources.n_pixels());
-        assert_eq!((radiance.len(), display.len()), (n_pixels, n_pixels), "pixels of the window");
-        pixels.filtered().download_bytes(0, bytemuck::cast_slice_mut(radiance))?;
-        make_opaque(radiance);
-        // The words of the buffer have the red byte first on every host that kdray runs on.
-        pixels.pixel_display.download_bytes(0, display.as_flattened_mut())
-    }
-
     /// Downloads what a display shows of the window's pixels.
-    fn display(&self) -> Result<Vec<u32>, GpuError> {
-        self.resources.pixels.pixel_display.download_first(self.resources.n_pixels())
+    fn display(&self) -> Result<Vec<[u8; 4]>, GpuError> {
+        let mut display = vec![[0; 4]; self.resources.n_pixels()];
+        // The words of the buffer have the red byte first on every host that kdray runs on.
+        self.resources.pixels.pixel_display.download_bytes(0, display.as_flattened_mut())?;
+        Ok(display)
     }
 
     /// Returns the picture of the crop, from the radiance and the display of the window's pixels.
-    fn picture_from(&self, radiance: Vec<[f32; 4]>, display: Vec<u32>) -> Picture {
+    fn picture_from(&self, radiance: Vec<[f32; 4]>, display: Vec<[u8; 4]>) -> Picture {
         let (window, crop) = (self.in_use.window(), self.in_use.crop_or_whole());
         Picture {
             width: crop.width(),
             height: crop.height(),
             radiance: opaque(window.part(radiance, &crop)),
-            display: window.part(display, &crop).into_iter().map(u32::to_le_bytes).collect(),
+            display: window.part(display, &crop),
         }
     }
 

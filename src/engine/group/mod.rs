@@ -5,12 +5,12 @@
 //! work_queue   ranges of units of work for each device, according to its measured speed
 //! samples      one picture: a unit is a block of samples of all pixels, which costs the same everywhere; for paths
 //!              without `edge` or layers
-//! rows         one picture: a unit is a row of pixels, and a range of rows is a tile; for all other pictures
+//! columns      one picture: a unit is a column of pixels, and a range of columns is a tile; for all other pictures
 //! film         many pictures: a unit is a picture
 //! ```
 
+mod columns;
 mod film;
-mod rows;
 mod samples;
 mod tiles;
 mod work_queue;
@@ -41,7 +41,7 @@ pub struct RendererGroup {
     shares_samples: bool,
     /// Index of the next picture's first sample.
     first_sample: u32,
-    rows: WorkQueue,
+    columns: WorkQueue,
     samples: WorkQueue,
     tiles: WorkQueue,
     /// The picture that was drawn last.
@@ -69,21 +69,20 @@ impl RendererGroup {
             options.clone()
         } else {
             // Buffers have room for the first device's first tile. Larger tiles get new buffers.
-            let y1 = asked.y0 + asked.height().div_ceil(n_devices as u32);
-            RenderOptions { crop: Some(Crop { y1, ..asked }), ..options.clone() }
+            let x1 = asked.x0 + asked.width().div_ceil(n_devices as u32);
+            RenderOptions { crop: Some(Crop { x1, ..asked }), ..options.clone() }
         };
         let open = |context: &Arc<Context>| BandedRenderer::new(Arc::clone(context), world, &first);
         let members = open_members(contexts, open)?;
         // `window_mean`, from which samples are shared, needs a picture of one band.
         let shares_samples = may_share_samples && members.iter().all(|member| member.renderer.n_bands() == 1);
-        let are_alike = contexts.iter().all(|context| context.info().name == contexts[0].info().name);
-        let of_samples = if are_alike { Chunking::OneEach } else { Chunking::Guided { least: 1 } };
+        let of_samples = if are_alike(contexts) { Chunking::OneEach } else { Chunking::Guided { least: 1 } };
         Ok(Self {
             members,
             options: options.clone(),
             shares_samples,
             first_sample: 0,
-            rows: WorkQueue::new(n_devices, rows::chunking(contexts, options)),
+            columns: WorkQueue::new(n_devices, columns::chunking(contexts, options)),
             samples: WorkQueue::new(n_devices, of_samples),
             tiles: WorkQueue::new(n_devices, tiles::chunking(contexts)),
             picture: Picture::default(),
@@ -115,7 +114,7 @@ impl RendererGroup {
         let by_samples = self.shares_samples && n_samples >= 2 * samples::UNIT;
         let mut drawn = match by_samples {
             true => self.draw_samples(n_samples, watcher)?,
-            false => self.draw_rows(n_samples, watcher)?,
+            false => self.draw_columns(n_samples, watcher)?,
         };
         drawn.profile.device = self.device_names();
         if let Some(ms) = &mut drawn.profile.frame_ms {
@@ -156,6 +155,11 @@ impl RendererGroup {
     pub fn picture(&self) -> &Picture {
         &self.picture
     }
+}
+
+/// Whether all devices are of one kind.
+fn are_alike(contexts: &[Arc<Context>]) -> bool {
+    contexts.iter().all(|context| context.info().name == contexts[0].info().name)
 }
 
 /// Opens a renderer on each device, all at the same time.
