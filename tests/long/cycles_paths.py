@@ -33,7 +33,7 @@ Further differences of the models, and what the cases do about them:
 | `spot` | glTF's edge is soft over 0.001 of the cosine, Cycles's is sharp. Cycles gets a cone of the same light |
 | `metal` | Cycles spreads the light of further bounces as the first one's, kdray as a Lambertian surface does, so that a ball by daylight differs by some percent. In white surroundings, only the sum counts |
 | `thin_glass` | Cycles's material has no thin sheets. The case makes one of Cycles's simple closures, after glTF's formula |
-| `glass` | a rough boundary of Cycles's passes on more light than the formula of single scattering: with roughness 0.4 by 0.7 % to 5 % from inside. The case has roughness 0.2, and `glass_albedo` and `glass_inside` compare a rougher boundary with the formula |
+| `glass_albedo`, `glass_inside` | the formula has single scattering, so kdray's material has `single_scattering`. `glass` compares what both programs make of light that bounces between microfacets |
 | `glass` | Cycles's formula of absorption has another parameter, which is computed from glTF's |
 | `sheen_albedo` | glTF and kdray have the fibres of Estevez and Kulla. Cycles has those of Zeltner, Burley, Chiang (2022) and of Ashikhmin, but not these |
 """

@@ -69,10 +69,13 @@ def export():
     """Writes Blender's scene into the working directory, and returns the scene file for kdray and options of it."""
     bpy.context.view_layer.update()
     bpy.ops.export_scene.gltf(filepath=str(Path.cwd() / "scene.glb"), export_format="GLB")
+    # Materials that have no compensation for light between microfacets, as the formula that they are compared with.
+    single = [made.name for made in bpy.data.materials if made.get("single_scattering")]
     tables = [
         table("[render]", {"integrator": "path", "width": SIZE, "height": SIZE, "max_depth": MAX_DEPTH}),
         table("[camera]", camera_keys()),
-        table("[[mesh]]", {"file": "scene.glb"}),
+        table("[[mesh]]", {"file": "scene.glb"}) + ("override = true\n" if single else ""),
+        *(table(f"[materials.{name}]", {"single_scattering": True}).replace("True", "true") for name in single),
         *(table("[[light]]", lamp_keys(lamp)) for lamp in bpy.data.objects if lamp.type == "LIGHT"),
     ]
     if bpy.context.scene.world:

@@ -198,9 +198,10 @@ def on_floor(make):
 
 
 def glass():
-    """A ball and a block of slightly rough glass that absorbs light."""
+    """A ball and a block of rough glass that absorbs light. Light that bounces between microfacets is not lost."""
     floor()
-    made = absorbing_glass(1.5, 0.2)
+    made = absorbing_glass(1.5, 0.4)
+    principled(made)[2].distribution = "MULTI_GGX"
     ball(made, (-0.8, 0.0, 0.9), 0.8)
     block(made, (1.0, -0.2, 0.7), 1.2)
     daylight()
@@ -286,6 +287,7 @@ def plane_in_white(make, is_front=True):
 
 def clear_glass():
     made = absorbing_glass(1.5, 0.4)
+    made["single_scattering"] = True
     principled(made)[2].inputs["Base Color"].default_value = (1.0, 1.0, 1.0, 1.0)
     principled(made)[0]["Volume Absorption"].inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
     return made

@@ -13,6 +13,7 @@
 #include "bsdf/local_frame.glsl"
 #include "bsdf/multiple_scattering.glsl"
 #include "bsdf/sheen.glsl"
+#include "bsdf/solid_loss.glsl"
 
 // What all lobes need that depends on the material and the viewer.
 struct BsdfTerms {
@@ -33,7 +34,7 @@ struct BsdfTerms {
     float sheen_share;
     float base_share;
     float sheen_bound;
-    // Factor on what a sheet reflects and transmits, which makes up for light that bounces between microfacets.
+    // Factor on what a sheet or a solid reflects and transmits, for the light that bounces between microfacets.
     float clear_gain;
     // Largest channels of what the dielectric reflects: along the normal, at grazing angles, and after light has
     // bounced between microfacets. They give its albedo.
@@ -153,6 +154,15 @@ void set_layers(inout BsdfTerms terms, GgxAlbedo albedo) {
     terms.choice = sum > 0.0 ? terms.choice / sum : vec4(0.0);
 }
 
+// The share of light that a sheet or the boundary of a solid would lose between microfacets.
+float clear_loss(BsdfTerms terms, GgxAlbedo albedo) {
+    if ((terms.material.flags & MATERIAL_SINGLE_SCATTERING) != 0u) return 0.0;
+    if (!terms.is_solid) return albedo.loss;
+    // Light passes the boundary straight, or the boundary is perfectly smooth.
+    if (!scene_has_lobe(LOBE_TRANSMISSION) || terms.eta == 1.0 || terms.width == 0.0) return 0.0;
+    return solid_loss(terms.to_viewer.z, sqrt(terms.width), terms.eta);
+}
+
 // The terms for a viewer.
 BsdfTerms bsdf_terms(Material material, Surface surface, vec3 to_viewer) {
     // Textures of floats can have any value.
@@ -175,8 +185,7 @@ BsdfTerms bsdf_terms(Material material, Surface surface, vec3 to_viewer) {
     float roughness = sqrt(terms.width);
     GgxAlbedo albedo = NO_ALBEDO;
     if (terms.has_interface) albedo = ggx_albedo(terms.to_viewer.z, roughness);
-    bool has_gain = (material.flags & MATERIAL_SINGLE_SCATTERING) == 0u && !terms.is_solid;
-    terms.clear_gain = has_gain ? 1.0 / (1.0 - albedo.loss) : 1.0;
+    terms.clear_gain = 1.0 / (1.0 - clear_loss(terms, albedo));
     set_lambert(terms, albedo, roughness);
     set_layers(terms, albedo);
     if ((material.flags & MATERIAL_UNLIT) != 0u) terms.choice = vec4(0.0);

@@ -13,6 +13,7 @@ mod multiple_scattering;
 mod reflection;
 mod sample;
 mod sheen;
+mod solid_loss;
 mod terms;
 #[cfg(test)]
 mod tests;

@@ -13,6 +13,7 @@ use super::{
     local_frame::{LocalFrame, frame_around, to_local},
     multiple_scattering::{later_bounces, mean_reflectance},
     sheen::sheen_bound,
+    solid_loss::solid_loss,
 };
 use crate::{
     layout::{
@@ -47,7 +48,7 @@ pub struct BsdfTerms {
     /// Share of the light that the layers above leave to the interface.
     pub(super) base_share: f32,
     pub(super) sheen_bound: f32,
-    /// Factor on what a sheet reflects and transmits, which makes up for light that bounces between microfacets.
+    /// Factor on what a sheet or a solid reflects and transmits, for the light that bounces between microfacets.
     pub(super) clear_gain: f32,
     /// Largest channels of what the dielectric reflects: along the normal, at grazing angles, and after light has
     /// bounced between microfacets. They give its albedo.
@@ -180,6 +181,21 @@ fn set_layers(terms: &mut BsdfTerms, albedo: GgxAlbedo) {
     terms.choice = if sum > 0.0 { choice / sum } else { Vec4::ZERO };
 }
 
+/// The share of light that a sheet or the boundary of a solid would lose between microfacets.
+fn clear_loss(terms: &BsdfTerms, albedo: GgxAlbedo) -> f32 {
+    if terms.material.flags & MATERIAL_SINGLE_SCATTERING != 0 {
+        return 0.0;
+    }
+    if !terms.is_solid {
+        return albedo.loss;
+    }
+    // Light passes the boundary straight, or the boundary is perfectly smooth.
+    if terms.eta == 1.0 || terms.width == 0.0 {
+        return 0.0;
+    }
+    solid_loss(terms.to_viewer.z, terms.width.sqrt(), terms.eta)
+}
+
 /// Returns the terms for a viewer.
 pub fn bsdf_terms(material: &Material, surface: &Surface, to_viewer: Vec3) -> BsdfTerms {
     let mut material = *material;
@@ -196,7 +212,6 @@ pub fn bsdf_terms(material: &Material, surface: &Surface, to_viewer: Vec3) -> Bs
     let roughness = width.sqrt();
     let has_interface = has_interface(&material);
     let albedo = if has_interface { ggx_albedo(to_viewer.z, roughness) } else { NO_ALBEDO };
-    let has_gain = material.flags & MATERIAL_SINGLE_SCATTERING == 0 && !is_solid;
     let mut terms = BsdfTerms {
         material,
         frame,
@@ -210,13 +225,14 @@ pub fn bsdf_terms(material: &Material, surface: &Surface, to_viewer: Vec3) -> Bs
         sheen_share: 1.0,
         base_share: 1.0,
         sheen_bound: 1.0,
-        clear_gain: if has_gain { 1.0 / (1.0 - albedo.loss) } else { 1.0 },
+        clear_gain: 1.0,
         dielectric: Vec3::ZERO,
         below: Vec3::ZERO,
         between: Vec3::ZERO,
         straight_choice: 0.0,
         choice: Vec4::ZERO,
     };
+    terms.clear_gain = 1.0 / (1.0 - clear_loss(&terms, albedo));
     set_lambert(&mut terms, albedo, roughness);
     set_layers(&mut terms, albedo);
     if material.flags & MATERIAL_UNLIT != 0 {
