@@ -64,9 +64,12 @@ float longest_component(vec3 v) {
 // Moves a ray's origin to the point that is nearest to 0, of those with t from t_min or 0 up to t_max, if that at least
 // halves its largest coordinate. Returns the distance of the move, or else 0.
 float move_to_centre(inout PathRay ray, float t_min) {
-    float t_nearest = -dot(ray.origin, ray.direction) / dot(ray.direction, ray.direction);
+    vec3 d = ray.direction;
+    precise float height = ray.origin.x * d.x + ray.origin.y * d.y + ray.origin.z * d.z;
+    precise float length_squared = d.x * d.x + d.y * d.y + d.z * d.z;
+    float t_nearest = -height / length_squared;
     float t_move = min(max(t_nearest, min(t_min, 0.0)), ray.t_max);
-    precise vec3 origin = ray.origin + t_move * ray.direction;
+    precise vec3 origin = ray.origin + t_move * d;
     if (!(2.0 * longest_component(origin) <= longest_component(ray.origin))) return 0.0;
     ray.origin = origin;
     ray.t_max -= t_move;

@@ -124,6 +124,8 @@ fn far_near_scene(inputs: &KernelInputs<impl ReadCounter>, ray: &SearchRay) -> (
     if longest_component(near.origin) > inputs.origin_reach {
         t_start += move_to_centre(&mut near);
     }
+    // The kernel subtracts the sum, too, so that the result is the same.
+    near.t_min = ray.t_min - t_start;
     (near, t_start)
 }
 
