@@ -42,9 +42,7 @@ fn small_torus() -> MeshWithTree {
 
 /// Returns the mesh with a ground.
 fn with_ground(mesh: &[Triangle], half: f32) -> MeshWithTree {
-    let world = MeshWithTree::new([mesh, &ground(half)].concat());
-    assert_eq!(world.tree().validate(&world.triangles), Ok(()));
-    world
+    MeshWithTree::new([mesh, &ground(half)].concat())
 }
 
 /// Returns rays of all nasty kinds at a mesh. The origin of each is moved back by the length that `back` makes.
@@ -77,6 +75,14 @@ fn traced(inputs: &KernelInputs, traversal: Traversal, rays: &[PathRay]) -> Vec<
 
 fn tree_traversals() -> impl Iterator<Item = Traversal> {
     Traversal::ALL.iter().copied().filter(|&traversal| traversal != Traversal::Brute)
+}
+
+#[test]
+fn trees_are_valid() {
+    for (half, mesh) in GROUNDS.into_iter().zip([small_torus().triangles, meshes::soup(5000, 7)]) {
+        let world = with_ground(&mesh, half);
+        assert_eq!(world.tree().validate(&world.triangles), Ok(()));
+    }
 }
 
 #[test]
