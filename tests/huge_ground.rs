@@ -7,7 +7,7 @@ use glam::{Vec3, vec3};
 use kdray::{
     accel::{
         Query,
-        kdtree::{BuildOptions, Traversal},
+        kdtree::{BuildOptions, KdTree, Traversal},
     },
     cast::{Caster, Ray, cast_on_cpu},
     cpu::tracer::FastTracer,
@@ -105,22 +105,43 @@ fn the_ground_costs_little() {
     }
 }
 
-/// The origins are near the mesh and far away from it. Most rays go to vertices and edges, or along split planes.
+fn check_against_brute_force(mesh: &MeshWithTree, world: &MeshWithTree, rays: &[PathRay]) {
+    let expected: Vec<Hit> = rays.par_iter().map(|ray| world.by_brute_force(ray, 0.0)).collect();
+    let n_hits = expected.iter().filter(|hit| hit.triangle_ix < mesh.triangles.len() as u32).count();
+    assert!(n_hits > rays.len() / 8, "only {n_hits} rays hit the mesh");
+    for traversal in tree_traversals() {
+        let difference = first_difference(rays, &expected, &traced(&world.inputs(), traversal, rays));
+        assert_eq!(difference, None, "{traversal}, {:?}", world.tree().bounds());
+    }
+}
+
+/// The origins are near the mesh, at all distances, and at distances just below that from which rays are moved. There,
+/// the rounding of rays that are not moved is greatest. Most rays go to vertices and edges, or along split planes.
 #[test]
 fn rays_find_what_brute_force_finds() {
     let mesh = small_torus();
     for half in GROUNDS {
         let world = with_ground(&mesh.triangles, half);
-        for most in [1.0, 3.0 * half] {
-            let rays = rays_at(&mesh, 2000 * N_KINDS, |random| length(random, most) - 1.0);
-            let expected: Vec<Hit> = rays.par_iter().map(|ray| world.by_brute_force(ray, 0.0)).collect();
-            let n_hits = expected.iter().filter(|hit| hit.triangle_ix < mesh.triangles.len() as u32).count();
-            assert!(n_hits > rays.len() / 4, "only {n_hits} rays hit the mesh");
-            for traversal in tree_traversals() {
-                let difference = first_difference(&rays, &expected, &traced(&world.inputs(), traversal, &rays));
-                assert_eq!(difference, None, "{traversal}, ground of {half}, origins up to {most}");
-            }
-        }
+        let reach = world.accel.origin_reach();
+        assert!(reach < 0.1 * half);
+        let n = 1000 * N_KINDS;
+        check_against_brute_force(&mesh, &world, &rays_at(&mesh, n, |_| 0.0));
+        check_against_brute_force(&mesh, &world, &rays_at(&mesh, n, |random| length(random, 3.0 * half)));
+        check_against_brute_force(&mesh, &world, &rays_at(&mesh, 5 * n, |random| reach * random.between(0.8, 0.99)));
+    }
+}
+
+/// The cells of a shallow tree reach up to the ground's edge, so a ray's interval of t in a cell has large ends.
+#[test]
+fn triangles_in_large_cells_are_found() {
+    let mesh = small_torus();
+    let options = BuildOptions { max_depth: Some(2), ..BuildOptions::default() };
+    for half in GROUNDS {
+        let triangles = with_ground(&mesh.triangles, half).triangles;
+        let tree = KdTree::build(&triangles, &options);
+        assert_eq!(tree.validate(&triangles), Ok(()));
+        let world = MeshWithTree::with_tree(triangles, tree);
+        check_against_brute_force(&mesh, &world, &rays_at(&mesh, 500 * N_KINDS, |random| length(random, 10.0)));
     }
 }
 
