@@ -60,7 +60,7 @@
 // for this limit.
 #define KD_MAX_ORIGIN_DISTANCE 4.0
 // If a ray keeps this far from a triangle's plane all along its way through a leaf, it has no hit on the triangle in
-// this leaf. The distance is a multiple of the scene's largest coordinate, and twice the margin, at scale 0 (scales.rs).
+// this leaf. At scale 0 (scales.rs), it is a multiple of the scene's largest coordinate, and twice the margin.
 // src/accel/kdtree/planes.rs adds up what rounding does to hits, to planes and to a ray's distance from a plane.
 #define KD_PLANE_EPSILON 0.000015258789
 // A component of a direction is replaced by this if its magnitude is less. So inverse directions are finite, and rays
@@ -879,8 +879,8 @@ struct Guide {
 // - `environment_width`, `environment_height`: size of the map, texels.
 // - `environment_turn`: by which the map is turned about +y, in turns, counter-clockwise as seen from above.
 // - `origin_reach`: the greatest magnitude of a coordinate of a ray's origin up to which the origin is not moved (world
-//   units). It is `KD_MAX_ORIGIN_DISTANCE` times the greatest magnitude of a coordinate of the box, or less in a kd-tree
-//   with several scales (src/accel/kdtree/scales.rs).
+//   units). It is `KD_MAX_ORIGIN_DISTANCE` times the greatest magnitude of a coordinate of the box, or less in a
+//   kd-tree with several scales (src/accel/kdtree/scales.rs).
 // - The rest: the device address of each of the scene's arrays, low word first. 0 if kernels read the array by its
 //   binding.
 struct AccelConstants {

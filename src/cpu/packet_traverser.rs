@@ -173,8 +173,8 @@ impl PacketTraverser {
         }
     }
 
-    /// Traces the first `n_rays` rays. If any of them starts far from the scene, which is rare, the rays are first moved
-    /// near to it.
+    /// Traces the first `n_rays` rays. If any of them starts far from the scene, which is rare, the rays are first
+    /// moved near to it.
     #[inline(always)]
     fn traverse_at<S: Simd, const ANY_HIT: bool>(
         &mut self,
