@@ -129,8 +129,8 @@ fn far_near_scene(inputs: &KernelInputs<impl ReadCounter>, ray: &SearchRay) -> (
     (near, t_start)
 }
 
-/// Calls `search` with the ray that [`near_scene`] returns, and returns its hit with t counted from the ray's own origin.
-/// A
+/// Calls `search` with the ray that [`near_scene`] returns, and returns its hit with t counted from the ray's own
+/// origin. A
 /// miss has t = t_max.
 #[inline(always)]
 pub fn hit_from_near(

@@ -55,8 +55,8 @@ pub fn check(tree: &KdTree, triangles: &[Triangle]) -> Result<(), Invalid> {
 }
 
 impl Descent<'_> {
-    /// Returns the first node, from `node` with its cell down, that lacks a part of the triangle: a leaf that comes near
-    /// the
+    /// Returns the first node, from `node` with its cell down, that lacks a part of the triangle: a leaf that comes
+    /// near the
     /// polygon and does not have the triangle, or a node with a slab that the polygon reaches out of.
     fn lack_below(&self, node: u32, cell: &Bounds, polygon: &[DVec3]) -> Option<Lack> {
         if polygon.is_empty() {

@@ -2,8 +2,8 @@
 //!
 //! A ray is clear of a plane if its distance from the plane is more than `plane_epsilon` all along its t interval in
 //! the leaf. At scale 0 (scales.rs), this epsilon is `KD_PLANE_EPSILON` times the largest coordinate, which is twice
-//! the margin: 256 units of 2^-24 times the largest coordinate. The table lists the errors in these units, with origins as
-//! far away as `KD_MAX_ORIGIN_DISTANCE` allows. At scale i, errors and epsilon are 2^i times smaller. There, the
+//! the margin: 256 units of 2^-24 times the largest coordinate. The table lists the errors in these units, with origins
+//! as far away as `KD_MAX_ORIGIN_DISTANCE` allows. At scale i, errors and epsilon are 2^i times smaller. There, the
 //! plane's normal and distance are multiplied by 2^i, so that kernels need no other epsilon. This loses no bits.
 //!
 //! ```text
