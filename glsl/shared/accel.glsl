@@ -40,7 +40,7 @@ uint search(TraversalRay ray, bool any_hit, inout Nearest best) {
 // search, all t are half of the ray's own (traversal_ray.glsl).
 Hit traverse(PathRay ray_in, float t_min, bool any_hit) {
     float t_start;
-    PathRay ray_near = near_scene(ray_in, t_start);
+    PathRay ray_near = near_scene(ray_in, t_min, t_start);
     TraversalRay ray = traversal_ray(ray_near, t_min - t_start);
     spill_pair(LENGTHS_SLOT, t_start, ray_in.t_max);
     Nearest best = Nearest(0.5 * ray_near.t_max, NO_TRIANGLE);

@@ -56,11 +56,11 @@
 #define KD_MAX_DEPTH 64u
 
 // The greatest magnitude of a coordinate of a ray's origin, as a multiple of the scene's largest coordinate. A ray
-// that starts farther away is first moved along itself up to the scene. The tree's rounding margin is derived for
-// this limit.
+// that starts farther away is first moved along itself up to the scene. The rounding margins of triangles are derived
+// for this limit.
 #define KD_MAX_ORIGIN_DISTANCE 4.0
 // If a ray keeps this far from a triangle's plane all along its way through a leaf, it has no hit on the triangle in
-// this leaf. The distance is a multiple of the scene's largest coordinate, and twice the tree's margin.
+// this leaf. At scale 0 (scales.rs), it is a multiple of the scene's largest coordinate, and twice the margin.
 // src/accel/kdtree/planes.rs adds up what rounding does to hits, to planes and to a ray's distance from a plane.
 #define KD_PLANE_EPSILON 0.000015258789
 // A component of a direction is replaced by this if its magnitude is less. So inverse directions are finite, and rays
@@ -586,8 +586,8 @@ struct PathRay {
 // A ray that is cast by itself, not for a picture, 32 bytes. The length of `direction` is arbitrary; it is the unit
 // of t. Hits have t in `(t_min, t_max]`. All numbers are valid as `t_min` and `t_max`. An end that is less than 1e-36
 // world units from the ray's origin may count as 0, since devices may flush denormals. Otherwise both ends are exact
-// to the last bit if the origin is within the limit of `KD_MAX_ORIGIN_DISTANCE`. If it is not, they are exact to
-// 2^-24 of the distance from the ray's origin to the scene.
+// to the last bit if the origin is within `AccelConstants.origin_reach`. If it is not, they are exact to 2^-24 of the
+// distance from the ray's origin to the scene, or of the origin's distance from 0 if that is greater.
 struct Ray {
     vec3 origin;
     float t_min;
@@ -878,6 +878,9 @@ struct Guide {
 // - `light_nodes_begin`: index in `texture_words` of the first `LightNode`. `NO_WORDS`: there is no light tree.
 // - `environment_width`, `environment_height`: size of the map, texels.
 // - `environment_turn`: by which the map is turned about +y, in turns, counter-clockwise as seen from above.
+// - `origin_reach`: the greatest magnitude of a coordinate of a ray's origin up to which the origin is not moved (world
+//   units). It is `KD_MAX_ORIGIN_DISTANCE` times the greatest magnitude of a coordinate of the box, or less in a
+//   kd-tree with several scales (src/accel/kdtree/scales.rs).
 // - The rest: the device address of each of the scene's arrays, low word first. 0 if kernels read the array by its
 //   binding.
 struct AccelConstants {
@@ -910,7 +913,7 @@ struct AccelConstants {
     uint environment_height;
     float environment_turn;
     uint light_nodes_begin;
-    uint reserved0;
+    float origin_reach;
 #define ARRAY(name, element, row, number) uvec2 name;
 #include "scene_arrays.glsl"
 #undef ARRAY

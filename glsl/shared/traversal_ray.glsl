@@ -9,8 +9,8 @@
 // its ends, and half its length is their difference (slab.glsl). Halving loses no bits.
 //
 // The t of a plane is rounded, but the traversal treats it as exact. That has the effect of a plane that is slightly
-// off its place, and a leaf has all triangles that are so near to its cell (src/accel/bounds.rs). The margin there
-// also covers the rounding of the hit test. So the traversal finds what brute force finds, also for rays along planes
+// off its place, and a leaf has all triangles that are so near to its cell (src/accel/bounds.rs). The margins there
+// also cover the rounding of the hit test. So the traversal finds what brute force finds, also for rays along planes
 // and through corners of cells.
 //
 // shear: with z halved, so that hits have the traversal's t. t_min: hits have a greater t. t_enter, t_exit: the part
@@ -57,15 +57,37 @@ float largest_coordinate() {
     return max(largest.x, max(largest.y, largest.z));
 }
 
-// Returns the ray. If its origin is beyond the limit of KD_MAX_ORIGIN_DISTANCE, it is moved along the ray to the
-// structure's box. t_start: the distance of the move, in the ray's own t, or 0 if the origin is not moved.
-PathRay near_scene(PathRay ray, out float t_start) {
-    vec3 away = abs(ray.origin);
-    t_start = 0.0;
-    if (max(away.x, max(away.y, away.z)) <= KD_MAX_ORIGIN_DISTANCE * largest_coordinate()) return ray;
-    t_start = 2.0 * max(traversal_ray(ray, 0.0).t_enter, 0.0);
-    precise vec3 origin = ray.origin + t_start * ray.direction;
+float longest_component(vec3 v) {
+    return max(abs(v.x), max(abs(v.y), abs(v.z)));
+}
+
+// Moves a ray's origin to the point that is nearest to 0, of those with t from t_min or 0 up to t_max, if that at least
+// halves its largest coordinate. Returns the distance of the move, or else 0.
+float move_to_centre(inout PathRay ray, float t_min) {
+    vec3 d = ray.direction;
+    precise float height = ray.origin.x * d.x + ray.origin.y * d.y + ray.origin.z * d.z;
+    precise float length_squared = d.x * d.x + d.y * d.y + d.z * d.z;
+    float t_nearest = -height / length_squared;
+    float t_move = min(max(t_nearest, min(t_min, 0.0)), ray.t_max);
+    precise vec3 origin = ray.origin + t_move * d;
+    if (!(2.0 * longest_component(origin) <= longest_component(ray.origin))) return 0.0;
     ray.origin = origin;
-    ray.t_max -= t_start;
+    ray.t_max -= t_move;
+    return t_move;
+}
+
+// Returns the ray. If its origin is beyond the limit of KD_MAX_ORIGIN_DISTANCE, it is moved along the ray to the
+// structure's box. If it is then beyond origin_reach, it is moved towards 0 (src/accel/kdtree/scales.rs). t_start: the
+// distance of the moves, in the ray's own t, or 0 if the origin is not moved.
+PathRay near_scene(PathRay ray, float t_min, out float t_start) {
+    t_start = 0.0;
+    if (longest_component(ray.origin) <= accel.origin_reach) return ray;
+    if (longest_component(ray.origin) > KD_MAX_ORIGIN_DISTANCE * largest_coordinate()) {
+        t_start = 2.0 * max(traversal_ray(ray, 0.0).t_enter, 0.0);
+        precise vec3 origin = ray.origin + t_start * ray.direction;
+        ray.origin = origin;
+        ray.t_max -= t_start;
+    }
+    if (longest_component(ray.origin) > accel.origin_reach) t_start += move_to_centre(ray, t_min - t_start);
     return ray;
 }

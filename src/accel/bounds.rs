@@ -17,6 +17,8 @@ use crate::layout::Triangle;
 /// is off the triangle by u (11.5 D + 14 L) on each axis, as `reference::triangle` proves. D, the greatest coordinate
 /// difference between o and a corner, is at most 5 m. L, that between two corners, is at most 2 m. So the point is
 /// off by at most 85.5 u m. The sum is 120.5 u m, of the margin's 128 u m.
+///
+/// In a kd-tree, each triangle has its own margin, with a length in place of m that may be less (kdtree/scales.rs).
 pub const MARGIN: f32 = 1.0 / (1 << 17) as f32;
 
 /// Closed axis-aligned box, world units.
@@ -44,12 +46,15 @@ impl Bounds {
         Self { min: self.min.map(|x| (x - margin).max(f32::MIN)), max: self.max.map(|x| (x + margin).min(f32::MAX)) }
     }
 
-    /// Returns the rounding margin of all cells of a scene with these bounds, world units (see [`MARGIN`]). A
-    /// triangle that comes nearer to a cell than the margin counts as inside the cell. The margin is never zero, so
-    /// no grown box is flat.
+    /// Returns the rounding margin of a scene with these bounds, world units (see [`MARGIN`]). A triangle that comes
+    /// nearer to a cell than the margin counts as inside the cell. The margin is never zero, so no grown box is flat.
     pub fn margin(&self) -> f32 {
-        let largest = self.min.iter().chain(&self.max).fold(0.0, |largest: f32, x| largest.max(x.abs()));
-        (MARGIN * largest).max(f32::MIN_POSITIVE)
+        (MARGIN * self.largest_coordinate()).max(f32::MIN_POSITIVE)
+    }
+
+    /// Returns the greatest magnitude of a coordinate of the box, world units.
+    pub fn largest_coordinate(&self) -> f32 {
+        self.min.iter().chain(&self.max).fold(0.0, |largest: f32, x| largest.max(x.abs()))
     }
 
     /// Returns the smallest box that contains both.
@@ -98,7 +103,7 @@ pub fn is_finite(triangle: &Triangle) -> bool {
 /// bytes.
 #[derive(Clone, Copy, Debug)]
 pub struct Reference {
-    /// Bounds of the part of the triangle that comes within the margin of the cell, grown by the margin, and then cut
+    /// Bounds of the part of the triangle that comes within its margin of the cell, grown by the margin, and then cut
     /// off at the cell's faces. So they never reach beyond the cell.
     pub bounds: Bounds,
     pub triangle_ix: u32,

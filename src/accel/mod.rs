@@ -13,8 +13,8 @@ use self::{
     kdtree::{BuildOptions, KdTree},
 };
 pub use self::{query::Query, statistics::Statistics};
-use crate::layout::Triangle;
 pub use crate::layout::{Hit, NO_TRIANGLE, Ray};
+use crate::layout::{KD_MAX_ORIGIN_DISTANCE, Triangle};
 use crate::util::progress::Progress;
 
 /// An acceleration structure over the triangles of a world.
@@ -109,6 +109,18 @@ impl Accel {
         match self {
             Self::KdTree(tree) => tree.bounds(),
             Self::Grid(grid) => grid.bounds(),
+        }
+    }
+
+    /// The greatest magnitude of a coordinate of a ray's origin up to which a search does not move the origin, world
+    /// units.
+    pub fn origin_reach(&self) -> f32 {
+        match self {
+            Self::KdTree(tree) => tree.constants().origin_reach,
+            Self::Grid(_) => {
+                let [least, greatest] = self.bounds();
+                KD_MAX_ORIGIN_DISTANCE * least.abs().max(greatest.abs()).max_element()
+            }
         }
     }
 }

@@ -20,7 +20,7 @@ use crate::{
         counting::table::ReadCounter,
         inputs::KernelInputs,
         leaf::entries_of,
-        traversal_ray::{TraversalRay, largest_coordinate, origin_reach, signs_of},
+        traversal_ray::{TraversalRay, largest_coordinate, signs_of},
     },
 };
 
@@ -159,11 +159,11 @@ impl<S: Simd> Packet<S> {
         (packet, whole.of((1 << n_rays) - 1))
     }
 
-    /// Tells whether all coordinates of all origins have a magnitude of at most `origin_reach`. It also tests unused
+    /// Tells whether `near_scene` moves no ray: no coordinate of an origin exceeds `origin_reach`. It also tests unused
     /// lanes, which still hold rays of an earlier packet. A far ray in an unused lane costs time but changes no hit.
     #[inline(always)]
     pub fn is_within_reach(&self, inputs: &KernelInputs<impl ReadCounter>) -> bool {
-        let reach = origin_reach(inputs);
+        let reach = inputs.origin_reach;
         let [x, y, z] = [self.origin[0].abs(), self.origin[1].abs(), self.origin[2].abs()];
         (x.simd_gt(reach) | y.simd_gt(reach) | z.simd_gt(reach)).all_false()
     }

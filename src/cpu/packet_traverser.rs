@@ -11,14 +11,14 @@ use super::{
 };
 use crate::{
     accel::kdtree::EMPTY_LEAF,
-    layout::{Hit, KD_MAX_DEPTH, KD_PAIR_SHIFT, KdNode},
+    layout::{Hit, KD_MAX_DEPTH, KD_PAIR_SHIFT, KdNode, NO_TRIANGLE},
     reference::{
         counting::table::ReadCounter,
         inputs::KernelInputs,
         kdtree::{Cell, Pending, axis_of, is_leaf, search, search_cell},
         pending_stack::PendingStack,
         slab::slab_of,
-        traversal_ray::{TraversalRay, hit_from_near},
+        traversal_ray::{TraversalRay, near_scene},
     },
 };
 
@@ -39,6 +39,36 @@ struct Entry {
     enter: [f32; LANES],
     exit: [f32; LANES],
     node_ix: u32,
+}
+
+/// Rays that were moved near the scene ([`near_scene`]), and the t by which each was moved.
+struct Moved {
+    rays: RaysSoa,
+    t_start: [f32; LANES],
+}
+
+impl Moved {
+    /// Moves the first `n_rays` rays.
+    #[cold]
+    fn new(inputs: &KernelInputs<impl ReadCounter>, search_rays: &RaysSoa, n_rays: usize) -> Self {
+        let mut moved = Self { rays: *search_rays, t_start: [0.0; LANES] };
+        for lane in 0..n_rays {
+            let (near, t_start) = near_scene(inputs, &search_rays.get(lane));
+            moved.rays.set(lane, &near);
+            moved.t_start[lane] = t_start;
+        }
+        moved
+    }
+
+    /// Returns the hits of the moved rays with t counted from the rays' own origins. A miss has t = t_max.
+    #[cold]
+    fn hits_from_origins(&self, search_rays: &RaysSoa, mut hits: HitsSoa) -> HitsSoa {
+        for lane in 0..LANES {
+            let is_miss = hits.triangle_ix[lane] == NO_TRIANGLE;
+            hits.t[lane] = if is_miss { search_rays.t_max[lane] } else { hits.t[lane] + self.t_start[lane] };
+        }
+        hits
+    }
 }
 
 /// Tells whether a ray that is the only one in a cell is traced faster alone than in its packet. This is true if the
@@ -143,8 +173,8 @@ impl PacketTraverser {
         }
     }
 
-    /// Traces the first `n_rays` rays. If any of them starts far from the scene, which is rare, every ray is traced
-    /// alone.
+    /// Traces the first `n_rays` rays. If any of them starts far from the scene, which is rare, the rays are first
+    /// moved near to it.
     #[inline(always)]
     fn traverse_at<S: Simd, const ANY_HIT: bool>(
         &mut self,
@@ -153,32 +183,18 @@ impl PacketTraverser {
         search_rays: &RaysSoa,
         n_rays: usize,
     ) -> HitsSoa {
-        let (mut packet, whole) = Packet::new(simd, inputs, search_rays, n_rays);
-        if !packet.is_within_reach(inputs) {
-            return self.traverse_one_by_one::<ANY_HIT>(inputs, search_rays, n_rays);
+        let (mut packet, mut whole) = Packet::new(simd, inputs, search_rays, n_rays);
+        let moved = if packet.is_within_reach(inputs) { None } else { Some(Moved::new(inputs, search_rays, n_rays)) };
+        if let Some(moved) = &moved {
+            (packet, whole) = Packet::new(simd, inputs, &moved.rays, n_rays);
         }
         if whole.lanes() != 0 {
             self.search::<_, ANY_HIT>(inputs, &mut packet, whole);
         }
-        packet.hits()
-    }
-
-    /// Traces each ray alone, with its origin moved along the ray to near the scene.
-    #[cold]
-    fn traverse_one_by_one<const ANY_HIT: bool>(
-        &mut self,
-        inputs: &KernelInputs<impl ReadCounter>,
-        search_rays: &RaysSoa,
-        n_rays: usize,
-    ) -> HitsSoa {
-        let mut hits = HitsSoa::default();
-        for lane in 0..n_rays {
-            let hit = hit_from_near(inputs, &search_rays.get(lane), |near, best| {
-                self.traverse_alone::<ANY_HIT>(inputs, &TraversalRay::new(inputs, near), best);
-            });
-            hits.set(lane, &hit);
+        match moved {
+            None => packet.hits(),
+            Some(moved) => moved.hits_from_origins(search_rays, packet.hits()),
         }
-        hits
     }
 
     /// Returns the hits of the first `n_rays` rays, which must be of one octant. All further lanes of the result are

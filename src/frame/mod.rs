@@ -231,8 +231,8 @@ pub enum Primary {
     /// The graphics pipeline rasterizes triangle IDs; then each ray is intersected with its triangle's plane.
     Raster,
     /// Compute kernels rasterize triangles with the ray-triangle test of the traversal. So hits are those of `Trace`,
-    /// bit for bit, unless camera rays begin farther from the scene than `KD_MAX_ORIGIN_DISTANCE` allows. The device
-    /// must have 64-bit atomics. The CPU engine has no such kernels and takes `Raster` instead.
+    /// bit for bit, unless camera rays begin so far away that their origins are moved (`near_scene`). The device must
+    /// have 64-bit atomics. The CPU engine has no such kernels and takes `Raster` instead.
     SoftwareRaster,
     /// Rays are traced through the acceleration structure.
     Trace,

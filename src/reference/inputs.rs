@@ -10,7 +10,10 @@ use crate::{
         grid::{Grid, Lattice},
         kdtree::{KdTree, TraversalLinks},
     },
-    layout::{Frame, GridCell, Hit, KdBox, KdNode, KdRope, Light, Material, Plane, Slab, TRIANGLE_HIDDEN, Triangle},
+    layout::{
+        AccelConstants, Frame, GridCell, Hit, KdBox, KdNode, KdRope, Light, Material, Plane, Slab, TRIANGLE_HIDDEN,
+        Triangle,
+    },
     world::{Emitters, Geometry, Textures, World},
 };
 
@@ -25,6 +28,8 @@ pub struct KernelInputs<'a, R = NoCounter> {
     pub box_min: Vec3,
     /// Greatest corner of this box.
     pub box_max: Vec3,
+    /// The limit of the coordinates of a ray's origin, world units. Origins beyond it are moved (`near_scene`).
+    pub origin_reach: f32,
     pub triangles: &'a [Triangle],
     /// One word for each triangle: an index into `materials`, or with `filters`, `TRIANGLE_HIDDEN` or 0.
     pub triangle_materials: &'a [u32],
@@ -132,7 +137,7 @@ impl<'a> KernelInputs<'a> {
             leaf_triangles: CountedSlice::from(tree.leaf_triangles()),
             leaf_planes: tree.leaf_planes(),
             kd_slabs: CountedSlice::from(tree.slabs()),
-            ..Self::without_accel(triangles, [tree.box_min(), tree.box_max()])
+            ..Self::without_accel(triangles, &tree.constants())
         }
     }
 
@@ -144,17 +149,18 @@ impl<'a> KernelInputs<'a> {
             lattice: Some(grid.lattice()),
             grid_cells: CountedSlice::from(grid.cells()),
             n_grid_levels: grid.n_levels(),
-            ..Self::without_accel(triangles, grid.bounds())
+            ..Self::without_accel(triangles, &grid.constants())
         }
     }
 
-    /// Inputs with the triangles and the box that holds them. All other arrays are empty.
-    fn without_accel(triangles: &'a [Triangle], [box_min, box_max]: [Vec3; 2]) -> Self {
+    /// Inputs with the triangles and the constants of their structure. All other arrays are empty.
+    fn without_accel(triangles: &'a [Triangle], constants: &AccelConstants) -> Self {
         Self {
             frame: None,
             noise_tiles: &[],
-            box_min,
-            box_max,
+            box_min: constants.box_min,
+            box_max: constants.box_max,
+            origin_reach: constants.origin_reach,
             triangles,
             triangle_materials: &[],
             filters: false,
@@ -186,6 +192,7 @@ impl<'a> KernelInputs<'a> {
             noise_tiles: self.noise_tiles,
             box_min: self.box_min,
             box_max: self.box_max,
+            origin_reach: self.origin_reach,
             triangles: self.triangles,
             triangle_materials: self.triangle_materials,
             filters: self.filters,

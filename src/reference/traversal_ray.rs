@@ -81,32 +81,56 @@ pub fn largest_coordinate(inputs: &KernelInputs<impl ReadCounter>) -> f32 {
     inputs.box_min.abs().max(inputs.box_max.abs()).max_element()
 }
 
-/// Returns the limit of the coordinates of a ray's origin (world units). For origins whose coordinates all have at
-/// most this magnitude, the margins of leaves cover the ray's rounding.
+/// Returns the greatest magnitude of a component.
 #[inline(always)]
-pub fn origin_reach(inputs: &KernelInputs<impl ReadCounter>) -> f32 {
-    KD_MAX_ORIGIN_DISTANCE * largest_coordinate(inputs)
+fn longest_component(v: Vec3) -> f32 {
+    v.abs().max_element()
 }
 
-/// Returns whether the ray's origin is within [`origin_reach`].
+/// Returns the ray with its origin moved along itself by t.
 #[inline(always)]
-fn is_within_reach(inputs: &KernelInputs<impl ReadCounter>, ray: &SearchRay) -> bool {
-    ray.origin.abs().max_element() <= origin_reach(inputs)
+fn moved(ray: &SearchRay, t: f32) -> SearchRay {
+    SearchRay { origin: ray.origin + t * ray.direction, t_min: ray.t_min - t, t_max: ray.t_max - t, ..*ray }
 }
 
-/// Returns the ray, and the t by which its origin was moved. If the origin is beyond [`origin_reach`], it is moved
-/// along the ray to the structure's box. Otherwise t is 0.
+/// Moves a ray's origin to the point that is nearest to 0, of those with t from `t_min` or 0 up to `t_max`, if that at
+/// least halves its largest coordinate. Returns the distance of the move, or else 0.
+fn move_to_centre(ray: &mut SearchRay) -> f32 {
+    let t_nearest = -ray.origin.dot(ray.direction) / ray.direction.length_squared();
+    let t_move = min(max(t_nearest, min(ray.t_min, 0.0)), ray.t_max);
+    let there = moved(ray, t_move);
+    if !(2.0 * longest_component(there.origin) <= longest_component(ray.origin)) {
+        return 0.0;
+    }
+    *ray = there;
+    t_move
+}
+
+/// Returns the ray, and the t by which its origin was moved, or 0. If the origin is beyond the limit of
+/// `KD_MAX_ORIGIN_DISTANCE`, it is moved along the ray to the structure's box. If it is then beyond `origin_reach`, it
+/// is moved towards 0 (`accel/kdtree/scales.rs`).
 #[inline(always)]
 pub fn near_scene(inputs: &KernelInputs<impl ReadCounter>, ray: &SearchRay) -> (SearchRay, f32) {
-    if is_within_reach(inputs, ray) {
-        return (*ray, 0.0);
-    }
-    let t_start = max(TraversalRay::new(inputs, &SearchRay { t_min: 0.0, ..*ray }).t_enter, 0.0);
-    let origin = ray.origin + t_start * ray.direction;
-    (SearchRay { origin, t_min: ray.t_min - t_start, t_max: ray.t_max - t_start, ..*ray }, t_start)
+    if longest_component(ray.origin) <= inputs.origin_reach { (*ray, 0.0) } else { far_near_scene(inputs, ray) }
 }
 
-/// Calls `search` with the ray moved near the scene, and returns its hit with t counted from the ray's own origin. A
+#[cold]
+fn far_near_scene(inputs: &KernelInputs<impl ReadCounter>, ray: &SearchRay) -> (SearchRay, f32) {
+    let (mut near, mut t_start) = (*ray, 0.0);
+    if longest_component(ray.origin) > KD_MAX_ORIGIN_DISTANCE * largest_coordinate(inputs) {
+        t_start = max(TraversalRay::new(inputs, &SearchRay { t_min: 0.0, ..*ray }).t_enter, 0.0);
+        near = moved(ray, t_start);
+    }
+    if longest_component(near.origin) > inputs.origin_reach {
+        t_start += move_to_centre(&mut near);
+    }
+    // The kernel subtracts the sum, too, so that the result is the same.
+    near.t_min = ray.t_min - t_start;
+    (near, t_start)
+}
+
+/// Calls `search` with the ray that [`near_scene`] returns, and returns its hit with t counted from the ray's own
+/// origin. A
 /// miss has t = t_max.
 #[inline(always)]
 pub fn hit_from_near(

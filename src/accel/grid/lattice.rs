@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::{
     accel::bounds::Bounds,
-    layout::{AccelConstants, GRID_MAX_RESOLUTION, KD_PLANE_EPSILON},
+    layout::{AccelConstants, GRID_MAX_RESOLUTION, KD_MAX_ORIGIN_DISTANCE, KD_PLANE_EPSILON},
 };
 
 /// Cubes side by side that fill a box, beginning at its least corner. At its greatest corner the box may cut some of
@@ -158,9 +158,11 @@ impl Lattice {
     pub fn constants(&self) -> AccelConstants {
         let [box_min, box_max] = self.bounds();
         let [n_cells_x, n_cells_y, n_cells_z] = self.n_cells;
+        let largest_coordinate = self.largest_coordinate();
         AccelConstants {
             box_min,
-            plane_epsilon: KD_PLANE_EPSILON * box_min.abs().max(box_max.abs()).max_element(),
+            plane_epsilon: KD_PLANE_EPSILON * largest_coordinate,
+            origin_reach: KD_MAX_ORIGIN_DISTANCE * largest_coordinate,
             box_max,
             n_cells_x,
             n_cells_y,

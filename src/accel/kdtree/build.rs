@@ -9,6 +9,7 @@ use super::{
     flatten::{UpperTree, flatten},
     planes::planes_of,
     sah::Split,
+    scales::Scales,
     search::Search,
     subtree::{self, BuildCell, Input, split_reference},
 };
@@ -41,22 +42,26 @@ impl KdTree {
     /// Does what [`KdTree::build`] does, and reports its progress.
     pub fn build_observed(triangles: &[Triangle], options: &BuildOptions, progress: &Progress) -> KdTree {
         let exact_bounds = Bounds::of_all(triangles);
-        let margin = exact_bounds.margin();
+        let scales = Scales::new(triangles, &exact_bounds);
+        let reference = |ix: u32| {
+            let triangle = &triangles[ix as usize];
+            Reference { bounds: Bounds::of(triangle).grown(scales.margin_of(triangle)), triangle_ix: ix }
+        };
         let references: Vec<Reference> = (0..triangles.len() as u32)
             .into_par_iter()
             .filter(|&ix| is_finite(&triangles[ix as usize]))
-            .map(|ix| Reference { bounds: Bounds::of(&triangles[ix as usize]).grown(margin), triangle_ix: ix })
+            .map(reference)
             .collect();
-        let bounds = exact_bounds.grown(margin);
+        let bounds = exact_bounds.grown(exact_bounds.margin());
         let n = references.len() as u64;
         let budget = (n * u64::from(options.max_references_per_triangle) + MIN_BUDGET).min(MAX_BUDGET.max(n));
         let cell = BuildCell { bounds, level: 0, budget };
         // The budget of a cell is its share of the triangles.
         let meter = progress.begin(Work::Building, budget);
-        let input = Input { triangles, options, margin };
+        let input = Input { triangles, options, scales };
         let mut parts = flatten(grow((input, &meter), references, cell), bounds);
-        parts.leaf_planes = planes_of(triangles, &parts.leaf_triangles);
-        let mut tree = KdTree { parts, n_triangles: triangles.len() };
+        parts.leaf_planes = planes_of(&parts, triangles, &scales);
+        let mut tree = KdTree { parts, n_triangles: triangles.len(), scales };
         if options.slabs {
             tree.add_slabs(triangles);
         }

@@ -2,7 +2,7 @@
 //! the plane and takes the bounds of each of the two parts.
 //!
 //! The clipping is Sutherland-Hodgman's, in f64. Coordinates are f32, so a computed point is off by some 2^-52 of
-//! them, which is far less than the margin.
+//! them, which is far less than a triangle's margin.
 
 use crate::{accel::bounds::Bounds, layout::Triangle};
 

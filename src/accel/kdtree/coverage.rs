@@ -4,10 +4,13 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{Invalid, KdTree, Node};
-use crate::{accel::bounds::is_finite, layout::Triangle};
+use super::{Invalid, KdTree, Node, scales::length_of};
+use crate::{
+    accel::bounds::{Bounds, is_finite},
+    layout::Triangle,
+};
 
-/// Share of the margin, and of the reach of slabs, that is checked. The rest is room for two kinds of rounding:
+/// Share of a margin, and of the reach of slabs, that is checked. The rest is room for two kinds of rounding:
 /// bounds are rounded to f32, and a corner may be the result of seven cuts, by six faces of a cell and a plane
 /// (clip.rs), each of which is off by four times 2^-53 of the coordinates.
 const CHECKED: f64 = 0.96;
@@ -16,10 +19,9 @@ const CHECKED: f64 = 0.96;
 struct Descent<'a> {
     tree: &'a KdTree,
     triangle_ix: u32,
+    triangle: &'a Triangle,
     /// Distance from a cell within which a leaf must have the triangle, world units.
     margin: f64,
-    /// Distance by which slabs must reach beyond their triangles, world units.
-    reach: f64,
 }
 
 /// Defect of a node that the check has found for a triangle.
@@ -30,16 +32,20 @@ enum Lack {
     Slab(u32),
 }
 
-/// Checks that every leaf within `margin` of a triangle has it, and that no triangle reaches out of a node's slab.
+/// Checks that every leaf within a triangle's margin has it, and that no triangle reaches out of a node's slab.
 ///
 /// # Errors
 /// The first triangle, by index, for which this does not hold, and the node.
-pub fn check(tree: &KdTree, triangles: &[Triangle], margin: f32) -> Result<(), Invalid> {
-    let reach = CHECKED * f64::from(tree.constants().plane_epsilon);
+pub fn check(tree: &KdTree, triangles: &[Triangle]) -> Result<(), Invalid> {
+    let root = Bounds { min: tree.box_min().to_array(), max: tree.box_max().to_array() };
     let missing = triangles.par_iter().enumerate().find_map_first(|(ix, triangle)| {
         let corners = [triangle.v0, triangle.v1, triangle.v2].map(|v| v.as_dvec3());
-        let descent = Descent { tree, triangle_ix: ix as u32, margin: CHECKED * f64::from(margin), reach };
-        let lack = if is_finite(triangle) { descent.lack_below(0, &corners) } else { None };
+        let lack = if is_finite(triangle) {
+            let margin = CHECKED * f64::from(tree.scales.margin_of(triangle));
+            Descent { tree, triangle_ix: ix as u32, triangle, margin }.lack_below(0, &root, &corners)
+        } else {
+            None
+        };
         lack.map(|lack| match lack {
             Lack::Entry(node) => Invalid::Missing { node, triangle: ix as u32 },
             Lack::Slab(node) => Invalid::OutsideSlab { node, triangle: ix as u32 },
@@ -49,16 +55,17 @@ pub fn check(tree: &KdTree, triangles: &[Triangle], margin: f32) -> Result<(), I
 }
 
 impl Descent<'_> {
-    /// Returns the first node, from `node` down, that lacks a part of the triangle: a leaf that comes near the
+    /// Returns the first node, from `node` with its cell down, that lacks a part of the triangle: a leaf that comes
+    /// near the
     /// polygon and does not have the triangle, or a node with a slab that the polygon reaches out of.
-    fn lack_below(&self, node: u32, polygon: &[DVec3]) -> Option<Lack> {
+    fn lack_below(&self, node: u32, cell: &Bounds, polygon: &[DVec3]) -> Option<Lack> {
         if polygon.is_empty() {
             return None;
         }
         if let Some(slab) = self.tree.slab_of(node) {
             let (normal, offset) = (slab.normal.as_dvec3(), f64::from(slab.offset));
             // In the slab's unit, half of its thickness is 1, and a world unit is the normal's length (`Slab`).
-            let room = 1.0 - self.reach * normal.length();
+            let room = 1.0 - self.slab_reach(cell) * normal.length();
             if polygon.iter().any(|&corner| (normal.dot(corner) - offset).abs() > room) {
                 return Some(Lack::Slab(node));
             }
@@ -72,9 +79,17 @@ impl Descent<'_> {
                 let above_plane = |v: DVec3| v[axis] - f64::from(position);
                 let near_below = clip(polygon, |v| self.margin - above_plane(v));
                 let near_above = clip(polygon, |v| self.margin + above_plane(v));
-                self.lack_below(child, &near_below).or_else(|| self.lack_below(child + 1, &near_above))
+                let [below, above] = cell.split(axis, position);
+                let lack = self.lack_below(child, &below, &near_below);
+                lack.or_else(|| self.lack_below(child + 1, &above, &near_above))
             }
         }
+    }
+
+    /// Returns the distance by which a slab must reach beyond the triangle in a cell, world units.
+    fn slab_reach(&self, cell: &Bounds) -> f64 {
+        let scale = self.tree.scales.of_triangle(self.triangle).min(self.tree.scales.of_cell(cell));
+        CHECKED * f64::from(self.tree.constants().plane_epsilon * length_of(scale))
     }
 }
 

@@ -4,7 +4,7 @@
 //! triangles ─> build ─────> subtree ─────> flatten ─> KdTree ─> statistics
 //!              large cells, └ small cells,            ├─> planes, slabs: let rays skip most triangles
 //!              all threads    a thread each           └─> validate, coverage
-//!                   │              │
+//!                   │              │       scales: margins, the larger the farther a triangle is from 0
 //!                   └──> search <──┘   binned: counts by bins, sweeps the few that may hold the best plane
 //!                        and clip      counted: counts at every plane, for cells of at most 32 triangles
 //! ```
@@ -23,6 +23,7 @@ mod parts;
 mod planes;
 mod ropes;
 mod sah;
+mod scales;
 mod search;
 mod slabs;
 mod statistics;
@@ -34,6 +35,7 @@ use crate::layout::{AccelConstants, KD_AXIS_MASK, KD_LEAF, KD_MAX_DEPTH, KD_PAIR
 
 pub use links::TraversalLinks;
 pub use parts::Parts;
+use scales::Scales;
 pub use statistics::Statistics;
 pub use traversal::Traversal;
 pub use validate::Invalid;
@@ -47,6 +49,7 @@ pub struct KdTree {
     parts: Parts,
     /// The number of triangles that the tree was built from. Every triangle index in a leaf is less than this number.
     n_triangles: usize,
+    scales: Scales,
 }
 
 impl KdTree {
@@ -55,7 +58,8 @@ impl KdTree {
         let Parts { box_min, box_max, .. } = self.parts;
         let largest_coordinate = box_min.abs().max(box_max.abs()).max_element();
         let plane_epsilon = KD_PLANE_EPSILON * largest_coordinate;
-        AccelConstants { box_min, box_max, plane_epsilon, ..AccelConstants::default() }
+        let origin_reach = self.scales.origin_reach(largest_coordinate);
+        AccelConstants { box_min, box_max, plane_epsilon, origin_reach, ..AccelConstants::default() }
     }
 }
 

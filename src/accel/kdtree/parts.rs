@@ -2,7 +2,8 @@
 
 use glam::Vec3;
 
-use super::{Invalid, KdTree, Node};
+use super::{Invalid, KdTree, Node, scales::Scales};
+use crate::accel::bounds::Bounds;
 use crate::layout::{KdNode, Plane, Slab, Triangle};
 
 /// Arrays of a kd-tree and the cell of its root.
@@ -17,7 +18,7 @@ pub struct Parts {
     pub parents: Vec<u32>,
     /// Triangle indices, leaf after leaf in depth-first order, ascending in each leaf.
     pub leaf_triangles: Vec<u32>,
-    /// The plane of each triangle in `leaf_triangles`.
+    /// The plane of each triangle in `leaf_triangles`, whose normal has the length 2^i at scale i (scales.rs).
     pub leaf_planes: Vec<Plane>,
     /// A slab for each node, zeros for a node that is not marked with `KD_HAS_SLAB`. The array may be empty if no
     /// node is marked.
@@ -44,7 +45,8 @@ impl KdTree {
     /// # Errors
     /// The first of [`KdTree::validate`]'s invariants that does not hold.
     pub fn from_parts(parts: Parts, triangles: &[Triangle]) -> Result<Self, Invalid> {
-        let tree = Self { parts, n_triangles: triangles.len() };
+        let scales = Scales::new(triangles, &Bounds::of_all(triangles));
+        let tree = Self { parts, n_triangles: triangles.len(), scales };
         tree.validate(triangles)?;
         Ok(tree)
     }

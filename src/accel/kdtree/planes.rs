@@ -1,9 +1,10 @@
 //! Planes of the leaves' triangles. Where a ray keeps clear of a triangle's plane, the triangle need not be tested.
 //!
 //! A ray is clear of a plane if its distance from the plane is more than `plane_epsilon` all along its t interval in
-//! the leaf. This epsilon is `KD_PLANE_EPSILON` times the largest coordinate, which is twice the tree's margin: 256
-//! units of 2^-24 times the largest coordinate. The table lists the errors in these units, with origins as far away
-//! as `KD_MAX_ORIGIN_DISTANCE` allows.
+//! the leaf. At scale 0 (scales.rs), this epsilon is `KD_PLANE_EPSILON` times the largest coordinate, which is twice
+//! the margin: 256 units of 2^-24 times the largest coordinate. The table lists the errors in these units, with origins
+//! as far away as `KD_MAX_ORIGIN_DISTANCE` allows. At scale i, errors and epsilon are 2^i times smaller. There, the
+//! plane's normal and distance are multiplied by 2^i, so that kernels need no other epsilon. This loses no bits.
 //!
 //! ```text
 //! error of                                                   units
@@ -19,11 +20,46 @@
 
 use rayon::prelude::*;
 
-use crate::layout::{Plane, Triangle};
+use super::{
+    Node, Parts,
+    scales::{Scales, length_of},
+};
+use crate::{
+    accel::bounds::Bounds,
+    layout::{Plane, Triangle},
+};
 
-/// Returns the plane of each entry's triangle.
-pub fn planes_of(triangles: &[Triangle], entries: &[u32]) -> Vec<Plane> {
-    entries.par_iter().map(|&ix| plane_of(&triangles[ix as usize])).collect()
+/// Returns the plane of each entry's triangle. It has the coarser one of the scales of the triangle and of the leaf's
+/// cell.
+pub fn planes_of(parts: &Parts, triangles: &[Triangle], scales: &Scales) -> Vec<Plane> {
+    let in_cell = |(&ix, cell_scale): (&u32, u32)| {
+        let triangle = &triangles[ix as usize];
+        let Plane { normal, distance } = plane_of(triangle);
+        let length = length_of(cell_scale.min(scales.of_triangle(triangle)));
+        Plane { normal: normal / length, distance: distance / length }
+    };
+    parts.leaf_triangles.par_iter().zip(cell_scales(parts, scales)).map(in_cell).collect()
+}
+
+/// Returns the scale of each entry's cell.
+fn cell_scales(parts: &Parts, scales: &Scales) -> Vec<u32> {
+    let mut of_entries = vec![0; parts.leaf_triangles.len()];
+    if scales.has_one() {
+        return of_entries;
+    }
+    let mut stack = vec![(0, Bounds { min: parts.box_min.to_array(), max: parts.box_max.to_array() })];
+    while let Some((node_ix, cell)) = stack.pop() {
+        match parts.node(node_ix) {
+            Node::Leaf { first, count } => {
+                of_entries[first as usize..][..count as usize].fill(scales.of_cell(&cell));
+            }
+            Node::Split { axis, position, child } => {
+                let [below, above] = cell.split(axis, position);
+                stack.extend([(child, below), (child + 1, above)]);
+            }
+        }
+    }
+    of_entries
 }
 
 /// Returns a triangle's plane: the rounded normal, and the distance at which a plane with that normal passes through

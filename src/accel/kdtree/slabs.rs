@@ -2,14 +2,14 @@
 //! Scenes, SIGGRAPH 1986). A ray that passes by a surface goes through many cells that have a part of it. Where the
 //! ray keeps clear of a cell's slab, it need not go down to the leaves.
 //!
-//! A slab holds the parts of triangles within the tree's margin (bounds.rs) of the cell. It reaches beyond them by
-//! `plane_epsilon`, which is also the distance that a ray has to keep from a triangle's plane. The proof is that of
-//! planes.rs, except that rounding moves a slab by 5 of the units there, and a plane by 4.
+//! A slab holds the parts of triangles within their margins (bounds.rs) of the cell. It reaches beyond them by the
+//! epsilon of planes.rs at the coarsest of the scales of the cell and its triangles. The proof is that of planes.rs,
+//! except that rounding moves a slab by 5 of the units there, and a plane by 4.
 
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{KdTree, Node, clip::Polygon};
+use super::{KdTree, Node, clip::Polygon, scales::length_of};
 use crate::{
     accel::bounds::Bounds,
     layout::{KD_HAS_SLAB, Slab, Triangle},
@@ -39,11 +39,7 @@ impl KdTree {
     /// entry of the leaves.
     pub(super) fn add_slabs(&mut self, triangles: &[Triangle]) {
         let bounds = Bounds { min: self.box_min().to_array(), max: self.box_max().to_array() };
-        // The root's cell has the margin around it already, so this margin is larger than the tree's by 2^-17 of
-        // itself.
-        let margin = bounds.margin();
-        let reach = f64::from(self.constants().plane_epsilon);
-        let fitting = Fitting { tree: self, triangles, n_entries: self.entries_below(), margin, reach };
+        let fitting = Fitting { tree: self, triangles, n_entries: self.entries_below() };
         let slabs: Vec<Slabs> = fitting.patches(bounds).par_iter().map(|patch| fitting.slabs_of(patch)).collect();
         let parts = &mut self.parts;
         parts.slabs = vec![Slab::default(); parts.nodes.len()];
@@ -88,10 +84,16 @@ struct Fitting<'a> {
     tree: &'a KdTree,
     triangles: &'a [Triangle],
     n_entries: Vec<u32>,
-    /// Rounding margin of the cells, world units.
-    margin: f32,
-    /// Distance by which a slab reaches beyond its triangles, world units.
-    reach: f64,
+}
+
+/// What [`Fitting::fit`] finds out about the surface below a node.
+#[derive(Clone, Copy)]
+struct Surface {
+    /// The sum of the polygons' area vectors. A vector that points away from the sum so far is negated, so the
+    /// triangles' winding does not matter.
+    area: DVec3,
+    /// The coarsest of the triangles' scales.
+    scale: u32,
 }
 
 /// The part of the surface that is in the leaves below a node, and the slabs that were found there.
@@ -122,52 +124,42 @@ impl Fitting<'_> {
 
     /// Returns the slabs of a node and of all nodes below it.
     fn slabs_of(&self, patch: &NodeCell) -> Slabs {
-        let mut surface = FlatPiece::default();
-        self.fit(patch, u32::MAX, &mut surface);
-        surface.slabs
+        let mut piece = FlatPiece::default();
+        self.fit(patch, u32::MAX, &mut piece);
+        piece.slabs
     }
 
-    /// Adds the polygons below a node to the surface, and the slabs there. `n_above`: the number of entries below the
-    /// parent. Returns the sum of the polygons' area vectors. A vector that points away from the sum so far is
-    /// negated, so the triangles' winding does not matter.
-    fn fit(&self, patch: &NodeCell, n_above: u32, surface: &mut FlatPiece) -> DVec3 {
-        let (n_entries, first_corner) = (self.n_entries[patch.node as usize], surface.corners.len());
-        let (area, thickest) = match self.tree.node(patch.node) {
+    /// Adds the polygons below a node to the piece, and the slabs there. `n_above`: the number of entries below the
+    /// parent.
+    fn fit(&self, patch: &NodeCell, n_above: u32, piece: &mut FlatPiece) -> Surface {
+        let (n_entries, first_corner) = (self.n_entries[patch.node as usize], piece.corners.len());
+        let (surface, thickest) = match self.tree.node(patch.node) {
             Node::Leaf { first, count } => {
                 let entries = &self.tree.leaf_triangles()[first as usize..][..count as usize];
-                let area = entries.iter().fold(DVec3::ZERO, |area, &ix| {
-                    let polygon = Polygon::near(&self.triangles[ix as usize], &patch.cell, self.margin);
-                    towards(area, surface.add(&polygon))
+                let scales = &self.tree.scales;
+                let surface = entries.iter().fold(Surface::NONE, |surface, &ix| {
+                    let triangle = &self.triangles[ix as usize];
+                    let polygon = Polygon::near(triangle, &patch.cell, scales.margin_of(triangle));
+                    surface.and(Surface { area: piece.add(&polygon), scale: scales.of_triangle(triangle) })
                 });
-                (area, if count >= LEAF_ENTRIES { THICKEST_LEAF } else { 0.0 })
+                (surface, if count >= LEAF_ENTRIES { THICKEST_LEAF } else { 0.0 })
             }
             Node::Split { axis, position, child } => {
                 let [below, above] = patch.cell.split(axis, position);
-                let below = self.fit(&NodeCell { node: child, cell: below }, n_entries, surface);
-                let above = self.fit(&NodeCell { node: child + 1, cell: above }, n_entries, surface);
+                let below = self.fit(&NodeCell { node: child, cell: below }, n_entries, piece);
+                let above = self.fit(&NodeCell { node: child + 1, cell: above }, n_entries, piece);
                 let is_first = SLAB_ENTRY_LIMITS.iter().any(|&most| n_entries <= most && most < n_above);
-                (towards(below, above), if is_first { THICKEST_SPLIT } else { 0.0 })
+                (below.and(above), if is_first { THICKEST_SPLIT } else { 0.0 })
             }
         };
         if thickest > 0.0 && n_entries > 0 {
             let longest = patch.cell.extent().into_iter().fold(0.0, f64::max);
-            let slab = self.slab_around(&surface.corners[first_corner..], area, thickest * longest);
-            surface.slabs.extend(slab.map(|slab| (patch.node, slab)));
+            let scale = surface.scale.min(self.tree.scales.of_cell(&patch.cell));
+            let reach = f64::from(self.tree.constants().plane_epsilon * length_of(scale));
+            let slab = slab_around(&piece.corners[first_corner..], surface.area, thickest * longest, reach);
+            piece.slabs.extend(slab.map(|slab| (patch.node, slab)));
         }
-        area
-    }
-
-    /// Returns the slab whose planes are perpendicular to the surface's mean normal. Returns none if the surface is
-    /// thicker than `thickest` (world units), or if its normals cancel out.
-    fn slab_around(&self, corners: &[DVec3], area: DVec3, thickest: f64) -> Option<Slab> {
-        let across = area.try_normalize()?;
-        let (low, high) = extent_along(corners, across);
-        if high - low > thickest {
-            return None;
-        }
-        let half = 0.5 * (high - low) + self.reach;
-        let slab = Slab { normal: (across / half).as_vec3(), offset: (0.5 * (low + high) / half) as f32 };
-        (slab.normal.is_finite() && slab.offset.is_finite()).then_some(slab)
+        surface
     }
 }
 
@@ -181,9 +173,29 @@ impl FlatPiece {
     }
 }
 
-/// Returns the sum of two area vectors. The second one is negated if it points away from the first.
-fn towards(area: DVec3, other: DVec3) -> DVec3 {
-    if area.dot(other) < 0.0 { area - other } else { area + other }
+impl Surface {
+    /// A surface without triangles.
+    const NONE: Self = Self { area: DVec3::ZERO, scale: u32::MAX };
+
+    /// Joins two surfaces.
+    fn and(self, other: Self) -> Self {
+        let area = if self.area.dot(other.area) < 0.0 { self.area - other.area } else { self.area + other.area };
+        Self { area, scale: self.scale.min(other.scale) }
+    }
+}
+
+/// Returns the slab whose planes are perpendicular to the surface's mean normal, which is that of `area`. Returns none
+/// if the surface is thicker than `thickest` (world units), or if its normals cancel out. `reach`: the distance by
+/// which the slab reaches beyond the corners (world units).
+fn slab_around(corners: &[DVec3], area: DVec3, thickest: f64, reach: f64) -> Option<Slab> {
+    let across = area.try_normalize()?;
+    let (low, high) = extent_along(corners, across);
+    if high - low > thickest {
+        return None;
+    }
+    let half = 0.5 * (high - low) + reach;
+    let slab = Slab { normal: (across / half).as_vec3(), offset: (0.5 * (low + high) / half) as f32 };
+    (slab.normal.is_finite() && slab.offset.is_finite()).then_some(slab)
 }
 
 /// Returns the least and the greatest height of corners along a direction.

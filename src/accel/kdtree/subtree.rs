@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use super::{BuildOptions, EMPTY_LEAF, Node, clip::split_bounds, sah::Split, search::Search};
+use super::{BuildOptions, EMPTY_LEAF, Node, clip::split_bounds, sah::Split, scales::Scales, search::Search};
 use crate::{
     accel::bounds::{Bounds, Reference},
     layout::{KD_WORD_DEPTH, KdNode, Triangle},
@@ -14,8 +14,7 @@ use crate::{
 pub struct Input<'a> {
     pub triangles: &'a [Triangle],
     pub options: &'a BuildOptions,
-    /// Distance from a cell within which a triangle counts as inside the cell, world units.
-    pub margin: f32,
+    pub scales: Scales,
 }
 
 /// A cell that is to be built, without its references.
@@ -76,7 +75,7 @@ pub fn split_reference(input: Input, reference: &Reference, cell: &Bounds, split
         return [None, Some(*reference)];
     }
     let triangle = &input.triangles[reference.triangle_ix as usize];
-    let parts = split_bounds(triangle, cell, (split.axis, split.position), input.margin);
+    let parts = split_bounds(triangle, cell, (split.axis, split.position), input.scales.margin_of(triangle));
     // The bounds of each part are rounded outwards. The intersection keeps them within the reference's own bounds, so
     // bounds never grow from a cell to its children.
     let limits = reference.bounds.split(split.axis, split.position);

@@ -1,7 +1,7 @@
 //! Check of all invariants of a tree. This file checks the structure. `coverage` checks that no leaf lacks a
 //! triangle.
 
-use super::{EMPTY_LEAF, KdTree, Node, coverage, planes::planes_of};
+use super::{EMPTY_LEAF, KdTree, Node, coverage, planes::planes_of, scales::Scales};
 use crate::{
     accel::bounds::{Bounds, is_finite},
     layout::{KD_MAX_DEPTH, Triangle},
@@ -55,8 +55,8 @@ pub enum Invalid {
 impl KdTree {
     /// Checks the tree against the triangles it was built from.
     ///
-    /// Each triangle is cut up along the planes that it meets, down to the leaves. Each leaf within the margin of a
-    /// part must have the triangle. The check takes some microseconds a triangle.
+    /// Each triangle is cut up along the planes that it meets, down to the leaves. Each leaf within the triangle's
+    /// margin of a part must have the triangle. The check takes some microseconds a triangle.
     ///
     /// # Errors
     /// The first invariant that does not hold.
@@ -71,16 +71,16 @@ impl KdTree {
         }
         let root = Bounds { min: self.box_min().to_array(), max: self.box_max().to_array() };
         let exact_bounds = Bounds::of_all(triangles);
-        let margin = exact_bounds.margin();
-        if root != exact_bounds.grown(margin) {
+        let scales = Scales::new(triangles, &exact_bounds);
+        if root != exact_bounds.grown(exact_bounds.margin()) || scales != self.scales {
             return Err(Invalid::RootCell);
         }
         if self.nodes()[1] != EMPTY_LEAF || self.parents()[0] != 0 {
             return Err(Invalid::Unused);
         }
-        Walk::new(self, triangles, margin).run(root)?;
-        coverage::check(self, triangles, margin)?;
-        let are_right = self.leaf_planes() == planes_of(triangles, self.leaf_triangles());
+        Walk::new(self, triangles).run(root)?;
+        coverage::check(self, triangles)?;
+        let are_right = self.leaf_planes() == planes_of(&self.parts, triangles, &scales);
         if are_right { Ok(()) } else { Err(Invalid::Planes) }
     }
 }
@@ -89,8 +89,6 @@ impl KdTree {
 struct Walk<'a> {
     tree: &'a KdTree,
     triangles: &'a [Triangle],
-    /// Distance from a cell within which a triangle counts as inside the cell, world units.
-    margin: f32,
     /// Whether each node has been entered.
     seen: Vec<bool>,
     /// The number of entries of the leaves so far.
@@ -100,8 +98,8 @@ struct Walk<'a> {
 }
 
 impl<'a> Walk<'a> {
-    fn new(tree: &'a KdTree, triangles: &'a [Triangle], margin: f32) -> Self {
-        Self { tree, triangles, margin, seen: vec![false; tree.nodes().len()], n_entries: 0, depth: 0 }
+    fn new(tree: &'a KdTree, triangles: &'a [Triangle]) -> Self {
+        Self { tree, triangles, seen: vec![false; tree.nodes().len()], n_entries: 0, depth: 0 }
     }
 
     fn run(mut self, root: Bounds) -> Result<(), Invalid> {
@@ -167,7 +165,8 @@ impl<'a> Walk<'a> {
             let Some(corners) = self.triangles.get(triangle as usize).filter(|_| triangle >= next) else {
                 return Err(Invalid::LeafOrder { node, triangle });
             };
-            if !is_finite(corners) || !Bounds::of(corners).grown(self.margin).touches(cell) {
+            let is_near = || Bounds::of(corners).grown(self.tree.scales.margin_of(corners)).touches(cell);
+            if !is_finite(corners) || !is_near() {
                 return Err(Invalid::Stray { node, triangle });
             }
             next = triangle + 1;

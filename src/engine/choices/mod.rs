@@ -51,7 +51,6 @@ use crate::{
     accel::{AccelKind, kdtree::Traversal},
     frame::{Integrator, Primary, RenderOptions},
     gpu::{Context, DeviceInfo, GpuError},
-    layout::KD_MAX_ORIGIN_DISTANCE,
     scene::{Camera, Projection},
     world::World,
 };
@@ -141,9 +140,7 @@ impl Workload {
 
     /// Tells whether tracing and compute kernels that rasterize find the same primary hits, bit for bit.
     fn primaries_agree(&self, world: &World) -> bool {
-        let [least, greatest] = world.bounds();
-        let largest_coordinate = least.abs().max(greatest.abs()).max_element();
-        self.farthest_eye <= KD_MAX_ORIGIN_DISTANCE * largest_coordinate
+        self.farthest_eye <= world.geometry().accel().origin_reach()
     }
 
     /// Returns the work of an interactive window, whose number of rays and cameras have no bound.
