@@ -190,7 +190,7 @@ fn inspect_tells_how_paths_pick_lights() {
         // A scene without lights gets some, and a background.
         let n_others = lights["lights"].as_u64().unwrap() - n as u64;
         assert_eq!((n_others, lights["picked_by"].as_str()), (3, Some(expected)));
-        assert!(text.lines().any(|line| line.starts_with("picked by a") && line.ends_with(expected)), "{text}");
+        assert!(text.lines().any(|line| line.starts_with("a ray's source is picked from a") && line.ends_with(expected)), "{text}");
     }
 }
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 /// First bytes of other files, and what these files are.
-const FOREIGN: [(&[u8], &str); 15] = [
+const FOREIGN: [(&[u8], &str); 24] = [
     (
         b"version https://git-lfs",
         "is a pointer of Git LFS, which stands for a larger file: `git lfs pull` fetches that file",
@@ -20,6 +20,15 @@ const FOREIGN: [(&[u8], &str); 15] = [
     (b"//Maya ASCII", "is a file of Maya: export it from there as OBJ"),
     (b"#usda", "is a USD file, which is not read: Blender, for example, saves it as glTF"),
     (b"#VRML", "is a VRML file, which is not read: MeshLab, for example, saves it as PLY"),
+    (b"# vtk DataFile", "is a VTK file, which is not read: ParaView, for example, saves it as PLY"),
+    (b"VOX ", "is a file of MagicaVoxel: export it from there as OBJ or PLY"),
+    (b"PMX ", "is an MMD model, which is not read: an add-on of Blender reads it"),
+    (b"b3dm", "is a tile of 3D Tiles, which is not read: `3d-tiles-tools b3dmToGlb` takes the glTF file out of it"),
+    (b"LASF", "is a cloud of points (LAS), without triangles to show. CloudCompare, for example, makes a mesh of it"),
+    (b"ASTM-E57", "is a cloud of points (E57), without triangles to show. CloudCompare, for example, makes a mesh of it"),
+    (b"# .PCD", "is a cloud of points (PCD), without triangles to show. CloudCompare, for example, makes a mesh of it"),
+    (b"Ogawa", "is an Alembic file, which is not read: Blender, for example, saves it as glTF"),
+    (b"\x28\xb5\x2f\xfd", "is compressed by Zstandard, as files of Blender are: export those from there as glTF"),
     (b"OFF\n", "is an OFF file, which is not read: MeshLab, for example, saves it as PLY"),
     (b"OFF\r", "is an OFF file, which is not read: MeshLab, for example, saves it as PLY"),
 ];
@@ -81,6 +90,8 @@ mod tests {
             (b"\n <!DOCTYPE HTML><html>", "web page"),
             (b"<?xml version=\"1.0\"?>\n<COLLADA xmlns=\"\">", "COLLADA"),
             (b"Kaydara FBX Binary  \0", "FBX"),
+            (b"VOX \x96\0\0\0", "MagicaVoxel"),
+            (b"\x28\xb5\x2f\xfd\0", "Zstandard"),
         ] {
             assert!(what_it_is(bytes).unwrap().contains(what), "{what}");
         }

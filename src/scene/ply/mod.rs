@@ -12,14 +12,14 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use glam::{DVec3, Vec2};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 use serde::Deserialize;
 use serde_ply::{DeserializeError, ElementDef, PlyFormat, PlyHeader, PlyProperty, PlyReader, PropertyType, ScalarType};
 
 use self::{
     quick::{header_bytes, quick_triangles, quick_vertices},
-    vertex::{Vertices, upper_left},
+    vertex::{REDS, Vertices, largest_colour, upper_left},
 };
 use super::{
     error::Checked,
@@ -31,10 +31,14 @@ use super::{
     needs::{Attributes, MeshSize, require_for_mesh, require_for_rows},
     outside::Access,
     polygon::Triangulator,
+    read::lossy_text,
     smooth::{Shading, smooth_normals},
-    texture::Texture,
+    texture::{Texture, linear_of_srgb},
 };
-use crate::util::progress::{Meter, Progress, Work};
+use crate::util::{
+    progress::{Meter, Progress, Work},
+    text::one_line,
+};
 
 /// Polygon as the indices of its vertices. Writers use either of the two names.
 #[derive(Deserialize)]
@@ -47,6 +51,13 @@ struct Polygon {
     /// Number of the image that the polygon shows.
     #[serde(default)]
     texnumber: f64,
+    /// Colour, if the element has one.
+    #[serde(default, alias = "diffuse_red", alias = "r")]
+    red: f32,
+    #[serde(default, alias = "diffuse_green", alias = "g")]
+    green: f32,
+    #[serde(default, alias = "diffuse_blue", alias = "b")]
+    blue: f32,
 }
 
 /// Strips of triangles as the indices of their vertices; -1 begins a new strip.
@@ -132,6 +143,8 @@ struct Elements {
     /// All faces, if they were read in the quick way.
     triangles: Vec<[u32; 3]>,
     polygons: Vec<Polygon>,
+    /// Linear colours of the polygons, or empty if the file has none that are shown.
+    polygon_colours: Vec<Vec3>,
     strips: Vec<Strips>,
 }
 
@@ -155,6 +168,8 @@ pub(super) fn ply_mesh(
     n_loaded: usize,
     progress: &Progress,
 ) -> Checked<PlyMesh> {
+    let mended = mended(bytes);
+    let bytes = &mended[..];
     let (head, rest) = widened(bytes);
     let mut reader = PlyReader::from_reader(Counted::new(&head, rest, progress))
         .map_err(|error| format!("is no PLY file: {}", text(&error)))?;
@@ -169,6 +184,36 @@ pub(super) fn ply_mesh(
     let would_be_invisible = elements.vertices.would_be_invisible;
     let (mesh, n_left_out) = mesh(elements, names.len(), shading)?;
     Ok(PlyMesh { mesh, names, uses_crease, n_left_out, would_be_invisible })
+}
+
+/// Returns a file without what the reader of PLY files does not accept: lines that end in CR alone, blank lines in a
+/// text, and names in the header that are not UTF-8.
+fn mended(bytes: &[u8]) -> Cow<'_, [u8]> {
+    let mut mended = Cow::Borrowed(bytes);
+    if bytes.starts_with(b"ply\r") && !bytes.starts_with(b"ply\r\n") {
+        const END: &[u8] = b"\rend_header\r";
+        let end = bytes.windows(END.len()).position(|part| part == END).map_or(bytes.len(), |at| at + END.len());
+        let is_text = bytes[..end].windows(5).any(|part| part == b"ascii");
+        let end = if is_text { bytes.len() } else { end };
+        mended.to_mut()[..end].iter_mut().filter(|byte| **byte == b'\r').for_each(|byte| *byte = b'\n');
+    }
+    let Some(n_header) = header_bytes(&mended) else { return mended };
+    let (header, rows) = mended.split_at(n_header);
+    let is_text = header.windows(12).any(|part| part == b"format ascii");
+    let is_blank = |line: &[u8]| line.trim_ascii().is_empty();
+    let has_blanks = is_text && rows.split(|byte| *byte == b'\n').rev().skip(1).any(is_blank);
+    if str::from_utf8(header).is_ok() && !has_blanks {
+        return mended;
+    }
+    let mut whole = lossy_text(header.to_vec()).into_bytes();
+    match has_blanks {
+        true => rows
+            .split_inclusive(|byte| *byte == b'\n')
+            .filter(|line| !is_blank(line))
+            .for_each(|line| whole.extend(line)),
+        false => whole.extend(rows),
+    }
+    Cow::Owned(whole)
 }
 
 /// Returns a file in two parts, the first of which is the header or empty. In a text, coordinates may have more digits
@@ -217,7 +262,7 @@ impl Elements {
         let of_polygons = self.polygons.iter().map(|polygon| polygon.vertex_indices.len());
         let n_corners = of_polygons.chain(self.strips.iter().map(|strips| strips.vertex_indices.len()));
         let has_uvs = !self.vertices.uvs.is_empty() || self.polygons.iter().any(|p| !p.texcoord.is_empty());
-        let has_colours = !self.vertices.colours.is_empty();
+        let has_colours = !self.vertices.colours.is_empty() || !self.polygon_colours.is_empty();
         MeshSize {
             n_triangles: self.triangles.len() as u64 + n_corners.map(|n| n.saturating_sub(2) as u64).sum::<u64>(),
             // The points are there already.
@@ -278,12 +323,26 @@ fn read(reader: &mut PlyReader<Counted>, (header, bytes): (&PlyHeader, &[u8]), o
         let failed = |error| format!("element `{}`: {}", element.name.escape_debug(), text(&error));
         match element.name.as_str() {
             "vertex" => found.vertices = Vertices::read(reader, element, origin)?,
-            "face" => found.polygons = reader.next_element().map_err(failed)?,
+            "face" => {
+                found.polygons = reader.next_element().map_err(failed)?;
+                found.polygon_colours = polygon_colours(element, &found.polygons);
+            }
             "tristrips" => found.strips = reader.next_element().map_err(failed)?,
             _ => drop(reader.next_element::<Vec<Skipped>>().map_err(failed)?),
         }
     }
+    if found.vertices.colours.iter().any(|colour| *colour != found.vertices.colours[0]) {
+        found.polygon_colours.clear();
+    }
     Ok(found)
+}
+
+/// Returns the linear colours of polygons, or nothing if they have none.
+fn polygon_colours(element: &ElementDef, polygons: &[Polygon]) -> Vec<Vec3> {
+    let Some(red) = REDS.iter().find(|name| element.has_property(name)) else { return Vec::new() };
+    let colours = polygons.iter().map(|polygon| Vec3::new(polygon.red, polygon.green, polygon.blue));
+    let one = largest_colour(element, red, colours.clone());
+    colours.map(|colour| (colour / one).map(linear_of_srgb)).collect()
 }
 
 /// Returns the names of images in the comments `TextureFile NAME`.
@@ -294,7 +353,7 @@ fn texture_files(comments: &[String]) -> impl Iterator<Item = &str> {
 /// Returns one material for each name of an image, which is its base colour. Warns of images that cannot be read.
 fn materials(path: &Path, names: &[String], access: Access, images: &mut Images) -> Vec<Material> {
     let reach = access.beside(path);
-    let warn = |what: &str| tracing::warn!("{}: TextureFile is not shown: {}", path.display(), what.escape_debug());
+    let warn = |what: &str| tracing::warn!("{}: TextureFile is not shown: {}", path.display(), one_line(what));
     let mut add = |name: &String| {
         let is_shown = !images.is_replaced(name);
         is_shown.then(|| reach.find(reach.root, name).map(|file| images.add(file.path)))
@@ -350,7 +409,7 @@ fn check(elements: &[ElementDef]) -> Checked<()> {
 /// Makes the mesh, without faces whose corners are not finite, and returns their number. `n_images`: the number of
 /// images that polygons can show.
 fn mesh(elements: Elements, n_images: usize, shading: Shading) -> Checked<(Mesh, usize)> {
-    let Elements { vertices, triangles, polygons, strips } = elements;
+    let Elements { vertices, triangles, polygons, polygon_colours, strips } = elements;
     let mut mesh = Mesh { slots: vec![0; triangles.len()], faces: triangles, ..Mesh::default() };
     let has_own_uvs = |polygon: &Polygon| polygon.texcoord.len() == 2 * polygon.vertex_indices.len();
     let has_uvs = !vertices.uvs.is_empty() || polygons.iter().any(|p| !p.texcoord.is_empty() && has_own_uvs(p));
@@ -372,6 +431,9 @@ fn mesh(elements: Elements, n_images: usize, shading: Shading) -> Checked<(Mesh,
         triangulator.cut(&corners, |triangle| {
             mesh.faces.push(triangle.map(|corner| indices[corner]));
             mesh.slots.push(slot);
+            if let Some(colour) = polygon_colours.get(polygon_ix) {
+                mesh.colours.push([colour.extend(1.0); 3]);
+            }
             if has_uvs && has_own_uvs(polygon) {
                 let own = |corner: usize| upper_left(polygon.texcoord[2 * corner], polygon.texcoord[2 * corner + 1]);
                 mesh.uvs[0].push(triangle.map(own));
@@ -395,7 +457,9 @@ fn mesh(elements: Elements, n_images: usize, shading: Shading) -> Checked<(Mesh,
         // Without texture coordinates, no image is shown.
         mesh.slots.fill(0);
     }
-    if !vertices.colours.is_empty() {
+    if !polygon_colours.is_empty() {
+        mesh.colours.resize(mesh.faces.len(), [Vec4::ONE; 3]);
+    } else if !vertices.colours.is_empty() {
         mesh.colours = mesh.faces.par_iter().map(|face| face.map(|ix| vertices.colours[ix as usize])).collect();
     }
     mesh.positions = vertices.positions;
