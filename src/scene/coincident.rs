@@ -82,13 +82,11 @@ impl Coincident {
     /// Finds the faces that are there several times and look different.
     pub fn of(parts: &[Part]) -> Self {
         let mut found = Self::default();
-        let all_look_alike = |part: &Part| match &part.looks {
-            Looks::Material(_) => part.look(0) == parts[0].look(0),
-            Looks::Mesh(mesh) => {
-                mesh.colours.is_empty() && mesh.slots.iter().all(|slot| Some(slot) == mesh.slots.first())
-            }
+        let can_differ = |part: &Part| match &part.looks {
+            Looks::Material(_) => part.look(0) != parts[0].look(0),
+            Looks::Mesh(mesh) => have_looks(mesh) && have_repeated_keys(part),
         };
-        if parts.iter().all(all_look_alike) {
+        if !parts.iter().any(can_differ) {
             return found;
         }
         let mut all: Vec<Face> = parts.par_iter().enumerate().flat_map_iter(faces_of).collect();
@@ -145,6 +143,22 @@ impl Face {
     fn corners(&self) -> Range<usize> {
         self.first_corner..self.first_corner + self.n_corners
     }
+}
+
+/// Returns whether some faces of a mesh look different from others.
+fn have_looks(mesh: &Mesh) -> bool {
+    !mesh.colours.is_empty() || mesh.slots.iter().any(|slot| *slot != mesh.slots[0])
+}
+
+/// Returns whether some triangles of a part have the same key. Most meshes end here, after less memory and time than
+/// their faces with all places would take.
+fn have_repeated_keys(part: &Part) -> bool {
+    let triangles: &[[u32; 3]] = part.corners.as_chunks().0;
+    let of_corner = |ix: u32| hash(Vec3::from_slice(&part.points[ix as usize * 3..]));
+    let key = |triangle: &[u32; 3]| triangle.iter().fold(0_u64, |sum, ix| sum.wrapping_add(of_corner(*ix)));
+    let mut keys: Vec<u64> = triangles.par_iter().map(key).collect();
+    keys.par_sort_unstable();
+    keys.par_windows(2).any(|pair| pair[0] == pair[1])
 }
 
 fn faces_of<'a>((part_ix, part): (usize, &'a Part)) -> impl Iterator<Item = Face> + use<'a> {

@@ -25,7 +25,10 @@ const FOREIGN: [(&[u8], &str); 24] = [
     (b"PMX ", "is an MMD model, which is not read: an add-on of Blender reads it"),
     (b"b3dm", "is a tile of 3D Tiles, which is not read: `3d-tiles-tools b3dmToGlb` takes the glTF file out of it"),
     (b"LASF", "is a cloud of points (LAS), without triangles to show. CloudCompare, for example, makes a mesh of it"),
-    (b"ASTM-E57", "is a cloud of points (E57), without triangles to show. CloudCompare, for example, makes a mesh of it"),
+    (
+        b"ASTM-E57",
+        "is a cloud of points (E57), without triangles to show. CloudCompare, for example, makes a mesh of it",
+    ),
     (b"# .PCD", "is a cloud of points (PCD), without triangles to show. CloudCompare, for example, makes a mesh of it"),
     (b"Ogawa", "is an Alembic file, which is not read: Blender, for example, saves it as glTF"),
     (b"\x28\xb5\x2f\xfd", "is compressed by Zstandard, as files of Blender are: export those from there as glTF"),
@@ -59,6 +62,13 @@ fn of_name(path: &Path) -> Option<&'static str> {
         "3mf" => Some("is a 3MF file, which is not read: PrusaSlicer, for example, saves it as STL"),
         "usdz" => Some("is a USD file, which is not read: Blender, for example, saves it as glTF"),
         "3ds" => Some("is a 3DS file, which is not read: Assimp, for example, saves it as glTF"),
+        "x3d" => Some("is an X3D file, which is not read: Blender, for example, saves it as glTF"),
+        "amf" => Some("is an AMF file, which is not read: PrusaSlicer, for example, saves it as STL"),
+        "skp" => Some("is a file of SketchUp: export it from there as OBJ"),
+        "max" => Some("is a file of 3ds Max: export it from there as glTF or OBJ"),
+        "mtl" => Some("holds the materials of an OBJ file: name the OBJ file"),
+        "gcode" => Some("holds the moves of a printer: name the STL file from which it was made"),
+        "png" | "jpg" | "jpeg" | "tif" | "tiff" | "tga" | "bmp" | "webp" => Some("is an image and no scene"),
         "dxf" => Some("is a DXF file, which is not read: FreeCAD, for example, saves it as OBJ or STL"),
         "igs" | "iges" => Some("is an IGES file, which has no triangles: FreeCAD, for example, saves it as OBJ or STL"),
         _ => None,
@@ -104,6 +114,7 @@ mod tests {
     fn the_other_name_counts_if_the_content_does_not_tell() {
         assert!(of_other_name(Path::new("a.txt"), b"hello").contains("ends in none of .toml"));
         assert!(of_other_name(Path::new("a.3MF"), b"PK\x03\x04").contains("a 3MF file"));
+        assert!(of_other_name(Path::new("a.mtl"), b"newmtl a\n").contains("name the OBJ file"));
         assert!(of_other_name(Path::new("a.zip"), b"PK\x03\x04").contains("a ZIP archive"));
         assert!(of_other_name(Path::new("a.off"), b"OFF\n3 1 0\n").contains("an OFF file"));
         assert!(of_other_name(Path::new("a.fbx"), b"Kaydara FBX Binary  \0").contains("FBX"));

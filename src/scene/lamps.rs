@@ -22,7 +22,7 @@ const N_LAMP_POINTS: usize = 64;
 /// only the ratio counts.
 const LEAST_IRRADIANCE: f32 = 0.2;
 /// Least share of the places that are lit, where lamps light a scene.
-const LEAST_LIT: f32 = 0.6;
+const LEAST_LIT: f32 = 0.75;
 
 /// A point on a lamp.
 struct LampPoint {

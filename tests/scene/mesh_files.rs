@@ -137,7 +137,7 @@ fn the_content_counts_and_not_the_name() {
             assert_eq!(load_as(name, &content).triangles, expected.triangles, "{name}");
         }
     }
-    assert!(error("cube.txt", &ply_text()).ends_with("in none of .toml, .gltf, .glb, .obj, .ply, .stl and .kdpack"));
+    assert!(error("cube.txt", &obj()).ends_with("in none of .toml, .gltf, .glb, .obj, .ply, .stl and .kdpack"));
 }
 
 #[test]

@@ -142,6 +142,7 @@ fn ply_files_of_old_programs_are_read() {
     let n_faces = |bytes: &[u8]| loaded(&[("m.ply", bytes)]).0.meshes[0].faces.len();
     assert_eq!(n_faces(text.replace('\n', "\r").as_bytes()), 2);
     assert_eq!(n_faces(text.replace("end_header\n", "end_header\n\n").replace("3 1 3", " \n3 1 3").as_bytes()), 2);
+    assert_eq!(n_faces(text.trim_end().as_bytes()), 2, "the last line does not end");
     let latin = [b"ply\ncomment caf\xe9\n", &text.as_bytes()[4..]].concat();
     assert_eq!(n_faces(&latin), 2);
 }

@@ -200,7 +200,9 @@ fn material_uses(scene: &FlatScene, details: Vec<MaterialDetails>) -> Vec<Materi
 
 impl Inspection {
     fn text(&self) -> String {
-        let [min, max] = self.bounds.map(vector);
+        // Both corners have the digits of the larger one.
+        let largest = self.bounds.as_flattened().iter().fold(0.0_f32, |largest, x| largest.max(x.abs()));
+        let [min, max] = self.bounds.map(|corner| rounded(corner, largest));
         let mut text = format!("{}: {} triangles, loaded in {:.0} ms\n", self.scene, self.triangles, self.load_ms);
         let size = std::array::from_fn(|axis| self.bounds[1][axis] - self.bounds[0][axis]);
         text += &format!("bounds {min} to {max}, size {}\n", vector(size));
@@ -237,8 +239,12 @@ impl Inspection {
 
 /// Returns a vector with five digits of its largest number, which are enough to read. `--json` prints all digits.
 fn vector(parts: [f32; 3]) -> String {
-    let largest = parts.iter().fold(0.0_f64, |largest, x| largest.max(f64::from(x.abs())));
-    let n_decimals = (4.0 - largest.max(1e-30).log10().floor()).clamp(0.0, 34.0) as usize;
+    rounded(parts, parts.iter().fold(0.0, |largest, x| largest.max(x.abs())))
+}
+
+/// Returns a vector with the digits with which a number has five.
+fn rounded(parts: [f32; 3], number: f32) -> String {
+    let n_decimals = (4.0 - f64::from(number).max(1e-30).log10().floor()).clamp(0.0, 34.0) as usize;
     let part = |x: f32| {
         let text = format!("{x:.n_decimals$}");
         let short = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };

@@ -261,7 +261,7 @@ fn a_bomb_is_refused_by_its_header() {
 #[test]
 fn an_error_is_one_line_and_leaves_the_others() {
     let good = Encoded { name: "good".to_owned(), bytes: encoded(with_alpha(), ImageFormat::Png).into() };
-    let bad = Encoded { name: "b\nad".to_owned(), bytes: b"GIF89a"[..].into() };
+    let bad = Encoded { name: "b\nad".to_owned(), bytes: b"qoif\0\0"[..].into() };
     let results = decode_all(vec![bad, good], 0, &Progress::default());
     let error = results[0].as_ref().unwrap_err();
     assert_eq!(error, "image `b ad`: is none of PNG, JPEG, TGA, BMP, WebP, TIFF, GIF, HDR, EXR and DDS");

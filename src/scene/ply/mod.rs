@@ -3,11 +3,11 @@
 //! MeshLab names the image of the surface. Coordinates are taken as they are: the format states neither a unit nor an
 //! axis that points up.
 
+mod mended;
 mod quick;
 mod vertex;
 
 use std::{
-    borrow::Cow,
     io::{self, BufRead, BufReader, Read},
     path::{Path, PathBuf},
 };
@@ -18,7 +18,8 @@ use serde::Deserialize;
 use serde_ply::{DeserializeError, ElementDef, PlyFormat, PlyHeader, PlyProperty, PlyReader, PropertyType, ScalarType};
 
 use self::{
-    quick::{header_bytes, quick_triangles, quick_vertices},
+    mended::{mended, widened},
+    quick::{quick_triangles, quick_vertices},
     vertex::{REDS, Vertices, largest_colour, upper_left},
 };
 use super::{
@@ -31,7 +32,6 @@ use super::{
     needs::{Attributes, MeshSize, require_for_mesh, require_for_rows},
     outside::Access,
     polygon::Triangulator,
-    read::lossy_text,
     smooth::{Shading, smooth_normals},
     texture::{Texture, linear_of_srgb},
 };
@@ -184,56 +184,6 @@ pub(super) fn ply_mesh(
     let would_be_invisible = elements.vertices.would_be_invisible;
     let (mesh, n_left_out) = mesh(elements, names.len(), shading)?;
     Ok(PlyMesh { mesh, names, uses_crease, n_left_out, would_be_invisible })
-}
-
-/// Returns a file without what the reader of PLY files does not accept: lines that end in CR alone, blank lines in a
-/// text, and names in the header that are not UTF-8.
-fn mended(bytes: &[u8]) -> Cow<'_, [u8]> {
-    let mut mended = Cow::Borrowed(bytes);
-    if bytes.starts_with(b"ply\r") && !bytes.starts_with(b"ply\r\n") {
-        const END: &[u8] = b"\rend_header\r";
-        let end = bytes.windows(END.len()).position(|part| part == END).map_or(bytes.len(), |at| at + END.len());
-        let is_text = bytes[..end].windows(5).any(|part| part == b"ascii");
-        let end = if is_text { bytes.len() } else { end };
-        mended.to_mut()[..end].iter_mut().filter(|byte| **byte == b'\r').for_each(|byte| *byte = b'\n');
-    }
-    let Some(n_header) = header_bytes(&mended) else { return mended };
-    let (header, rows) = mended.split_at(n_header);
-    let is_text = header.windows(12).any(|part| part == b"format ascii");
-    let is_blank = |line: &[u8]| line.trim_ascii().is_empty();
-    let has_blanks = is_text && rows.split(|byte| *byte == b'\n').rev().skip(1).any(is_blank);
-    if str::from_utf8(header).is_ok() && !has_blanks {
-        return mended;
-    }
-    let mut whole = lossy_text(header.to_vec()).into_bytes();
-    match has_blanks {
-        true => rows
-            .split_inclusive(|byte| *byte == b'\n')
-            .filter(|line| !is_blank(line))
-            .for_each(|line| whole.extend(line)),
-        false => whole.extend(rows),
-    }
-    Cow::Owned(whole)
-}
-
-/// Returns a file in two parts, the first of which is the header or empty. In a text, coordinates may have more digits
-/// than single precision holds, whatever their type, as maps have. So the header declares them as double precision.
-fn widened(bytes: &[u8]) -> (Cow<'_, [u8]>, &[u8]) {
-    let as_it_is = (Cow::Borrowed(&bytes[..0]), bytes);
-    let Some(header) = header_bytes(bytes).and_then(|n| str::from_utf8(&bytes[..n]).ok()) else { return as_it_is };
-    let is_text = header.lines().any(|line| line.split_ascii_whitespace().take(2).eq(["format", "ascii"]));
-    if !is_text {
-        return as_it_is;
-    }
-    let widened = |line: &str| {
-        let words: Vec<&str> = line.split_ascii_whitespace().collect();
-        match words[..] {
-            ["property", kind @ ("float" | "float32"), "x" | "y" | "z"] => line.replacen(kind, "double", 1),
-            _ => line.to_owned(),
-        }
-    };
-    let head: String = header.split_inclusive('\n').map(widened).collect();
-    (Cow::Owned(head.into_bytes()), &bytes[header.len()..])
 }
 
 impl PlyMesh {
