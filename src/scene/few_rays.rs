@@ -108,8 +108,8 @@ pub(super) fn hits(scene: &Scene, rays: &[Ray]) -> Vec<Hits> {
     scene.instances.par_iter().enumerate().map(of_instance).reduce(none, joined)
 }
 
-/// Returns t where a ray hits a triangle, and whether it meets the triangle's front (Möller and Trumbore, Fast, Minimum Storage Ray/Triangle Intersection,
-/// 1997).
+/// Returns t where a ray hits a triangle, and whether it meets the triangle's front (Möller and Trumbore, Fast, Minimum
+/// Storage Ray/Triangle Intersection, 1997).
 fn hit(ray: &Ray, [a, b, c]: [Vec3; 3]) -> Option<(f32, bool)> {
     let (ab, ac) = (b - a, c - a);
     let p = ray.direction.cross(ac);

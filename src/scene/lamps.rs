@@ -1,4 +1,5 @@
-//! The rule that tells surfaces which light a scene, as lamps do, from those which only glow, as the lights of a car do.
+//! The rule that tells surfaces which light a scene, as lamps do, from those which only glow, as the lights of a car
+//! do.
 //!
 //! A file without lights that has lamps is shown in their light alone. So they have to light most of the picture: what
 //! is left would be black.
@@ -59,11 +60,12 @@ impl Scene {
                 }
             }
         }
-        power >= LEAST_LAMPLIGHT * area && (is_interior || self.lit_share(&emission, &lamps) >= LEAST_LIT)
+        let is_enough = !lamps.is_empty() && power >= LEAST_LAMPLIGHT * area;
+        is_enough && (is_interior || self.lit_share(&emission, &lamps) >= LEAST_LIT)
     }
 
-    /// Returns the share of what the camera sees that lamps light, or 1 if it sees nothing but lamps. What casts shadows
-    /// does not count. `lamps`: the lamps' triangles, each with the power of all up to it.
+    /// Returns the share of what the camera sees that lamps light, or 1 if it sees nothing but lamps. What casts
+    /// shadows does not count. `lamps`: the lamps' triangles, each with the power of all up to it.
     fn lit_share(&self, emission: &[f32], lamps: &[(f64, (usize, usize))]) -> f32 {
         let points = self.lamp_points(lamps);
         let rays = view_rays(&self.camera, self.defaults.width as f32 / self.defaults.height as f32, N_SEEN);

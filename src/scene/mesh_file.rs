@@ -61,8 +61,8 @@ impl MeshFormat {
     }
 }
 
-/// Returns whether a file's first bytes are those of a GLB or a PLY file, whatever its name is: avatars in `.vrm` files,
-/// for example, are GLB.
+/// Returns whether a file's first bytes are those of a GLB or a PLY file, whatever its name is: avatars in `.vrm`
+/// files, for example, are GLB.
 pub(super) fn is_certain(head: &[u8]) -> bool {
     [&b"glTF"[..], b"ply\n", b"ply\r"].iter().any(|first| head.starts_with(first))
 }

@@ -46,6 +46,9 @@ fn what_glows_among_other_things_does_not_light_them() {
     // A lamp over them lights what the camera sees.
     let lamp = "v -9 8 -9\nv 15 8 -9\nv 15 8 15\nv -9 8 15\nusemtl glow\nf 81 82 83 84\n";
     assert_eq!(of(cubes(&[], "Kd 0\nKe 5 4 2", lamp)).0, 0);
+    // A triangle without area gives off nothing.
+    let flat = b"mtllib m.mtl\nusemtl glow\nv 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n";
+    assert_eq!(loaded(&[("m.obj", flat), ("m.mtl", b"newmtl glow\nKe 5 5 5\n")]).0.lights.len(), 2);
     // Where there is nothing but lamps, they are seen in their own light.
     let all: Vec<usize> = (0..10).collect();
     assert_eq!(of(cubes(&all, "Kd 0\nKe 5 4 2", "")), (0, true, Integrator::Path));

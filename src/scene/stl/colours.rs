@@ -13,7 +13,8 @@ const MARK: u16 = 1 << 15;
 /// Least share of the facets that have the mark, in a file of VisCAM. Half of random numbers have it.
 const LEAST_MARKED: f64 = 0.9;
 
-/// Returns a linear colour for each facet, or nothing if the file has none. Facets of VisCAM without a colour are white.
+/// Returns a linear colour for each facet, or nothing if the file has none. Facets of VisCAM without a colour are
+/// white.
 pub(super) fn of_attributes(header: &[u8], attributes: &[u16]) -> Vec<Vec3> {
     let place = header.windows(MAGICS.len()).position(|part| part == MAGICS);
     let of_object = place.and_then(|at| header[at + MAGICS.len()..].first_chunk());
