@@ -101,7 +101,7 @@ pub(super) fn facets(bytes: &[u8], origin: DVec3, (n_loaded, progress): (usize, 
         match () {
             () if word.is("solid") || word.is("endsolid") => words.skip_name(),
             () if word.is("facet") => pass_over_normal(&mut words),
-            () if word.is("vertex") => corners.push(corner(&mut words, &failed)? - origin),
+            () if word.is("vertex") => corners.push(corner(&mut words, failed)? - origin),
             () if word.is("endfacet") => {
                 let n = corners.len();
                 let [a, b, c] = corners[..] else { return Err(failed(format!("a facet has {n} corners, not 3"))) };
