@@ -190,7 +190,10 @@ fn inspect_tells_how_paths_pick_lights() {
         // A scene without lights gets some, and a background.
         let n_others = lights["lights"].as_u64().unwrap() - n as u64;
         assert_eq!((n_others, lights["picked_by"].as_str()), (3, Some(expected)));
-        assert!(text.lines().any(|line| line.starts_with("picked by a") && line.ends_with(expected)), "{text}");
+        assert!(
+            text.lines().any(|line| line.starts_with("a ray's source is picked from a") && line.ends_with(expected)),
+            "{text}"
+        );
     }
 }
 
@@ -248,9 +251,11 @@ fn inspect_lists_what_a_scene_consists_of() {
     let memory = &json["texture_memory"];
     // The table of sRGB has 256 words. Each image has three levels of 8, 2 and 1 texels, and a word for each level.
     assert!(memory["texels"].as_u64() >= Some(4 * (256 + 14)) && memory["uvs"].as_u64() == Some(2 * 24), "{memory}");
-    for row in ["mesh", "terms of material", "image", "spot light at", "camera", "textures on a device"] {
+    for row in ["mesh", "look of material", "image", "spot light at", "camera", "textures on a device"] {
         assert!(text.lines().any(|line| line.starts_with(row)), "{row}: {text}");
     }
+    let bounds = text.lines().find(|line| line.starts_with("bounds")).unwrap();
+    assert_eq!(bounds, "bounds (0, 0, 0) to (1, 1, 0), size (1, 1, 0)");
     assert!(
         text.contains("base colour of wood")
             && text.lines().any(|line| line.starts_with("1") && line.contains("right"))

@@ -51,6 +51,23 @@ impl Camera {
         matches!(self.projection, Projection::Orthographic { .. })
     }
 
+    /// Returns whether a picture of this shape, width by height, can show something of a box. That it shows nothing is
+    /// certain if all corners are beyond one of the picture's edges, or behind the eye.
+    pub(super) fn may_see(&self, (min, max): (Vec3, Vec3), aspect: f32) -> bool {
+        let forward = (self.target - self.eye).normalize_or_zero();
+        let right = forward.cross(self.up).normalize_or_zero();
+        let up = right.cross(forward);
+        let corners = (0..8).map(|ix| {
+            let pick = |axis: usize| if ix >> axis & 1 == 0 { min[axis] } else { max[axis] };
+            let from_eye = Vec3::new(pick(0), pick(1), pick(2)) - self.eye;
+            let (depth, x, y) = (from_eye.dot(forward), from_eye.dot(right), from_eye.dot(up));
+            let half = self.height_at(depth) / 2.0;
+            [-depth, x - half * aspect, -x - half * aspect, y - half, -y - half]
+        });
+        let corners: Vec<[f32; 5]> = corners.collect();
+        (0..5).all(|side| corners.iter().any(|beyond| beyond[side] < 0.0))
+    }
+
     /// Returns the height, in world units, of what the picture shows at a distance from the eye along the view.
     pub fn height_at(&self, distance: f32) -> f32 {
         match self.projection {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 /// First bytes of other files, and what these files are.
-const FOREIGN: [(&[u8], &str); 15] = [
+const FOREIGN: [(&[u8], &str); 24] = [
     (
         b"version https://git-lfs",
         "is a pointer of Git LFS, which stands for a larger file: `git lfs pull` fetches that file",
@@ -20,6 +20,18 @@ const FOREIGN: [(&[u8], &str); 15] = [
     (b"//Maya ASCII", "is a file of Maya: export it from there as OBJ"),
     (b"#usda", "is a USD file, which is not read: Blender, for example, saves it as glTF"),
     (b"#VRML", "is a VRML file, which is not read: MeshLab, for example, saves it as PLY"),
+    (b"# vtk DataFile", "is a VTK file, which is not read: ParaView, for example, saves it as PLY"),
+    (b"VOX ", "is a file of MagicaVoxel: export it from there as OBJ or PLY"),
+    (b"PMX ", "is an MMD model, which is not read: an add-on of Blender reads it"),
+    (b"b3dm", "is a tile of 3D Tiles, which is not read: `3d-tiles-tools b3dmToGlb` takes the glTF file out of it"),
+    (b"LASF", "is a cloud of points (LAS), without triangles to show. CloudCompare, for example, makes a mesh of it"),
+    (
+        b"ASTM-E57",
+        "is a cloud of points (E57), without triangles to show. CloudCompare, for example, makes a mesh of it",
+    ),
+    (b"# .PCD", "is a cloud of points (PCD), without triangles to show. CloudCompare, for example, makes a mesh of it"),
+    (b"Ogawa", "is an Alembic file, which is not read: Blender, for example, saves it as glTF"),
+    (b"\x28\xb5\x2f\xfd", "is compressed by Zstandard, as files of Blender are: export those from there as glTF"),
     (b"OFF\n", "is an OFF file, which is not read: MeshLab, for example, saves it as PLY"),
     (b"OFF\r", "is an OFF file, which is not read: MeshLab, for example, saves it as PLY"),
 ];
@@ -50,6 +62,13 @@ fn of_name(path: &Path) -> Option<&'static str> {
         "3mf" => Some("is a 3MF file, which is not read: PrusaSlicer, for example, saves it as STL"),
         "usdz" => Some("is a USD file, which is not read: Blender, for example, saves it as glTF"),
         "3ds" => Some("is a 3DS file, which is not read: Assimp, for example, saves it as glTF"),
+        "x3d" => Some("is an X3D file, which is not read: Blender, for example, saves it as glTF"),
+        "amf" => Some("is an AMF file, which is not read: PrusaSlicer, for example, saves it as STL"),
+        "skp" => Some("is a file of SketchUp: export it from there as OBJ"),
+        "max" => Some("is a file of 3ds Max: export it from there as glTF or OBJ"),
+        "mtl" => Some("holds the materials of an OBJ file: name the OBJ file"),
+        "gcode" => Some("holds the moves of a printer: name the STL file from which it was made"),
+        "png" | "jpg" | "jpeg" | "tif" | "tiff" | "tga" | "bmp" | "webp" => Some("is an image and no scene"),
         "dxf" => Some("is a DXF file, which is not read: FreeCAD, for example, saves it as OBJ or STL"),
         "igs" | "iges" => Some("is an IGES file, which has no triangles: FreeCAD, for example, saves it as OBJ or STL"),
         _ => None,
@@ -81,6 +100,8 @@ mod tests {
             (b"\n <!DOCTYPE HTML><html>", "web page"),
             (b"<?xml version=\"1.0\"?>\n<COLLADA xmlns=\"\">", "COLLADA"),
             (b"Kaydara FBX Binary  \0", "FBX"),
+            (b"VOX \x96\0\0\0", "MagicaVoxel"),
+            (b"\x28\xb5\x2f\xfd\0", "Zstandard"),
         ] {
             assert!(what_it_is(bytes).unwrap().contains(what), "{what}");
         }
@@ -93,6 +114,7 @@ mod tests {
     fn the_other_name_counts_if_the_content_does_not_tell() {
         assert!(of_other_name(Path::new("a.txt"), b"hello").contains("ends in none of .toml"));
         assert!(of_other_name(Path::new("a.3MF"), b"PK\x03\x04").contains("a 3MF file"));
+        assert!(of_other_name(Path::new("a.mtl"), b"newmtl a\n").contains("name the OBJ file"));
         assert!(of_other_name(Path::new("a.zip"), b"PK\x03\x04").contains("a ZIP archive"));
         assert!(of_other_name(Path::new("a.off"), b"OFF\n3 1 0\n").contains("an OFF file"));
         assert!(of_other_name(Path::new("a.fbx"), b"Kaydara FBX Binary  \0").contains("FBX"));

@@ -16,6 +16,12 @@ const LEAST_STEPS: f64 = 16.0;
 
 /// The direction from which a scene is usually seen, degrees: from the front, the right and above.
 const USUAL: Direction = Direction { azimuth: 24, elevation: 18 };
+/// The direction in place of the usual one for boxes about as high as wide, whose top would not be seen.
+const HIGHER: Direction = Direction { azimuth: 30, elevation: 28 };
+/// The top is seen if the eye is above the middle by this many half heights. From its own height, it is a line.
+const SEES_TOP: f64 = 1.25;
+/// Boxes whose height exceeds this many widths are seen from the usual direction, as a standing person is.
+const AS_HIGH_AS_WIDE: f64 = 1.25;
 /// Elevations of the other directions, degrees.
 const ELEVATIONS: [u32; 5] = [18, 26, 34, 42, 50];
 /// The usual direction is taken if it shows this share of what the best direction shows.
@@ -80,7 +86,7 @@ pub(super) struct Frame {
 /// long or flat, it is seen from a direction that shows much of its sides.
 pub(super) fn camera(scene: &Scene, bounds: (Vec3, Vec3), frame: &Frame) -> Camera {
     let bounds = BoundingBox::new(bounds);
-    let usual = View::new(&bounds, USUAL, frame);
+    let (usual_direction, usual) = usual(&bounds, frame);
     let others: Vec<_> =
         Direction::others().map(|direction| (direction, View::new(&bounds, direction, frame))).collect();
     let best = others.iter().map(|(_, view)| view.shown).fold(usual.shown, f64::max);
@@ -88,7 +94,7 @@ pub(super) fn camera(scene: &Scene, bounds: (Vec3, Vec3), frame: &Frame) -> Came
     let nearest = others.iter().filter(is_equal).min_by_key(|(direction, _)| direction.strangeness());
     let (direction, view) = match nearest {
         Some((direction, view)) if usual.shown < USUAL_IS_ENOUGH * best => (*direction, view),
-        _ => (USUAL, &usual),
+        _ => (usual_direction, &usual),
     };
     // The box's own corners are mostly empty.
     let of_scene = |directions| support(scene, bounds.centre, directions);
@@ -97,6 +103,16 @@ pub(super) fn camera(scene: &Scene, bounds: (Vec3, Vec3), frame: &Frame) -> Came
     } else {
         View::around(&bounds, direction, frame, of_scene).camera(frame)
     }
+}
+
+/// Returns the view of a box from the usual direction, or from a higher one if that shows its top.
+fn usual(bounds: &BoundingBox, frame: &Frame) -> (Direction, View) {
+    let WorldAxes { right, front, up } = frame.axes;
+    let half = |axis: DVec3| bounds.half.dot(axis.abs());
+    let is_high = half(up) > AS_HIGH_AS_WIDE * half(right).max(half(front));
+    let view = View::new(bounds, USUAL, frame);
+    let sees_top = (view.eye - bounds.centre).dot(up) >= SEES_TOP * half(up);
+    if is_high || sees_top { (USUAL, view) } else { (HIGHER, View::new(bounds, HIGHER, frame)) }
 }
 
 /// Returns how far the triangles of a scene reach from a point in some directions, in lengths of each.

@@ -3,17 +3,14 @@
 //! front outwards, that of a room without thickness turns it inwards, and walls with thickness have a front on the
 //! inside as well. A plain box whose sides face outwards counts, too, if there are things in it, which nobody would see
 //! from outside.
-//!
-//! Few rays meet all triangles here, without an acceleration structure, since the rays come before the structure is
-//! chosen and built.
 
 use std::f32::consts::PI;
 
 use glam::Vec3;
-use rayon::prelude::*;
 
 use super::{
-    Camera, Instance, Projection, Scene,
+    Camera, Projection, Scene,
+    few_rays::{Hit, Hits, Ray, hits, view_rays},
     framing::{self, Frame},
 };
 
@@ -43,6 +40,9 @@ const FREE: f32 = 0.5;
 
 /// A hit is on the bounding box if it lies beyond this share of the ray's way to it.
 const ON_BOX: f32 = 0.999;
+/// Ratio of the distances of a wall's two sides, where they stand for one face. Those with a material for each side
+/// have been moved apart.
+const THICKEST_SHELL: f32 = 1.0001;
 /// Least number of the rays that meet a thing in a closed box.
 const LEAST_HITS_OF_THINGS: usize = 3;
 
@@ -62,7 +62,7 @@ pub(super) fn is_interior(scene: &Scene, (min, max): (Vec3, Vec3)) -> bool {
     }
     let rays: Vec<Ray> = (0..N_RAYS).map(ray).collect();
     let hits = hits(scene, &rays);
-    n_walls(half, &rays, &hits) as f32 >= ENCLOSED * N_RAYS as f32
+    n_walls(half, &rays, &hits) as f32 >= ENCLOSED * N_RAYS as f32 && !is_empty_shell(&hits)
         || may_be_closed && hides_things(half, &rays, &hits, LEAST_HITS_OF_THINGS)
 }
 
@@ -74,6 +74,16 @@ fn n_walls(half: Vec3, rays: &[Ray], hits: &[Hits]) -> usize {
         is_wall(hits.last) || is_wall(hits.first)
     };
     rays.iter().zip(hits).filter(is_wall).count()
+}
+
+/// Returns whether nearly all rays from the middle meet nothing but a wall whose faces are there once for each side.
+/// Some programs write all bodies so, and nobody would look at an empty room.
+fn is_empty_shell(hits: &[Hits]) -> bool {
+    let is_shell = |hits: &&Hits| {
+        let (Some(first), Some(last), Some(back)) = (hits.first, hits.last, hits.last_back) else { return false };
+        first.is_front && last.t.max(back) <= first.t * THICKEST_SHELL && back >= first.t
+    };
+    hits.iter().filter(is_shell).count() + LEAST_HITS_OF_THINGS > hits.len()
 }
 
 /// Returns whether each ray from the middle at last meets the back of the bounding box with half extents, at most meets
@@ -132,7 +142,7 @@ fn camera_inside(scene: &Scene, (min, max): (Vec3, Vec3), frame: &Frame) -> Opti
         up,
         projection: Projection::Perspective { vertical_fov_degrees: frame.vertical_fov_degrees },
     });
-    let rays: Vec<Ray> = cameras.iter().flat_map(|camera| view_rays(camera, frame.aspect as f32)).collect();
+    let rays: Vec<Ray> = cameras.iter().flat_map(|camera| view_rays(camera, frame.aspect as f32, VIEW_RAYS)).collect();
     let hits = hits(scene, &rays);
     let diagonal = 2.0 * half.length();
     let mut best: Option<(f32, Camera)> = None;
@@ -150,112 +160,10 @@ fn camera_inside(scene: &Scene, (min, max): (Vec3, Vec3), frame: &Frame) -> Opti
     best.map(|(_, camera)| camera)
 }
 
-/// Returns rays of length 1 through the whole picture of a camera.
-fn view_rays(camera: &Camera, aspect: f32) -> Vec<Ray> {
-    let forward = (camera.target - camera.eye).normalize();
-    let right = forward.cross(camera.up).normalize();
-    let up = right.cross(forward);
-    let half_height = camera.height_at(1.0) / 2.0;
-    let (n_across, n_down) = VIEW_RAYS;
-    let place = |ix: usize, n: usize| (2 * ix + 1) as f32 / n as f32 - 1.0;
-    let ray = |ix: usize| {
-        let (x, y) = (place(ix % n_across, n_across), place(ix / n_across, n_down));
-        let direction = forward + half_height * (x * aspect * right + y * up);
-        Ray { origin: camera.eye, direction: direction.normalize() }
-    };
-    (0..n_across * n_down).map(ray).collect()
-}
-
 /// Returns one of [`N_RAYS`] unit vectors, which are evenly distributed along a spiral.
 fn on_sphere(ix: usize) -> Vec3 {
     let y = 1.0 - (2 * ix + 1) as f32 / N_RAYS as f32;
     let angle = ix as f32 * PI * (3.0 - 5.0_f32.sqrt());
     let radius = (1.0 - y * y).sqrt();
     Vec3::new(radius * angle.cos(), y, radius * angle.sin())
-}
-
-/// A ray from t = 0 to infinity.
-#[derive(Clone, Copy, Debug)]
-struct Ray {
-    origin: Vec3,
-    direction: Vec3,
-}
-
-/// A hit at `t`, and whether the ray meets the front of the triangle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Hit {
-    t: f32,
-    is_front: bool,
-}
-
-/// The first and the last hit of a ray.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Hits {
-    first: Option<Hit>,
-    last: Option<Hit>,
-}
-
-impl Hits {
-    /// Adds a hit. Of hits at the same t, fronts count, so that the order of the hits makes no difference.
-    fn add(&mut self, hit: Hit) {
-        let replaces = |old: Option<Hit>, sign: f32| {
-            old.is_none_or(|old| sign * hit.t < sign * old.t || hit.t == old.t && hit.is_front)
-        };
-        if replaces(self.first, 1.0) {
-            self.first = Some(hit);
-        }
-        if replaces(self.last, -1.0) {
-            self.last = Some(hit);
-        }
-    }
-
-    /// Adds both hits of another set.
-    fn join(mut self, other: &Self) -> Self {
-        other.first.into_iter().chain(other.last).for_each(|hit| self.add(hit));
-        self
-    }
-}
-
-/// Number of faces that one thread tests at a time.
-const FACES_PER_CHUNK: usize = 16_384;
-
-/// Returns the hits of each ray with all triangles of a scene.
-fn hits(scene: &Scene, rays: &[Ray]) -> Vec<Hits> {
-    let none = || vec![Hits::default(); rays.len()];
-    let joined = |a: Vec<Hits>, b: Vec<Hits>| a.iter().zip(&b).map(|(a, b)| a.join(b)).collect();
-    let of_instance = |Instance { mesh_ix, transform, .. }: &Instance| {
-        let mesh = &scene.meshes[*mesh_ix];
-        let of_chunk = |faces: &[[u32; 3]]| {
-            let mut hits = none();
-            for face in faces {
-                let corners = face.map(|ix| transform.point(mesh.positions[ix as usize]));
-                for (ray, hits) in rays.iter().zip(&mut hits) {
-                    if let Some(mut hit) = hit(ray, corners) {
-                        hit.is_front ^= transform.mirrors();
-                        hits.add(hit);
-                    }
-                }
-            }
-            hits
-        };
-        mesh.faces.par_chunks(FACES_PER_CHUNK).map(of_chunk).reduce(none, joined)
-    };
-    scene.instances.par_iter().map(of_instance).reduce(none, joined)
-}
-
-/// Returns the hit of a ray with a triangle (Möller and Trumbore, Fast, Minimum Storage Ray/Triangle Intersection,
-/// 1997).
-fn hit(ray: &Ray, [a, b, c]: [Vec3; 3]) -> Option<Hit> {
-    let (ab, ac) = (b - a, c - a);
-    let p = ray.direction.cross(ac);
-    let determinant = ab.dot(p);
-    let from_a = ray.origin - a;
-    let u = from_a.dot(p) / determinant;
-    if !(0.0..=1.0).contains(&u) {
-        return None;
-    }
-    let q = from_a.cross(ab);
-    let v = ray.direction.dot(q) / determinant;
-    let t = ac.dot(q) / determinant;
-    (v >= 0.0 && u + v <= 1.0 && t > 0.0 && t.is_finite()).then_some(Hit { t, is_front: determinant > 0.0 })
 }

@@ -4,9 +4,7 @@ use std::path::Path;
 
 use glam::Vec3;
 
-use super::{
-    Encoding, Image, Instance, Light, Microfacet, Scene, Texture, material::Material, texture::linear_of_srgb,
-};
+use super::{Encoding, Image, Light, Microfacet, Scene, Texture, material::Material, texture::linear_of_srgb};
 use crate::frame::Integrator;
 
 /// Roughness of a surface that still shows shapes of what it mirrors.
@@ -14,10 +12,7 @@ const ROUGHEST_MIRROR: f32 = 0.5;
 /// Share of a material's surface that has to mirror for the material to count as a mirror.
 const LEAST_MIRRORED_SHARE: f32 = 0.25;
 /// Number of pixels of each map that are looked at. It is odd, so that they are not all in one column of the image.
-const N_PLACES: usize = 4095;
-
-/// Least power of all lamps of a scene for its whole area, in units of white paper in full light.
-const LEAST_LAMPLIGHT: f64 = 0.1;
+pub(super) const N_PLACES: usize = 4095;
 
 /// Returns the index of the pixel that a share of an image's pixels precedes.
 fn pixel_ix(image: &Image, place: f32) -> usize {
@@ -41,36 +36,8 @@ impl Scene {
         self.materials.iter().any(|material| material.ke != Vec3::ZERO)
     }
 
-    /// Returns whether surfaces light the scene. Some are brighter than white paper in full light, as lamps are, and
-    /// together they give off so much light that other surfaces get some of it. The lights of a car do not.
-    pub(super) fn has_lamps(&self) -> bool {
-        let emission: Vec<f32> = self.materials.iter().map(|material| self.mean_emission(material)).collect();
-        if !self.materials.iter().any(|material| material.ke.max_element() > 1.0) {
-            return false;
-        }
-        let (mut area, mut power) = (0.0, 0.0);
-        for Instance { mesh_ix, transform, materials } in &self.instances {
-            let mesh = &self.meshes[*mesh_ix];
-            for (face, slot) in mesh.faces.iter().zip(&mesh.slots) {
-                let [a, b, c] = face.map(|ix| transform.point(mesh.positions[ix as usize]));
-                let of_face = f64::from((b - a).cross(c - a).length() / 2.0);
-                area += of_face;
-                power += of_face * f64::from(emission[materials[*slot as usize % materials.len()] as usize]);
-            }
-        }
-        power >= LEAST_LAMPLIGHT * area
-    }
-
-    /// Returns the mean of what a material emits over the image of its emission.
-    fn mean_emission(&self, material: &Material) -> f32 {
-        let ke = material.ke.max_element();
-        let Some(map) = material.maps.emission.as_ref().filter(|_| ke > 0.0) else { return ke };
-        let value = |ix: usize| self.colour_of_map(map, (ix as f32 + 0.5) / N_PLACES as f32);
-        ke * (0..N_PLACES).map(value).sum::<f32>() / N_PLACES as f32
-    }
-
     /// Returns the greatest part of a colour map at a place as of [`value_of_map`](Self::value_of_map), linear.
-    fn colour_of_map(&self, map: &Texture, place: f32) -> f32 {
+    pub(super) fn colour_of_map(&self, map: &Texture, place: f32) -> f32 {
         let Some(image) = self.images.get(map.image_ix as usize) else { return 1.0 };
         let [r, g, b, _] = image.pixels.get(pixel_ix(image, place));
         let greatest = r.max(g).max(b);

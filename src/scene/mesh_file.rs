@@ -7,6 +7,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{
+    coincident,
     error::SceneError,
     extent::MeshOrigin,
     foreign,
@@ -48,16 +49,22 @@ impl MeshFormat {
     /// Returns the format of a file: by its first bytes or its size, else by its name's ending, else OBJ, which is
     /// text without a magic number.
     pub fn of(path: &Path, bytes: &[u8]) -> Self {
-        if bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r") {
-            Self::Ply
-        } else if is_gltf(bytes) {
+        if is_gltf(bytes) {
             Self::Gltf
+        } else if is_certain(bytes) {
+            Self::Ply
         } else if is_binary_stl(bytes) || is_stl_text(bytes) {
             Self::Stl
         } else {
             Self::of_name(path).unwrap_or(Self::Obj)
         }
     }
+}
+
+/// Returns whether a file's first bytes are those of a GLB or a PLY file, whatever its name is: avatars in `.vrm`
+/// files, for example, are GLB.
+pub(super) fn is_certain(head: &[u8]) -> bool {
+    [&b"glTF"[..], b"ply\n", b"ply\r"].iter().any(|first| head.starts_with(first))
 }
 
 /// Returns whether a file is glTF: a GLB file, or a JSON object with the key `asset`.
@@ -164,12 +171,17 @@ impl Shape {
             ShapeKind::Ply(ply) => ply.mesh().positions.len(),
             ShapeKind::Stl(mesh) => mesh.positions.len(),
         };
+        // An OBJ file's polygons are separated before they are cut into triangles.
+        let is_obj = matches!(kind, ShapeKind::Obj(_));
         let mut loaded = match kind {
             ShapeKind::Obj(file) => obj_mesh(path, file, loading)?,
             ShapeKind::Ply(ply) => Loaded { origin, ..ply.with_materials(path, loading.access, loading.images) },
             ShapeKind::Stl(mesh) => Loaded { mesh, origin, materials: Vec::new(), uses_crease: loading.shading.smooth },
         };
         scan_colours::leave_out(path, &mut loaded, loading.images);
+        if !is_obj {
+            coincident::separate(&mut loaded.mesh);
+        }
         match (loaded.mesh.faces.is_empty(), n_points) {
             (false, _) => Ok(loaded),
             (true, 0) => Err(SceneError::file(path, "has no triangles")),

@@ -6,12 +6,14 @@
 
 mod assemble;
 mod camera;
+mod coincident;
 mod convert;
 mod defaults;
 mod description;
 mod environment;
 mod error;
 mod extent;
+mod few_rays;
 mod files;
 mod foreign;
 mod framing;
@@ -21,6 +23,7 @@ pub(crate) mod ground;
 mod image;
 mod image_files;
 mod interior;
+mod lamps;
 mod light;
 mod lighting;
 mod look;
@@ -215,7 +218,10 @@ impl Scene {
             load_mesh_file(path, options)?
         } else {
             let head = files::head(path, HEAD_BYTES).unwrap_or_else(|_| b" ".to_vec());
-            return Err(SceneError::file(path, foreign::of_other_name(path, &head)));
+            if !mesh_file::is_certain(&head) {
+                return Err(SceneError::file(path, foreign::of_other_name(path, &head)));
+            }
+            load_mesh_file(path, options)?
         };
         preset::replace(&mut scene, &options.look.materials).map_err(|what| SceneError::file(path, what))?;
         scene.add_tangents().map_err(|what| SceneError::file(path, what))?;

@@ -4,8 +4,7 @@ use std::path::Path;
 
 use super::{error::SceneError, files};
 
-/// Reads text that need not be UTF-8. What is not UTF-8 is read as Windows-1252, as old programs of Europe and America
-/// write names of files and materials.
+/// Reads text that need not be UTF-8, as [`lossy_text`] does.
 pub(super) fn read_lossy(path: &Path) -> Result<String, SceneError> {
     read_bytes(path).map(lossy_text)
 }
@@ -16,8 +15,25 @@ const WINDOWS_1252: [char; 32] = [
     '“', '”', '•', '–', '—', '˜', '™', 'š', '›', 'œ', '\u{9d}', 'ž', 'Ÿ',
 ];
 
-/// Returns bytes as text. Bytes that are not UTF-8 are read as Windows-1252.
+/// Returns bytes as text. UTF-16 is told by its byte order mark. What is not UTF-8 is read as Windows-1252, as old
+/// programs of Europe and America write names of files and materials. Where lines end in CR alone, as on old computers,
+/// they end in LF here.
 pub(super) fn lossy_text(bytes: Vec<u8>) -> String {
+    let text = match &bytes[..] {
+        [0xff, 0xfe, rest @ ..] => of_utf16(rest, u16::from_le_bytes),
+        [0xfe, 0xff, rest @ ..] => of_utf16(rest, u16::from_be_bytes),
+        _ => of_bytes(bytes),
+    };
+    if text.contains('\r') && !text.contains('\n') { text.replace('\r', "\n") } else { text }
+}
+
+fn of_utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> String {
+    let units = bytes.as_chunks().0.iter().map(|pair| unit(*pair));
+    char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER)).collect()
+}
+
+/// Returns bytes as text. Bytes that are not UTF-8 are read as Windows-1252.
+fn of_bytes(bytes: Vec<u8>) -> String {
     let of_byte = |byte: &u8| match byte {
         0x80..=0x9f => WINDOWS_1252[usize::from(byte - 0x80)],
         _ => char::from(*byte),

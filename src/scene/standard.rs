@@ -72,11 +72,13 @@ pub(super) fn fill_in(scene: &mut Scene, lacks: Lacks, options: &LoadOptions) ->
             scene.add_ground(bounds, up)?;
         }
     }
-    if lacks.integrator && scene.needs_path() {
+    let has_lamps = lacks_light && scene.has_lamps(is_interior);
+    // What only glows lights nothing, and the picture is there sooner and without noise if no light is sought there.
+    let only_glows = lacks_light && !has_lamps && lacks.ground;
+    if lacks.integrator && scene.needs_path() && !only_glows {
         scene.defaults.integrator = Integrator::Path;
     }
     // Lamps of a mesh file are bright by the units of its program, and need an exposure.
-    let has_lamps = lacks_light && scene.has_lamps();
     scene.defaults.is_metered |= has_lamps && lacks.ground;
     if lacks_light && !has_lamps {
         let lamps = if is_interior { lamps_inside(scene, bounds) } else { lamps_outside(scene, &axes) };

@@ -116,7 +116,8 @@ fn animated_cameras_begin_at_their_first_keys() {
         });
         let text = gltf.to_string();
         let (scene, _) = loaded(&[("m.gltf", text.as_bytes()), ("data.bin", &data)]);
-        (scene.camera.eye, (scene.camera.target - scene.camera.eye).normalize())
+        let camera = scene.cameras[0].1;
+        (camera.eye, (camera.target - camera.eye).normalize())
     };
     for interpolation in ["LINEAR", "CUBICSPLINE"] {
         let (eye, forward) = of(interpolation, false);

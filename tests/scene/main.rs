@@ -11,6 +11,7 @@ mod instances;
 mod materials;
 mod mesh_files;
 mod obj;
+mod odd_files;
 mod path;
 mod placed;
 mod progress;

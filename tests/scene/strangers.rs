@@ -315,7 +315,7 @@ fn metals_by_their_maps_are_mirrored_in_a_studio() {
 fn small_lights_on_a_thing_do_not_light_it() {
     let of = |ke: &str, edge: f32| {
         let walls = "v 0 0 0\nv 10 0 0\nv 10 10 0\nv 0 10 0\nusemtl wall\nf 1 2 3 4\n";
-        let lamp = format!("v 0 0 1\nv {edge} 0 1\nv {edge} {edge} 1\nv 0 {edge} 1\nusemtl lamp\nf 5 6 7 8\n");
+        let lamp = format!("v 0 0 5\nv {edge} 0 5\nv {edge} {edge} 5\nv 0 {edge} 5\nusemtl lamp\nf 5 6 7 8\n");
         let mtl = format!("newmtl wall\nnewmtl lamp\nKd 0\nKe {ke}\n");
         let obj = format!("mtllib m.mtl\n{walls}{lamp}");
         let scene = loaded(&[("m.obj", obj.as_bytes()), ("m.mtl", mtl.as_bytes())]).0;

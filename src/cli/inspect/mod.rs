@@ -111,7 +111,11 @@ impl From<&Emitters> for PathLights {
 
 impl PathLights {
     fn text(&self) -> String {
-        let rows = [["lights", &self.lights.to_string()], ["picked by a", self.picked_by]];
+        // The surroundings are one of them.
+        let rows = [
+            ["light sources: lights, shining triangles, surroundings", &self.lights.to_string()],
+            ["a ray's source is picked from a", self.picked_by],
+        ];
         table(["path tracing", ""], &rows.map(|row| row.map(str::to_owned)))
     }
 }
@@ -132,8 +136,8 @@ impl PathMemory {
 
     fn text(&self) -> String {
         let rows = [
-            ["a path; the most at a time are 2 million".to_owned(), self.bytes_per_path.to_string()],
-            [format!("a pixel, with {} samples", self.samples), self.bytes_per_pixel.to_string()],
+            ["for each path that is traced at a time".to_owned(), self.bytes_per_path.to_string()],
+            [format!("for each pixel of {} samples", self.samples), self.bytes_per_pixel.to_string()],
         ];
         table(["path tracing on a device", "bytes"], &rows)
     }
@@ -196,9 +200,12 @@ fn material_uses(scene: &FlatScene, details: Vec<MaterialDetails>) -> Vec<Materi
 
 impl Inspection {
     fn text(&self) -> String {
-        let [min, max] = self.bounds.map(vector);
+        // Both corners have the digits of the larger one.
+        let largest = self.bounds.as_flattened().iter().fold(0.0_f32, |largest, x| largest.max(x.abs()));
+        let [min, max] = self.bounds.map(|corner| rounded(corner, largest));
         let mut text = format!("{}: {} triangles, loaded in {:.0} ms\n", self.scene, self.triangles, self.load_ms);
-        text += &format!("bounds {min} to {max}\n");
+        let size = std::array::from_fn(|axis| self.bounds[1][axis] - self.bounds[0][axis]);
+        text += &format!("bounds {min} to {max}, size {}\n", vector(size));
         if let Some(origin) = self.origin {
             text += &format!("coordinates count from {origin:?} of the file\n");
         }
@@ -207,7 +214,8 @@ impl Inspection {
             [shortened(&used.name), used.triangles.to_string()]
         });
         text.push('\n');
-        text += &cut_table(["light", "position or direction", "intensity"], &self.lights, |_, light| {
+        let header = ["light", "position, or direction towards it", "intensity or irradiance"];
+        text += &cut_table(header, &self.lights, |_, light| {
             [light.kind.to_owned(), vector(light.position), vector(light.intensity)]
         });
         text.push('\n');
@@ -229,6 +237,31 @@ impl Inspection {
     }
 }
 
-fn vector([x, y, z]: [f32; 3]) -> String {
-    format!("({x}, {y}, {z})")
+/// Returns a vector with five digits of its largest number, which are enough to read. `--json` prints all digits.
+fn vector(parts: [f32; 3]) -> String {
+    rounded(parts, parts.iter().fold(0.0, |largest, x| largest.max(x.abs())))
+}
+
+/// Returns a vector with the digits with which a number has five.
+fn rounded(parts: [f32; 3], number: f32) -> String {
+    let n_decimals = (4.0 - f64::from(number).max(1e-30).log10().floor()).clamp(0.0, 34.0) as usize;
+    let part = |x: f32| {
+        let text = format!("{x:.n_decimals$}");
+        let short = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+        if short == "-0" { "0".to_owned() } else { short.to_owned() }
+    };
+    format!("({})", parts.map(part).join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vectors_have_five_digits() {
+        assert_eq!(vector([-2.750042, -0.000041, 5.5]), "(-2.75, 0, 5.5)");
+        assert_eq!(vector([123456.7, -99.4, 0.0]), "(123457, -99, 0)");
+        assert_eq!(vector([1.23456e-7, 0.0, -1e-7]), "(0.00000012346, 0, -0.0000001)");
+        assert_eq!(vector([0.0; 3]), "(0, 0, 0)");
+    }
 }

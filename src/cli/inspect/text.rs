@@ -9,6 +9,8 @@ use super::{
 };
 use crate::cli::table::table;
 
+/// Maps that can vary the opacity of a surface.
+const OF_OPACITY: [&str; 2] = ["base colour", "opacity"];
 /// Rows of a table beyond which it is cut.
 const MAX_ROWS: usize = 40;
 /// Characters of a name or a list beyond which it is cut.
@@ -36,8 +38,8 @@ pub fn shortened(name: &str) -> String {
 /// Returns the tables of what the scene consists of.
 pub fn contents(contents: &Contents, materials: &[MaterialUse], lights: &[LightUse], memory: &TextureMemory) -> String {
     let mut tables = vec![
-        cut_table(["mesh", "name", "triangles", "instances", "with"], &contents.meshes, mesh_row),
-        cut_table(["terms of material", "model", "opacity", "sides", "terms", "maps"], materials, |_, it| {
+        cut_table(["mesh", "name", "triangles", "instances", "has"], &contents.meshes, mesh_row),
+        cut_table(["look of material", "model", "opacity", "seen from", "terms", "maps"], materials, |_, it| {
             material_row(it)
         }),
     ];
@@ -72,13 +74,21 @@ fn mesh_row(ix: usize, mesh: &MeshUse) -> [String; 5] {
 
 fn material_row(material: &MaterialUse) -> [String; 6] {
     let details = &material.details;
-    let sides = if details.double_sided { "both" } else { "front" };
+    let sides = if details.double_sided { "both sides" } else { "the front" };
+    // Without a term or a map that says otherwise, a surface covers what is behind it.
+    let is_covered = !details.terms.contains_key("d") && !details.maps.keys().any(|term| OF_OPACITY.contains(&&**term));
+    let opacity = match details.opacity {
+        "coverage" if is_covered => "opaque",
+        "coverage" => "blended",
+        "cutout" => "cut out",
+        other => other,
+    };
     let term = |(key, value): (&String, &Value)| format!("{key} {}", plain(value));
     let map = |(term, image): (&String, &Value)| format!("{term} {}", shortened(image.as_str().unwrap_or_default()));
     [
         shortened(&material.name),
         details.model.to_owned(),
-        details.opacity.to_owned(),
+        opacity.to_owned(),
         sides.to_owned(),
         details.terms.iter().map(term).collect::<Vec<_>>().join(", "),
         listed(&details.maps, map),

@@ -30,8 +30,10 @@ use crate::{
     util::{memory::require, text::one_line},
 };
 
-/// Extensions that are read. A file that requires another one is refused.
-const SUPPORTED: [&str; 17] = [
+/// Extensions that are read. A file that requires another one is refused, unless the other one changes only how
+/// surfaces look, such as `KHR_materials_…`.
+const SUPPORTED: [&str; 18] = [
+    "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",
     "KHR_lights_punctual",
@@ -60,6 +62,14 @@ const WITHOUT_EFFECT: [&str; 6] = [
     "KHR_xmp",
     "MSFT_packing_normalRoughnessMetallic",
 ];
+
+/// The extension of files whose triangles are compressed by Draco.
+const DRACO: &str = "KHR_draco_mesh_compression";
+
+/// Returns whether a file that requires an extension can be shown without it, though some surfaces look different.
+fn changes_only_looks(extension: &str) -> bool {
+    ["KHR_materials_", "KHR_texture_"].iter().any(|start| extension.starts_with(start))
+}
 
 /// A glTF file, its buffers, and what is not shown of it.
 pub(super) struct Document {
@@ -142,11 +152,15 @@ impl Document {
     }
 
     fn check_extensions(&self) -> Checked<()> {
-        let required = &self.root.extensions_required;
-        let refused: Vec<_> = required.iter().filter(|name| !SUPPORTED.contains(&name.as_str())).collect();
+        let is_needed = |name: &&String| !SUPPORTED.contains(&name.as_str()) && !changes_only_looks(name);
+        let refused: Vec<_> = self.root.extensions_required.iter().filter(is_needed).collect();
         if !refused.is_empty() {
             let names: Vec<_> = refused.iter().map(|name| format!("`{name}`")).collect();
-            return Err(format!("extensionsRequired: the file needs {}, which is not supported", names.join(", ")));
+            let remedy = match refused.iter().any(|name| *name == DRACO) {
+                true => ": its triangles are compressed by Draco. Blender, for example, reads it and saves it without",
+                false => "",
+            };
+            return Err(format!("extensionsRequired: the file needs {}, which is not read{remedy}", names.join(", ")));
         }
         let is_known = |name: &str| SUPPORTED.contains(&name) || WITHOUT_EFFECT.contains(&name);
         for name in self.root.extensions_used.iter().filter(|name| !is_known(name)) {

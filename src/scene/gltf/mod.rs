@@ -15,6 +15,7 @@ mod document;
 mod geometry;
 mod glb;
 mod glossiness;
+mod instancing;
 mod lights;
 mod materials;
 mod meshopt;
@@ -24,7 +25,7 @@ mod uri;
 
 use std::path::Path;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use gltf::json::{Node, mesh::Primitive};
 use hashbrown::{HashMap, HashSet};
 use rayon::prelude::*;
@@ -34,11 +35,12 @@ use self::{
     deform::Skin,
     document::{Document, item},
     geometry::{Part, Pose},
+    instancing::Places,
     materials::Materials,
     nodes::Nodes,
 };
 use super::{
-    Instance, LoadOptions, Mesh, Scene, SceneError, Transform,
+    Camera, Instance, Light, LoadOptions, Mesh, Scene, SceneError, Transform, coincident,
     error::Checked,
     extent::{self, MeshOrigin},
     image::MAX_PIXELS,
@@ -49,7 +51,10 @@ use super::{
     preset::MaterialChoice,
     standard::{Lacks, SAMPLES},
 };
-use crate::util::progress::{Meter, Work};
+use crate::util::{
+    progress::{Meter, Work},
+    text::one_line,
+};
 
 /// Loads a glTF file as a scene with its lights and cameras.
 pub(super) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<(Scene, Lacks), SceneError> {
@@ -66,10 +71,11 @@ pub(super) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result
     extent::check(path, bounds)?;
     scene.lights = lights::lights(&document, &nodes, scene.origin).map_err(failed)?;
     scene.cameras = cameras::cameras(&document, &nodes, (bounds, scene.origin)).map_err(failed)?;
-    let lacks_camera = scene.cameras.is_empty();
-    scene.camera = scene.cameras.first().map_or(scene.camera, |(_, camera)| *camera);
-    // The light of emissive surfaces does not reach others.
-    let lacks_light = scene.lights.is_empty();
+    let first = camera_that_sees(path, &scene, (bounds, options));
+    let lacks_camera = first.is_none();
+    scene.camera = first.unwrap_or(scene.camera);
+    // The light of emissive surfaces does not reach others. Some exporters write lights of intensity 0.
+    let lacks_light = scene.lights.iter().all(Light::is_black);
     scene.defaults.is_metered = !lacks_light;
     scene.defaults.samples = SAMPLES;
     document.warnings(path).iter().for_each(|warning| tracing::warn!("{warning}"));
@@ -82,6 +88,19 @@ pub(super) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result
         integrator: true,
     };
     Ok((scene, lacks))
+}
+
+/// Returns the first camera whose picture can show something of the scene. A note tells of cameras before it.
+fn camera_that_sees(path: &Path, scene: &Scene, (bounds, options): ((Vec3, Vec3), &LoadOptions)) -> Option<Camera> {
+    let aspect = options.aspect.unwrap_or(scene.defaults.width as f32 / scene.defaults.height as f32);
+    let ix = scene.cameras.iter().position(|(_, camera)| camera.may_see(bounds, aspect));
+    if let (Some((name, _)), None | Some(1..)) = (scene.cameras.first(), ix) {
+        let (path, name) = (path.display(), one_line(name));
+        let taken =
+            ix.map_or("one is chosen".to_owned(), |ix| format!("`{}` is taken", one_line(&scene.cameras[ix].0)));
+        tracing::info!("{path}: the first camera, `{name}`, sees nothing of the scene: {taken}; --camera 0 keeps it");
+    }
+    ix.map(|ix| scene.cameras[ix].1)
 }
 
 /// What a scene has before a glTF file is loaded.
@@ -186,10 +205,18 @@ impl<'a> Loader<'a> {
         for &ix in &self.nodes.shown {
             let Some(instance) = self.instance(ix, &meter)? else { continue };
             let mesh = &self.meshes[instance.mesh_ix];
-            n_placed += mesh.faces.len() as u64;
+            let places = instancing::places(self.document, ix)?;
+            let n_faces = (mesh.faces.len() as u64).saturating_mul(places.as_ref().map_or(1, |places| places.n as u64));
+            n_placed = n_placed.saturating_add(n_faces);
             require_for_mesh(n_placed, &MeshSize::default())?;
-            mesh.placed(&instance.transform).map_err(|what| format!("nodes[{ix}]: {what}"))?;
-            scene.instances.push(instance);
+            let transforms = match &places {
+                Some(places) => self.instanced(ix, places)?,
+                None => vec![instance.transform.clone()],
+            };
+            for transform in transforms {
+                mesh.placed(&transform).map_err(|what| format!("nodes[{ix}]: {what}"))?;
+                scene.instances.push(Instance { transform, ..instance.clone() });
+            }
         }
         if scene.instances.is_empty() {
             return Err("has no triangles: points and lines are not shown".to_owned());
@@ -198,6 +225,14 @@ impl<'a> Loader<'a> {
         scene.materials = self.materials.materials;
         scene.images = self.materials.textures.decode(&mut scene.materials, self.before.n_pixels);
         Ok(scene)
+    }
+
+    /// Returns the transforms of the instances of a node. Those that flatten the mesh are left out.
+    fn instanced(&self, node_ix: usize, places: &Places) -> Checked<Vec<Transform>> {
+        let world_from_node = self.nodes.world_from_node(node_ix).unwrap_or_default();
+        let transform =
+            |ix: usize| places.node_from_instance(ix).map(|it| Transform::of_affine(world_from_node * it).ok());
+        (0..places.n).filter_map(|ix| transform(ix).transpose()).collect()
     }
 
     /// Returns the number of the primitives that are read if each mesh is read once.
@@ -290,6 +325,7 @@ impl<'a> Loader<'a> {
                 geometry::mesh(document, part, pose, &mut n_read)?.into_iter().for_each(|mesh| whole.append(mesh));
             }
         }
+        coincident::separate(&mut whole);
         whole.name = document.root.meshes[mesh_ix].name.clone().unwrap_or_default();
         self.meshes.push(whole);
         Ok(Some(Known { mesh_ix: self.meshes.len() - 1, materials, origin }))

@@ -117,7 +117,14 @@ impl<'a> Textures<'a> {
     fn image(&mut self, texture: &json::Texture, texture_ix: usize) -> Checked<Option<u32>> {
         let path = format!("textures[{texture_ix}]");
         let Some(image) = source(texture) else {
-            self.document.note("textures without an image of a known format, which are left out", path);
+            let is_ktx = has_extension(texture, "KHR_texture_basisu");
+            let what = match is_ktx {
+                true => {
+                    "textures in KTX2, which are not read (`gltf-transform ktxdecompress IN OUT` makes PNG of them)"
+                }
+                false => "textures without an image of a known format, which are left out",
+            };
+            self.document.note(what, path);
             return Ok(None);
         };
         let source = self.document.image_source(image, &format_args!("{path}.source"))?;
@@ -166,6 +173,10 @@ impl<'a> Textures<'a> {
         }
         images
     }
+}
+
+fn has_extension(texture: &json::Texture, name: &str) -> bool {
+    texture.extensions.as_ref().is_some_and(|extensions| extensions.others.contains_key(name))
 }
 
 /// Returns a texture's image: that of an extension for further formats, else the texture's own.

@@ -157,15 +157,35 @@ fn header_of(image: &Encoded) -> Checked<Header> {
 
 /// Returns the format of an image file.
 fn format_of(Encoded { name, bytes }: &Encoded) -> Checked<Format> {
-    use ImageFormat::{Bmp, Hdr, Jpeg, OpenExr, Png, Tga, WebP};
+    use ImageFormat::{Bmp, Gif, Hdr, Jpeg, OpenExr, Png, Tga, Tiff, WebP};
     if bytes.starts_with(b"DDS ") {
         return Ok(Format::Dds);
     }
     match ::image::guess_format(bytes) {
-        Ok(format @ (Png | Jpeg | Bmp | WebP | Hdr | OpenExr)) => Ok(Format::Common(format)),
+        Ok(format @ (Png | Jpeg | Bmp | WebP | Tiff | Gif | Hdr | OpenExr)) => Ok(Format::Common(format)),
         _ if name.to_ascii_lowercase().ends_with(".tga") => Ok(Format::Common(Tga)),
-        _ => Err("is none of PNG, JPEG, TGA, BMP, WebP, HDR, EXR and DDS".to_owned()),
+        _ => Err(foreign(bytes)
+            .unwrap_or("is none of PNG, JPEG, TGA, BMP, WebP, TIFF, GIF, HDR, EXR and DDS")
+            .to_owned()),
     }
+}
+
+/// Returns what an image file is whose format is not read, if its first bytes tell.
+fn foreign(bytes: &[u8]) -> Option<&'static str> {
+    const FOREIGN: [(usize, &[u8], &str); 5] = [
+        (
+            0,
+            b"\xabKTX",
+            "is KTX, which is not read: `gltf-transform ktxdecompress IN OUT`, makes PNG of it in a glTF file",
+        ),
+        (0, b"8BPS", "is an image of Photoshop, which is not read: save it as PNG"),
+        (4, b"ftyp", "is AVIF or HEIF, which is not read: save it as PNG"),
+        (0, b"<svg", "is SVG, which has no pixels: save it as PNG"),
+        (0, b"<?xml", "is XML, such as SVG, which has no pixels: save it as PNG"),
+    ];
+    let is_there =
+        |(at, first, _): &&(usize, &[u8], &str)| bytes.get(*at..).is_some_and(|rest| rest.starts_with(first));
+    FOREIGN.iter().find(is_there).map(|(.., what)| *what)
 }
 
 /// The most pixels of an EXR file's tile that is larger than its layer. The decoder allocates whole tiles.
@@ -196,8 +216,15 @@ fn decoder_of(format: ImageFormat, bytes: &[u8]) -> Checked<impl ImageDecoder> {
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     let mut limits = Limits::no_limits();
     limits.max_alloc = Some(MAX_EXTRA_BYTES);
-    reader.limits(limits);
-    reader.into_decoder().map_err(|error| error.to_string())
+    reader.limits(limits.clone());
+    let failed = |error: ::image::ImageError| error.to_string();
+    let mut decoder = reader.into_decoder().map_err(failed)?;
+    if matches!(format, ImageFormat::Tiff | ImageFormat::Gif) {
+        // Theirs count the pixels, too: once for the picture, and once for what it is made of.
+        limits.max_alloc = Some(decoder.total_bytes().saturating_mul(2).saturating_add(MAX_EXTRA_BYTES));
+        decoder.set_limits(limits).map_err(failed)?;
+    }
+    Ok(decoder)
 }
 
 /// Decodes an image whose size has been checked.

@@ -66,6 +66,8 @@ fn files() -> Vec<(&'static str, Vec<u8>)> {
         ("a.TGA", encoded(rgba(), ImageFormat::Tga)),
         ("a.webp", encoded(rgba(), ImageFormat::WebP)),
         ("a.jpg", encoded(photo, ImageFormat::Jpeg)),
+        ("a.tif", encoded(rgba(), ImageFormat::Tiff)),
+        ("a.gif", encoded(rgba(), ImageFormat::Gif)),
         ("a.hdr", encoded(rgb_float, ImageFormat::Hdr)),
         ("a.exr", encoded(floats, ImageFormat::OpenExr)),
         ("a.dds", dds([8, 8], dxt(b"DXT1"), &blocks)),
@@ -76,12 +78,47 @@ fn files() -> Vec<(&'static str, Vec<u8>)> {
 
 #[test]
 fn lossless_formats_keep_their_pixels() {
-    for format in [ImageFormat::Png, ImageFormat::Bmp, ImageFormat::WebP, ImageFormat::Tga] {
+    for format in [ImageFormat::Png, ImageFormat::Bmp, ImageFormat::WebP, ImageFormat::Tiff, ImageFormat::Tga] {
         // The content decides, except for TGA.
         let name = if format == ImageFormat::Tga { "dir/IMAGE.Tga" } else { "image.jpeg" };
         let image = decoded(name, encoded(with_alpha(), format)).unwrap();
         assert_eq!((image.width, image.height, &*image.name), (3, 2, name));
         assert_eq!(bytes_of(&image), pixels(&with_alpha()), "{format:?}");
+    }
+}
+
+/// The first of several pictures counts. A picture may be larger than what a decoder may allocate beside it.
+#[test]
+fn gif_and_tiff_are_read() {
+    let mut bytes = Vec::new();
+    let frame = |grey: u8| ::image::Frame::new(RgbaImage::from_pixel(5, 4, Rgba([grey, 0, 0, 255])));
+    ::image::codecs::gif::GifEncoder::new(&mut bytes).encode_frames([frame(200), frame(9)]).unwrap();
+    let image = decoded("a", bytes).unwrap();
+    assert_eq!((image.width, image.height, bytes_of(&image)), (5, 4, &[[200, 0, 0, 255]; 20][..]));
+    let side = 2100;
+    assert!(4 * u64::from(side) * u64::from(side) > MAX_EXTRA_BYTES);
+    let large = RgbaImage::from_pixel(side, side, Rgba([10, 20, 30, 255]));
+    for format in [ImageFormat::Tiff, ImageFormat::Gif] {
+        let image = decoded("a", encoded(large.clone(), format)).unwrap_or_else(|error| panic!("{format:?}: {error}"));
+        assert_eq!((image.width, bytes_of(&image)[7]), (side, [10, 20, 30, 255]), "{format:?}");
+    }
+    let words = [7_u16, 65535];
+    let grey = ImageBuffer::<::image::Luma<u16>, _>::from_raw(2, 1, words.to_vec()).unwrap();
+    assert_eq!(floats_of(&decoded("a", encoded(grey, ImageFormat::Tiff)).unwrap())[1][0], 1.0);
+    let floats = Rgb32FImage::from_pixel(2, 1, ::image::Rgb([4.0, 0.5, 0.25]));
+    let image = decoded("a", encoded(floats, ImageFormat::Tiff)).unwrap();
+    assert_eq!((floats_of(&image)[0], image.is_linear), ([4.0, 0.5, 0.25, 1.0], true));
+}
+
+#[test]
+fn other_formats_are_called_by_their_names() {
+    for (bytes, what) in [
+        (&b"\xabKTX 20\xbb"[..], "ktxdecompress"),
+        (b"8BPS\0", "Photoshop"),
+        (b"\0\0\0\x1cftypavif", "AVIF"),
+        (b"<svg ", "SVG"),
+    ] {
+        assert!(decoded("a", bytes.to_vec()).unwrap_err().contains(what), "{what}");
     }
 }
 
@@ -224,10 +261,10 @@ fn a_bomb_is_refused_by_its_header() {
 #[test]
 fn an_error_is_one_line_and_leaves_the_others() {
     let good = Encoded { name: "good".to_owned(), bytes: encoded(with_alpha(), ImageFormat::Png).into() };
-    let bad = Encoded { name: "b\nad".to_owned(), bytes: b"GIF89a"[..].into() };
+    let bad = Encoded { name: "b\nad".to_owned(), bytes: b"qoif\0\0"[..].into() };
     let results = decode_all(vec![bad, good], 0, &Progress::default());
     let error = results[0].as_ref().unwrap_err();
-    assert_eq!(error, "image `b ad`: is none of PNG, JPEG, TGA, BMP, WebP, HDR, EXR and DDS");
+    assert_eq!(error, "image `b ad`: is none of PNG, JPEG, TGA, BMP, WebP, TIFF, GIF, HDR, EXR and DDS");
     assert_eq!(bytes_of(results[1].as_ref().unwrap()), pixels(&with_alpha()));
 }
 

@@ -51,7 +51,8 @@ pub fn library_files(reach: Reach, rest: &str) -> Vec<Checked<NamedFile>> {
 }
 
 /// Returns the file of a map. Writers often state absolute names of their own machine: where a name leaves the folder
-/// of the OBJ file, a file of the same name beside the MTL file is taken. A comment may follow the name.
+/// of the OBJ file, the file is taken whose name beside the MTL file has the most last parts in common with it. A
+/// comment may follow the name.
 pub fn map_file(reach: Reach, folder: &Path, name: &str) -> Checked<NamedFile> {
     let exists = |file: &Checked<NamedFile>| file.as_ref().is_ok_and(|file| files::is_file(&file.path));
     let whole = reach.find(folder, name);
@@ -60,10 +61,9 @@ pub fn map_file(reach: Reach, folder: &Path, name: &str) -> Checked<NamedFile> {
     }
     let name = name.split_once(" #").map_or(name, |(name, _)| name.trim_end().trim_end_matches('"'));
     let without_comment = reach.find(folder, name);
-    let beside = reach.find(folder, name.rsplit(['/', '\\']).next().unwrap_or_default());
-    if !exists(&without_comment) && reach.within().find(folder, name).is_err() && exists(&beside) {
-        beside
-    } else {
-        without_comment
+    if exists(&without_comment) || reach.within().find(folder, name).is_ok() {
+        return without_comment;
     }
+    let ends = name.match_indices(['/', '\\']).map(|(at, _)| &name[at + 1..]).filter(|end| !end.is_empty());
+    ends.map(|end| reach.within().find(folder, end)).find(exists).unwrap_or(without_comment)
 }

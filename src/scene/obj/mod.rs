@@ -7,7 +7,6 @@ mod model;
 mod mtl;
 mod polypaint;
 mod quick;
-mod two_sided;
 
 use std::{collections::HashMap, path::Path};
 

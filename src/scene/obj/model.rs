@@ -5,11 +5,9 @@ use std::borrow::Cow;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::{
-    clean::{FaceKind, FaceShading},
-    two_sided::{Coincident, CoincidentTriangles},
-};
+use super::clean::{FaceKind, FaceShading};
 use crate::scene::{
+    coincident::{Coincident, CoincidentTriangles, Looks, Part},
     mesh::Mesh,
     polygon::Triangulator,
     smooth::{Shading, crease_normals},
@@ -60,6 +58,16 @@ impl<'a> Model<'a> {
         self.positions.iter().all(|number| number.is_finite())
             && are_finite(&self.texcoords, texcoords, 2)
             && are_finite(&self.normals, normals, 3)
+    }
+
+    /// Returns its faces, as far as it matters whether some of them are there several times.
+    fn faces(&self) -> Part<'_> {
+        Part {
+            points: &self.positions,
+            corners: &self.corners[0],
+            arities: &self.arities,
+            looks: Looks::Material(self.material_ix),
+        }
     }
 
     /// Cuts the faces into triangles.
@@ -135,7 +143,8 @@ pub fn mesh(models: &[Model], no_material: u32, (shading, colour_scale): (Shadin
     let mut mesh = Mesh::default();
     let mut to_smooth = Vec::new();
     let mut triangulator = Triangulator::default();
-    let mut coincident = CoincidentTriangles::new(Coincident::of(models));
+    let faces: Vec<Part> = models.iter().map(Model::faces).collect();
+    let mut coincident = CoincidentTriangles::new(Coincident::of(&faces));
     for (model_ix, model) in models.iter().enumerate() {
         let triangles = model.triangles(&mut triangulator);
         let part = model.part(&triangles, (shading, colour_scale));
@@ -143,7 +152,7 @@ pub fn mesh(models: &[Model], no_material: u32, (shading, colour_scale): (Shadin
         let is_smoothed = shading.smooth && model.kind.shading == FaceShading::Smooth;
         to_smooth.resize(to_smooth.len() + n_faces, is_smoothed);
         let first_corners = || triangles.each(|corner| corner).iter().map(|[first, ..]| *first).collect();
-        coincident.add((model_ix, model), mesh.faces.len(), first_corners);
+        coincident.add((model_ix, &faces[model_ix]), mesh.faces.len(), first_corners);
         let slot = model.material_ix.map_or(no_material, |ix| ix as u32);
         mesh.append(Mesh { slots: vec![slot; n_faces], ..part });
     }

@@ -22,7 +22,7 @@ use crate::scene::{
     read::read_lossy,
     texture::Channel,
 };
-use crate::util::text::escape_controls;
+use crate::util::text::{escape_controls, one_line};
 
 /// Roughness of a material that states how metallic it is, and nothing about its roughness.
 const DEFAULT_ROUGHNESS: f32 = 0.5;
@@ -75,7 +75,7 @@ pub fn load_libraries(
         for file in library_files(reach, rest) {
             let warn = |what: &str| tracing::warn!("{}:{line}: {what}", obj.display());
             match file {
-                Err(what) => warn(&format!("mtllib {}", what.escape_debug())),
+                Err(what) => warn(&format!("mtllib {}", one_line(&what))),
                 Ok(NamedFile { path, .. }) if !files::is_file(&path) => {
                     warn(&format!("{} does not exist: its materials become the default one", shown(&path)));
                 }
@@ -97,7 +97,7 @@ fn load_library(reach: Reach, path: &Path, images: &mut Images) -> Result<Vec<De
     let text = read_lossy(path)?;
     let (clean, left_out) = clean_mtl(&text);
     for (line, what) in left_out {
-        tracing::warn!("{}:{line}: {}; the statement is left out", shown(path), what.escape_debug());
+        tracing::warn!("{}:{line}: {}; the statement is left out", shown(path), one_line(&what));
     }
     let more = read_more(reach, path, &text, images);
     let (materials, _) =
@@ -214,7 +214,7 @@ fn read_more(reach: Reach, path: &Path, text: &str, images: &mut Images) -> Vec<
     let mut told: HashSet<String> = HashSet::new();
     let mut warn = |line: usize, key: &str, what: String| {
         if told.insert(key.to_owned()) {
-            tracing::warn!("{}:{line}: {}", shown(path), what.escape_debug());
+            tracing::warn!("{}:{line}: {}", shown(path), one_line(&what));
         }
     };
     let maps_colour = statements(text).any(|(_, s)| split_keyword(&s).0.eq_ignore_ascii_case("map_Kd"));
@@ -252,6 +252,12 @@ fn read_more(reach: Reach, path: &Path, text: &str, images: &mut Images) -> Vec<
             }
             MapKind::Shown(term) => term,
         };
+        if rest.to_ascii_uppercase().contains("<UDIM>") {
+            let what = "stands for the images of several tiles, and a material shows one image: export a material for \
+                        each tile";
+            warn(line, rest, format!("`{keyword}` is not shown: `<UDIM>` {what}"));
+            continue;
+        }
         let found = MapOptions::new(rest).and_then(|options| Ok((map_file(reach, folder, &options.name)?, options)));
         match found {
             Err(what) => warn(line, rest, format!("`{keyword}` is not shown: {what}")),
@@ -292,7 +298,7 @@ fn materials(described: Vec<Described>, images: &mut Images) -> Result<Vec<Mater
 }
 
 fn warn_of_image(path: &Path, map: &Map, what: &str) {
-    tracing::warn!("{}:{}: the image is not shown: {}", shown(path), map.line, what.escape_debug());
+    tracing::warn!("{}:{}: the image is not shown: {}", shown(path), map.line, one_line(what));
 }
 
 /// Makes a material. A colour that is stated by its map alone is white. So is a black `Kd` or `Ke` beside its map, as
@@ -414,6 +420,9 @@ fn illum(rest: &str) -> Checked<String> {
 fn finite(keyword: &str, word: &str) -> Checked<f32> {
     match word.parse::<f32>() {
         Ok(number) if number.is_finite() => Ok(number),
+        Err(_) if word.replacen(',', ".", 1).parse::<f32>().is_ok() => {
+            Err(format!("{keyword} `{word}` is not a number: decimals need a point in place of the comma"))
+        }
         _ => Err(format!("{keyword} `{word}` is not a finite number")),
     }
 }

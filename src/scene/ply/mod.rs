@@ -3,23 +3,24 @@
 //! MeshLab names the image of the surface. Coordinates are taken as they are: the format states neither a unit nor an
 //! axis that points up.
 
+mod mended;
 mod quick;
 mod vertex;
 
 use std::{
-    borrow::Cow,
     io::{self, BufRead, BufReader, Read},
     path::{Path, PathBuf},
 };
 
-use glam::{DVec3, Vec2};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 use serde::Deserialize;
 use serde_ply::{DeserializeError, ElementDef, PlyFormat, PlyHeader, PlyProperty, PlyReader, PropertyType, ScalarType};
 
 use self::{
-    quick::{header_bytes, quick_triangles, quick_vertices},
-    vertex::{Vertices, upper_left},
+    mended::{mended, widened},
+    quick::{quick_triangles, quick_vertices},
+    vertex::{REDS, Vertices, largest_colour, upper_left},
 };
 use super::{
     error::Checked,
@@ -32,9 +33,12 @@ use super::{
     outside::Access,
     polygon::Triangulator,
     smooth::{Shading, smooth_normals},
-    texture::Texture,
+    texture::{Texture, linear_of_srgb},
 };
-use crate::util::progress::{Meter, Progress, Work};
+use crate::util::{
+    progress::{Meter, Progress, Work},
+    text::one_line,
+};
 
 /// Polygon as the indices of its vertices. Writers use either of the two names.
 #[derive(Deserialize)]
@@ -47,6 +51,13 @@ struct Polygon {
     /// Number of the image that the polygon shows.
     #[serde(default)]
     texnumber: f64,
+    /// Colour, if the element has one.
+    #[serde(default, alias = "diffuse_red", alias = "r")]
+    red: f32,
+    #[serde(default, alias = "diffuse_green", alias = "g")]
+    green: f32,
+    #[serde(default, alias = "diffuse_blue", alias = "b")]
+    blue: f32,
 }
 
 /// Strips of triangles as the indices of their vertices; -1 begins a new strip.
@@ -132,6 +143,8 @@ struct Elements {
     /// All faces, if they were read in the quick way.
     triangles: Vec<[u32; 3]>,
     polygons: Vec<Polygon>,
+    /// Linear colours of the polygons, or empty if the file has none that are shown.
+    polygon_colours: Vec<Vec3>,
     strips: Vec<Strips>,
 }
 
@@ -155,6 +168,8 @@ pub(super) fn ply_mesh(
     n_loaded: usize,
     progress: &Progress,
 ) -> Checked<PlyMesh> {
+    let mended = mended(bytes);
+    let bytes = &mended[..];
     let (head, rest) = widened(bytes);
     let mut reader = PlyReader::from_reader(Counted::new(&head, rest, progress))
         .map_err(|error| format!("is no PLY file: {}", text(&error)))?;
@@ -169,26 +184,6 @@ pub(super) fn ply_mesh(
     let would_be_invisible = elements.vertices.would_be_invisible;
     let (mesh, n_left_out) = mesh(elements, names.len(), shading)?;
     Ok(PlyMesh { mesh, names, uses_crease, n_left_out, would_be_invisible })
-}
-
-/// Returns a file in two parts, the first of which is the header or empty. In a text, coordinates may have more digits
-/// than single precision holds, whatever their type, as maps have. So the header declares them as double precision.
-fn widened(bytes: &[u8]) -> (Cow<'_, [u8]>, &[u8]) {
-    let as_it_is = (Cow::Borrowed(&bytes[..0]), bytes);
-    let Some(header) = header_bytes(bytes).and_then(|n| str::from_utf8(&bytes[..n]).ok()) else { return as_it_is };
-    let is_text = header.lines().any(|line| line.split_ascii_whitespace().take(2).eq(["format", "ascii"]));
-    if !is_text {
-        return as_it_is;
-    }
-    let widened = |line: &str| {
-        let words: Vec<&str> = line.split_ascii_whitespace().collect();
-        match words[..] {
-            ["property", kind @ ("float" | "float32"), "x" | "y" | "z"] => line.replacen(kind, "double", 1),
-            _ => line.to_owned(),
-        }
-    };
-    let head: String = header.split_inclusive('\n').map(widened).collect();
-    (Cow::Owned(head.into_bytes()), &bytes[header.len()..])
 }
 
 impl PlyMesh {
@@ -217,7 +212,7 @@ impl Elements {
         let of_polygons = self.polygons.iter().map(|polygon| polygon.vertex_indices.len());
         let n_corners = of_polygons.chain(self.strips.iter().map(|strips| strips.vertex_indices.len()));
         let has_uvs = !self.vertices.uvs.is_empty() || self.polygons.iter().any(|p| !p.texcoord.is_empty());
-        let has_colours = !self.vertices.colours.is_empty();
+        let has_colours = !self.vertices.colours.is_empty() || !self.polygon_colours.is_empty();
         MeshSize {
             n_triangles: self.triangles.len() as u64 + n_corners.map(|n| n.saturating_sub(2) as u64).sum::<u64>(),
             // The points are there already.
@@ -278,12 +273,26 @@ fn read(reader: &mut PlyReader<Counted>, (header, bytes): (&PlyHeader, &[u8]), o
         let failed = |error| format!("element `{}`: {}", element.name.escape_debug(), text(&error));
         match element.name.as_str() {
             "vertex" => found.vertices = Vertices::read(reader, element, origin)?,
-            "face" => found.polygons = reader.next_element().map_err(failed)?,
+            "face" => {
+                found.polygons = reader.next_element().map_err(failed)?;
+                found.polygon_colours = polygon_colours(element, &found.polygons);
+            }
             "tristrips" => found.strips = reader.next_element().map_err(failed)?,
             _ => drop(reader.next_element::<Vec<Skipped>>().map_err(failed)?),
         }
     }
+    if found.vertices.colours.iter().any(|colour| *colour != found.vertices.colours[0]) {
+        found.polygon_colours.clear();
+    }
     Ok(found)
+}
+
+/// Returns the linear colours of polygons, or nothing if they have none.
+fn polygon_colours(element: &ElementDef, polygons: &[Polygon]) -> Vec<Vec3> {
+    let Some(red) = REDS.iter().find(|name| element.has_property(name)) else { return Vec::new() };
+    let colours = polygons.iter().map(|polygon| Vec3::new(polygon.red, polygon.green, polygon.blue));
+    let one = largest_colour(element, red, colours.clone());
+    colours.map(|colour| (colour / one).map(linear_of_srgb)).collect()
 }
 
 /// Returns the names of images in the comments `TextureFile NAME`.
@@ -294,7 +303,7 @@ fn texture_files(comments: &[String]) -> impl Iterator<Item = &str> {
 /// Returns one material for each name of an image, which is its base colour. Warns of images that cannot be read.
 fn materials(path: &Path, names: &[String], access: Access, images: &mut Images) -> Vec<Material> {
     let reach = access.beside(path);
-    let warn = |what: &str| tracing::warn!("{}: TextureFile is not shown: {}", path.display(), what.escape_debug());
+    let warn = |what: &str| tracing::warn!("{}: TextureFile is not shown: {}", path.display(), one_line(what));
     let mut add = |name: &String| {
         let is_shown = !images.is_replaced(name);
         is_shown.then(|| reach.find(reach.root, name).map(|file| images.add(file.path)))
@@ -350,7 +359,7 @@ fn check(elements: &[ElementDef]) -> Checked<()> {
 /// Makes the mesh, without faces whose corners are not finite, and returns their number. `n_images`: the number of
 /// images that polygons can show.
 fn mesh(elements: Elements, n_images: usize, shading: Shading) -> Checked<(Mesh, usize)> {
-    let Elements { vertices, triangles, polygons, strips } = elements;
+    let Elements { vertices, triangles, polygons, polygon_colours, strips } = elements;
     let mut mesh = Mesh { slots: vec![0; triangles.len()], faces: triangles, ..Mesh::default() };
     let has_own_uvs = |polygon: &Polygon| polygon.texcoord.len() == 2 * polygon.vertex_indices.len();
     let has_uvs = !vertices.uvs.is_empty() || polygons.iter().any(|p| !p.texcoord.is_empty() && has_own_uvs(p));
@@ -372,6 +381,9 @@ fn mesh(elements: Elements, n_images: usize, shading: Shading) -> Checked<(Mesh,
         triangulator.cut(&corners, |triangle| {
             mesh.faces.push(triangle.map(|corner| indices[corner]));
             mesh.slots.push(slot);
+            if let Some(colour) = polygon_colours.get(polygon_ix) {
+                mesh.colours.push([colour.extend(1.0); 3]);
+            }
             if has_uvs && has_own_uvs(polygon) {
                 let own = |corner: usize| upper_left(polygon.texcoord[2 * corner], polygon.texcoord[2 * corner + 1]);
                 mesh.uvs[0].push(triangle.map(own));
@@ -395,7 +407,9 @@ fn mesh(elements: Elements, n_images: usize, shading: Shading) -> Checked<(Mesh,
         // Without texture coordinates, no image is shown.
         mesh.slots.fill(0);
     }
-    if !vertices.colours.is_empty() {
+    if !polygon_colours.is_empty() {
+        mesh.colours.resize(mesh.faces.len(), [Vec4::ONE; 3]);
+    } else if !vertices.colours.is_empty() {
         mesh.colours = mesh.faces.par_iter().map(|face| face.map(|ix| vertices.colours[ix as usize])).collect();
     }
     mesh.positions = vertices.positions;

@@ -70,7 +70,7 @@ enum Property {
 /// Number of properties that are read.
 const N_PROPERTIES: usize = Property::Other as usize;
 /// Names of the red part of a colour, and of the first texture coordinate.
-const REDS: [&str; 3] = ["red", "diffuse_red", "r"];
+pub const REDS: [&str; 3] = ["red", "diffuse_red", "r"];
 const FIRST_UVS: [&str; 3] = ["s", "u", "texture_u"];
 
 /// The coordinates of a vertex, and its numbers by property. Those of the coordinates are 0.
@@ -139,7 +139,7 @@ impl Vertices {
             let colours = painted.iter().map(|p| Vec4::from_slice(&p.1[Property::Red as usize..]));
             vertices.would_be_invisible = has_alpha && colours.clone().all(|colour| colour.w == 0.0);
             let has_alpha = has_alpha && !vertices.would_be_invisible;
-            let one = largest_colour(element, red, colours.clone());
+            let one = largest_colour(element, red, colours.clone().map(Vec4::truncate));
             let linear = |colour: Vec4| {
                 let rgb = Vec3::from_array((colour.truncate() / one).to_array().map(linear_of_srgb));
                 let has_opacity = has_alpha && colour.w.is_finite();
@@ -162,11 +162,11 @@ pub fn has_more(element: &ElementDef) -> bool {
 
 /// Returns the number that stands for 1 in the colours: the largest of an integer type, 1 for floats, or 255 for floats
 /// that exceed 1.
-fn largest_colour(element: &ElementDef, red: &str, mut colours: impl Iterator<Item = Vec4>) -> f32 {
+pub fn largest_colour(element: &ElementDef, red: &str, mut colours: impl Iterator<Item = Vec3>) -> f32 {
     let property = element.properties.iter().find(|property| property.name == red);
     match property.map(|property| &property.property_type) {
         Some(PropertyType::Scalar(ScalarType::F32 | ScalarType::F64)) => {
-            if colours.any(|colour| colour.truncate().max_element() > 1.0) { 255.0 } else { 1.0 }
+            if colours.any(|colour| colour.max_element() > 1.0) { 255.0 } else { 1.0 }
         }
         Some(PropertyType::Scalar(ScalarType::I8)) => 127.0,
         Some(PropertyType::Scalar(ScalarType::U16)) => 65_535.0,

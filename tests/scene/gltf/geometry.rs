@@ -139,6 +139,8 @@ fn primitives_are_slots_and_nodes_are_instances() {
     let red = model.push("materials", json!({ "name": "red" }));
     let mut primitive = model.json["meshes"][0]["primitives"][0].clone();
     primitive["material"] = json!(red);
+    // The same triangle would become a copy of the first one.
+    primitive["indices"] = json!(model.accessor("SCALAR", U8, &[0_u8, 1, 1]));
     let mut points = primitive.clone();
     points["mode"] = json!(0);
     model.json["meshes"][0]["primitives"].as_array_mut().unwrap().extend([points, primitive]);

@@ -12,53 +12,104 @@ use std::{
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::model::Model;
-use crate::scene::{mesh::Mesh, mesh_file::bounds_of};
+use super::{mesh::Mesh, mesh_file::bounds_of};
 
 /// Distance by which a face is moved, as a share of the largest coordinate or of the diagonal of the mesh. It is 16
 /// steps of single precision.
 const SHARE: f32 = 2e-6;
 
-/// The faces of models that are there several times.
-#[derive(Debug, Default)]
-pub struct Coincident {
-    /// The faces that have an opposite one with another material.
-    pub two_sided: HashSet<FacePlace>,
-    /// Faces that are there again with the same side, each with the first of its kind.
-    pub repeated: Vec<(FacePlace, FacePlace)>,
+/// Faces of a file, in the order of the file.
+pub(super) struct Part<'a> {
+    /// Three numbers a point.
+    pub points: &'a [f32],
+    /// Index of the point of each corner.
+    pub corners: &'a [u32],
+    /// Numbers of the faces' corners. Empty if all faces are triangles.
+    pub arities: &'a [u32],
+    pub looks: Looks<'a>,
 }
 
-/// The place of a face: the index of its model, and its first corner there.
-pub type FacePlace = (usize, usize);
+/// What tells faces apart that look different.
+pub(super) enum Looks<'a> {
+    /// All faces of the part have this material.
+    Material(Option<usize>),
+    /// The faces are those of a mesh, with their slots and colours.
+    Mesh(&'a Mesh),
+}
+
+impl Part<'_> {
+    /// Returns a number that differs for nearly all faces which look different.
+    fn look(&self, face_ix: usize) -> u64 {
+        match &self.looks {
+            Looks::Material(ix) => ix.map_or(0, |ix| ix as u64 + 1),
+            Looks::Mesh(mesh) => {
+                let colours = mesh.colours.get(face_ix).into_iter().flatten();
+                colours.fold(u64::from(mesh.slots[face_ix]), |sum, colour| mix(sum, hash(colour.truncate())))
+            }
+        }
+    }
+
+    fn point(&self, corner: usize) -> Vec3 {
+        Vec3::from_slice(&self.points[self.corners[corner] as usize * 3..])
+    }
+
+    /// Returns the first corner of each face, and the number of its corners.
+    fn faces<'b>(&'b self) -> Box<dyn Iterator<Item = (usize, usize)> + 'b> {
+        if self.arities.is_empty() {
+            return Box::new((0..self.corners.len() / 3).map(|ix| (3 * ix, 3)));
+        }
+        Box::new(self.arities.iter().scan(0, |first, n| {
+            let face = (*first, *n as usize);
+            *first += face.1;
+            Some(face)
+        }))
+    }
+}
+
+/// The faces of parts that are there several times.
+#[derive(Debug, Default)]
+pub(super) struct Coincident {
+    /// The faces that have an opposite one which looks different.
+    two_sided: HashSet<FacePlace>,
+    /// Faces that are there again with the same side, each with the first of its kind.
+    repeated: Vec<(FacePlace, FacePlace)>,
+}
+
+/// The place of a face: the index of its part, and its first corner there.
+type FacePlace = (usize, usize);
 
 impl Coincident {
-    /// Finds the faces that are there several times with different materials.
-    pub fn of(models: &[Model]) -> Self {
+    /// Finds the faces that are there several times and look different.
+    pub fn of(parts: &[Part]) -> Self {
         let mut found = Self::default();
-        if models.iter().all(|model| model.material_ix == models[0].material_ix) {
+        let can_differ = |part: &Part| match &part.looks {
+            Looks::Material(_) => part.look(0) != parts[0].look(0),
+            Looks::Mesh(mesh) => have_looks(mesh) && have_repeated_keys(part),
+        };
+        if !parts.iter().any(can_differ) {
             return found;
         }
-        let mut all: Vec<Face> = models.par_iter().enumerate().flat_map_iter(faces_of).collect();
+        let mut all: Vec<Face> = parts.par_iter().enumerate().flat_map_iter(faces_of).collect();
         all.par_sort_unstable();
         for alike in all.chunk_by(|a, b| a.key == b.key).filter(|alike| alike.len() > 1) {
-            found.add(models, alike);
+            found.add(parts, alike);
         }
         found
     }
 
     /// Adds those of a few faces, ordered by their places, that have the points of the first one.
-    fn add(&mut self, models: &[Model], alike: &[Face]) {
-        let material = |face: &Face| models[face.model_ix].material_ix;
-        let first = alike[0].polygon(models);
+    fn add(&mut self, parts: &[Part], alike: &[Face]) {
+        let look = |face: &Face| parts[face.part_ix].look(face.face_ix);
+        let first = alike[0].polygon(parts);
         let (mut same, mut opposite) = (Vec::new(), Vec::new());
         for face in alike {
-            match is_turned(&first, &face.polygon(models)) {
+            match is_turned(&first, &face.polygon(parts)) {
                 Some(false) => same.push(face),
                 Some(true) => opposite.push(face),
                 None => {}
             }
         }
-        if opposite.iter().any(|face| material(face) != material(&alike[0])) {
+        if opposite.iter().any(|face| look(face) != look(&alike[0])) {
             self.two_sided.extend(same.iter().chain(&opposite).map(|face| face.place()));
         }
         for side in [same, opposite] {
@@ -67,24 +118,26 @@ impl Coincident {
     }
 }
 
-/// A face of a model.
+/// A face of a part.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Face {
     /// Sum over its corners, which does not depend on their order.
     key: u64,
-    model_ix: usize,
+    part_ix: usize,
     first_corner: usize,
     n_corners: usize,
+    /// Its index among the faces of the part.
+    face_ix: usize,
 }
 
 impl Face {
     /// Returns its points.
-    fn polygon(&self, models: &[Model]) -> Vec<Vec3> {
-        self.corners().map(|corner| point(&models[self.model_ix], corner)).collect()
+    fn polygon(&self, parts: &[Part]) -> Vec<Vec3> {
+        self.corners().map(|corner| parts[self.part_ix].point(corner)).collect()
     }
 
     fn place(&self) -> FacePlace {
-        (self.model_ix, self.first_corner)
+        (self.part_ix, self.first_corner)
     }
 
     fn corners(&self) -> Range<usize> {
@@ -92,36 +145,39 @@ impl Face {
     }
 }
 
-fn faces_of((model_ix, model): (usize, &Model)) -> Vec<Face> {
-    let face = |(first_corner, n_corners): (usize, usize)| {
-        let corners = (first_corner..first_corner + n_corners).map(|corner| hash(point(model, corner)));
-        Face { key: corners.fold(n_corners as u64, u64::wrapping_add), model_ix, first_corner, n_corners }
-    };
-    faces(model).map(face).collect()
+/// Returns whether some faces of a mesh look different from others.
+fn have_looks(mesh: &Mesh) -> bool {
+    !mesh.colours.is_empty() || mesh.slots.iter().any(|slot| *slot != mesh.slots[0])
 }
 
-/// Returns the first corner of each face, and the number of its corners.
-fn faces<'a>(model: &'a Model) -> Box<dyn Iterator<Item = (usize, usize)> + 'a> {
-    if model.arities.is_empty() {
-        return Box::new((0..model.corners[0].len() / 3).map(|ix| (3 * ix, 3)));
-    }
-    Box::new(model.arities.iter().scan(0, |first, n| {
-        let face = (*first, *n as usize);
-        *first += face.1;
-        Some(face)
-    }))
+/// Returns whether some triangles of a part have the same key. Most meshes end here, after less memory and time than
+/// their faces with all places would take.
+fn have_repeated_keys(part: &Part) -> bool {
+    let triangles: &[[u32; 3]] = part.corners.as_chunks().0;
+    let of_corner = |ix: u32| hash(Vec3::from_slice(&part.points[ix as usize * 3..]));
+    let key = |triangle: &[u32; 3]| triangle.iter().fold(0_u64, |sum, ix| sum.wrapping_add(of_corner(*ix)));
+    let mut keys: Vec<u64> = triangles.par_iter().map(key).collect();
+    keys.par_sort_unstable();
+    keys.par_windows(2).any(|pair| pair[0] == pair[1])
 }
 
-fn point(model: &Model, corner: usize) -> Vec3 {
-    Vec3::from_slice(&model.positions[model.corners[0][corner] as usize * 3..])
+fn faces_of<'a>((part_ix, part): (usize, &'a Part)) -> impl Iterator<Item = Face> + use<'a> {
+    part.faces().enumerate().map(move |(face_ix, (first_corner, n_corners))| {
+        let corners = (first_corner..first_corner + n_corners).map(|corner| hash(part.point(corner)));
+        let key = corners.fold(n_corners as u64, u64::wrapping_add);
+        Face { key, part_ix, first_corner, n_corners, face_ix }
+    })
 }
 
 /// Returns a number that differs for nearly all points.
 fn hash(point: Vec3) -> u64 {
     // 0 and -0 are one place.
     let bits = point.to_array().map(|x| u64::from((x + 0.0).to_bits()));
-    let mix = |sum: u64, bits: u64| (sum ^ bits).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(31);
     mix(bits.into_iter().fold(1, mix), 7)
+}
+
+fn mix(sum: u64, bits: u64) -> u64 {
+    (sum ^ bits).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(31)
 }
 
 /// Returns whether `b` has the points of `a` in the opposite order, or `None` if its points are not those of `a`.
@@ -137,13 +193,8 @@ fn is_turned(a: &[Vec3], b: &[Vec3]) -> Option<bool> {
     }
 }
 
-/// Returns the first corner of the face to which each corner of a model belongs.
-fn first_corners(model: &Model) -> Vec<usize> {
-    faces(model).flat_map(|(first, n)| std::iter::repeat_n(first, n)).collect()
-}
-
 /// The triangles of a mesh that come from faces which are there several times.
-pub struct CoincidentTriangles {
+pub(super) struct CoincidentTriangles {
     faces: Coincident,
     /// Indices of triangles by their faces.
     triangles: HashMap<FacePlace, Vec<usize>>,
@@ -157,15 +208,16 @@ impl CoincidentTriangles {
         Self { faces, triangles }
     }
 
-    /// Adds the triangles of a model. `first_triangle`: the index of the first one in the mesh. `corners`: the first
-    /// corner of each triangle in the model.
-    pub fn add(&mut self, (model_ix, model): (usize, &Model), first_triangle: usize, corners: impl Fn() -> Vec<usize>) {
+    /// Adds the triangles of a part. `first_triangle`: the index of the first one in the mesh. `corners`: the first
+    /// corner of each triangle in the part.
+    pub fn add(&mut self, (part_ix, part): (usize, &Part), first_triangle: usize, corners: impl Fn() -> Vec<usize>) {
         if self.triangles.is_empty() {
             return;
         }
-        let first_corners = first_corners(model);
+        // The first corner of the face to which each corner belongs.
+        let first_corners: Vec<usize> = part.faces().flat_map(|(first, n)| std::iter::repeat_n(first, n)).collect();
         for (ix, corner) in corners().into_iter().enumerate() {
-            if let Some(triangles) = self.triangles.get_mut(&(model_ix, first_corners[corner])) {
+            if let Some(triangles) = self.triangles.get_mut(&(part_ix, first_corners[corner])) {
                 triangles.push(first_triangle + ix);
             }
         }
@@ -183,6 +235,19 @@ impl CoincidentTriangles {
     }
 }
 
+/// Separates the triangles of a mesh that are there several times and look different.
+pub(super) fn separate(mesh: &mut Mesh) {
+    let part = Part {
+        points: bytemuck::cast_slice(&mesh.positions),
+        corners: mesh.faces.as_flattened(),
+        arities: &[],
+        looks: Looks::Mesh(mesh),
+    };
+    let mut found = CoincidentTriangles::new(Coincident::of(std::slice::from_ref(&part)));
+    found.add((0, &part), 0, || (0..mesh.faces.len()).map(|ix| 3 * ix).collect());
+    found.separate(mesh);
+}
+
 /// Makes a triangle of a mesh a copy of another one.
 fn copy(mesh: &mut Mesh, from: usize, to: usize) {
     mesh.faces[to] = mesh.faces[from];
@@ -193,6 +258,9 @@ fn copy(mesh: &mut Mesh, from: usize, to: usize) {
     }
     if !mesh.colours.is_empty() {
         mesh.colours[to] = mesh.colours[from];
+    }
+    if !mesh.tangents.is_empty() {
+        mesh.tangents[to] = mesh.tangents[from];
     }
 }
 
