@@ -256,7 +256,7 @@ fn a_grey_sphere_in_a_furnace_is_grey() {
     assert!((mean - 0.5).abs().max_element() < 4.0 * error.max(5e-4), "{mean} +- {error}");
 }
 
-/// Four times the samples halve the error, or better: the samples of a pixel are spread evenly.
+/// Sixteen times the samples leave a quarter of the error, up to chance: few bright paths are much of it.
 #[test]
 fn the_error_falls_with_the_number_of_samples() {
     let scene = scenes::mixed_outdoors();
@@ -267,11 +267,8 @@ fn the_error_falls_with_the_number_of_samples() {
         let squared = |(a, b): (&[f32; 4], &[f32; 4])| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f32>();
         (picture.radiance.iter().zip(&truth.radiance).map(squared).sum::<f32>() / truth.radiance.len() as f32).sqrt()
     };
-    let errors = [4, 16, 64].map(error);
-    for pair in errors.windows(2) {
-        let ratio = pair[0] / pair[1];
-        assert!(ratio > 1.7, "{errors:?}");
-    }
+    let [few, many] = [4, 64].map(error);
+    assert!(few / many > 3.0, "{few}, {many}");
 }
 
 /// With a lens, what is at the distance of sharpness has an edge of the width of a pixel, and what is farther has none.

@@ -1,10 +1,10 @@
-// The light that the rough boundary of a solid loses: what a microfacet reflects or refracts into other microfacets, where
-// it bounces on. Twin of src/reference/bsdf/solid_loss.rs.
+// The light that the rough boundary of a solid loses: what a microfacet reflects or refracts into other microfacets,
+// where it bounces on. Twin of src/reference/bsdf/solid_loss.rs.
 //
 // The share has no closed form, and polynomials fit it badly. The table holds it for three variables, each from 0 to 1:
 // the root of the cosine to the viewer (8 nodes), the roughness (8 nodes), and the root of (1 - q) / (1 - 1 / 2.6) (6
-// nodes), where q is eta or 1 / eta, whichever is less. It is for indices up to 2.6. tests/long/albedo_fit.py makes it. The unit tests of the twin integrate the
-// lobes, which states the errors.
+// nodes), where q is eta or 1 / eta, whichever is less. It is for indices up to 2.6. tests/long/albedo_fit.py makes it.
+// The unit tests of the twin integrate the lobes, which states the errors.
 #ifndef KDRAY_BSDF_SOLID_LOSS
 #define KDRAY_BSDF_SOLID_LOSS
 

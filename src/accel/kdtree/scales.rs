@@ -63,7 +63,8 @@ impl Scales {
     pub fn new(triangles: &[Triangle], bounds: &Bounds) -> Self {
         let (largest, margin) = (bounds.largest_coordinate(), bounds.margin());
         let all = Self { largest, margin, finest: MAX_SCALE };
-        let finest = if largest >= LIMITS[0] && largest <= LIMITS[1] { all.finest_needed(triangles) } else { 0 };
+        let is_in_range = (LIMITS[0]..=LIMITS[1]).contains(&largest);
+        let finest = if is_in_range { all.finest_needed(triangles) } else { 0 };
         Self { finest, ..all }
     }
 
