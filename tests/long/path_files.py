@@ -72,6 +72,8 @@ def export():
     # Materials that have no compensation for light between microfacets, as the formula that they are compared with.
     single = [made.name for made in bpy.data.materials if made.get("single_scattering")]
     tables = [
+        # With a stated ambient light, kdray chooses no lights by itself.
+        "ambient = [0, 0, 0]\n",
         table("[render]", {"integrator": "path", "width": SIZE, "height": SIZE, "max_depth": MAX_DEPTH}),
         table("[camera]", camera_keys()),
         table("[[mesh]]", {"file": "scene.glb"}) + ("override = true\n" if single else ""),
