@@ -176,7 +176,7 @@ fn foreign(bytes: &[u8]) -> Option<&'static str> {
         (
             0,
             b"\xabKTX",
-            "is KTX, which is not read: `gltf-transform ktxdecompress IN OUT`, makes PNG of it in a glTF file",
+            "is KTX, which is not read: `gltf-transform ktxdecompress IN OUT` makes PNG of it in a glTF file",
         ),
         (0, b"8BPS", "is an image of Photoshop, which is not read: save it as PNG"),
         (4, b"ftyp", "is AVIF or HEIF, which is not read: save it as PNG"),
