@@ -263,13 +263,8 @@ pub struct Picture {
 
 /// Sets the fourth component of pixels to 1. In frames of paths, kernels use it for the noise of the samples.
 pub(crate) fn opaque(mut radiance: Vec<[f32; 4]>) -> Vec<[f32; 4]> {
-    make_opaque(&mut radiance);
-    radiance
-}
-
-/// Does what [`opaque`] does, in place.
-pub(crate) fn make_opaque(radiance: &mut [[f32; 4]]) {
     radiance.par_iter_mut().for_each(|pixel| pixel[3] = 1.0);
+    radiance
 }
 
 named_enum!(Tonemap {

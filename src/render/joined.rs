@@ -11,7 +11,7 @@ use crate::{
 pub struct JoinedPicture {
     whole: Crop,
     pub picture: Picture,
-    /// The features and layers. Times and counts are the caller's.
+    /// The features and layers. The caller adds times and counts.
     pub drawn: Drawn,
 }
 

@@ -51,12 +51,17 @@ impl Camera {
         matches!(self.projection, Projection::Orthographic { .. })
     }
 
+    /// Returns unit vectors to the right of the picture, to its top, and from the eye to the target.
+    pub(super) fn axes(&self) -> [Vec3; 3] {
+        let forward = (self.target - self.eye).normalize_or_zero();
+        let right = forward.cross(self.up).normalize_or_zero();
+        [right, right.cross(forward), forward]
+    }
+
     /// Returns whether a picture of this shape, width by height, can show something of a box. That it shows nothing is
     /// certain if all corners are beyond one of the picture's edges, or behind the eye.
     pub(super) fn may_see(&self, (min, max): (Vec3, Vec3), aspect: f32) -> bool {
-        let forward = (self.target - self.eye).normalize_or_zero();
-        let right = forward.cross(self.up).normalize_or_zero();
-        let up = right.cross(forward);
+        let [right, up, forward] = self.axes();
         let corners = (0..8).map(|ix| {
             let pick = |axis: usize| if ix >> axis & 1 == 0 { min[axis] } else { max[axis] };
             let from_eye = Vec3::new(pick(0), pick(1), pick(2)) - self.eye;

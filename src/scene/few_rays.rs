@@ -1,5 +1,5 @@
-//! Few rays that meet all triangles of a scene, without an acceleration structure. They decide about the camera and the
-//! lights of a scene, before the structure is chosen and built.
+//! Tests a few rays against all triangles of a scene, without an acceleration structure. Their hits decide about the
+//! scene's camera and lights, before the structure is chosen and built.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -8,9 +8,7 @@ use super::{Camera, Instance, Scene};
 
 /// Returns rays of length 1 through the whole picture of a camera: as many across and down.
 pub(super) fn view_rays(camera: &Camera, aspect: f32, (n_across, n_down): (usize, usize)) -> Vec<Ray> {
-    let forward = (camera.target - camera.eye).normalize();
-    let right = forward.cross(camera.up).normalize();
-    let up = right.cross(forward);
+    let [right, up, forward] = camera.axes();
     let half_height = camera.height_at(1.0) / 2.0;
     let place = |ix: usize, n: usize| (2 * ix + 1) as f32 / n as f32 - 1.0;
     let ray = |ix: usize| {
@@ -48,7 +46,7 @@ pub(super) struct Hit {
 pub(super) struct Hits {
     pub first: Option<Hit>,
     pub last: Option<Hit>,
-    /// t of the last hit with the back of a triangle.
+    /// The t of the last hit with the back of a triangle.
     pub last_back: Option<f32>,
 }
 

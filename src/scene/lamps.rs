@@ -65,7 +65,7 @@ impl Scene {
     }
 
     /// Returns the share of what the camera sees that lamps light, or 1 if it sees nothing but lamps. What casts
-    /// shadows does not count. `lamps`: the lamps' triangles, each with the power of all up to it.
+    /// shadows does not count. `lamps`: the lamps' triangles, each with the sum of all powers up to its own.
     fn lit_share(&self, emission: &[f32], lamps: &[(f64, (usize, usize))]) -> f32 {
         let points = self.lamp_points(lamps);
         let rays = view_rays(&self.camera, self.defaults.width as f32 / self.defaults.height as f32, N_SEEN);

@@ -77,7 +77,7 @@ def export():
         table("[render]", {"integrator": "path", "width": SIZE, "height": SIZE, "max_depth": MAX_DEPTH}),
         table("[camera]", camera_keys()),
         table("[[mesh]]", {"file": "scene.glb"}) + ("override = true\n" if single else ""),
-        *(table(f"[materials.{name}]", {"single_scattering": True}).replace("True", "true") for name in single),
+        *(f"[materials.{name}]\nsingle_scattering = true\n" for name in single),
         *(table("[[light]]", lamp_keys(lamp)) for lamp in bpy.data.objects if lamp.type == "LIGHT"),
     ]
     if bpy.context.scene.world:

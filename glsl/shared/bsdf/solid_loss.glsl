@@ -4,7 +4,7 @@
 // The share has no closed form, and polynomials fit it badly. The table holds it for three variables, each from 0 to 1:
 // the root of the cosine to the viewer (8 nodes), the roughness (8 nodes), and the root of (1 - q) / (1 - 1 / 2.6) (6
 // nodes), where q is eta or 1 / eta, whichever is less. It is for indices up to 2.6. tests/long/albedo_fit.py makes it.
-// The unit tests of the twin integrate the lobes, which states the errors.
+// The unit tests of the twin integrate the lobes, and bound the errors.
 #ifndef KDRAY_BSDF_SOLID_LOSS
 #define KDRAY_BSDF_SOLID_LOSS
 
@@ -61,11 +61,13 @@ const uint SOLID_LOSSES[384] = uint[](
     0x20db1289u, 0x4c1436cfu, 0x72295e07u, 0x897a821eu, 0x2b9618fau, 0x60f54710u, 0x8e3d755du, 0xb36da403u
 );
 
+// The number of the table at a node.
 float loss_of_node(uint ix) {
     return float((SOLID_LOSSES[ix / 2u] >> (16u * (ix & 1u))) & 0xffffu) / 65535.0;
 }
 
-// The interpolated value of the table along the root of the cosine. row: of the roughness, the index and the side.
+// The value of the table between two nodes along the root of the cosine. row: number of the nodes that share a
+// roughness, an index of refraction and a side. place: 0 at the first node of the row, 7 at the last one.
 float loss_of_row(uint row, float place) {
     uint node = min(uint(place), 6u);
     float low = loss_of_node(8u * row + node), high = loss_of_node(8u * row + node + 1u);

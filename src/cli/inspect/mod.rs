@@ -111,7 +111,7 @@ impl From<&Emitters> for PathLights {
 
 impl PathLights {
     fn text(&self) -> String {
-        // The surroundings are one of them.
+        // The surroundings of the scene count as one light source.
         let rows = [
             ["light sources: lights, shining triangles, surroundings", &self.lights.to_string()],
             ["a ray's source is picked from a", self.picked_by],

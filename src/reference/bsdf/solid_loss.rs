@@ -2,6 +2,7 @@
 
 use glam::Vec2;
 
+/// Pairs of neighbours along the root of the cosine, 16 bits each.
 #[rustfmt::skip]
 const SOLID_LOSSES: [u32; 384] = [
     0x00000000, 0x00000000, 0x00000000, 0x00000000, 0x110f1464, 0x007f0000, 0x00050000, 0x00000000,
@@ -54,11 +55,12 @@ const SOLID_LOSSES: [u32; 384] = [
     0x20db1289, 0x4c1436cf, 0x72295e07, 0x897a821e, 0x2b9618fa, 0x60f54710, 0x8e3d755d, 0xb36da403,
 ];
 
+/// The number of the table at a node.
 fn loss_of_node(ix: u32) -> f32 {
     ((SOLID_LOSSES[ix as usize / 2] >> (16 * (ix & 1))) & 0xffff) as f32 / 65535.0
 }
 
-/// The interpolated value of the table along the root of the cosine.
+/// The value of the table between two nodes along the root of the cosine.
 fn loss_of_row(row: u32, place: f32) -> f32 {
     let node = (place as u32).min(6);
     let (low, high) = (loss_of_node(8 * row + node), loss_of_node(8 * row + node + 1));

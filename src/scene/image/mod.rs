@@ -220,7 +220,7 @@ fn decoder_of(format: ImageFormat, bytes: &[u8]) -> Checked<impl ImageDecoder> {
     let failed = |error: ::image::ImageError| error.to_string();
     let mut decoder = reader.into_decoder().map_err(failed)?;
     if matches!(format, ImageFormat::Tiff | ImageFormat::Gif) {
-        // Theirs count the pixels, too: once for the picture, and once for what it is made of.
+        // The limits of these decoders include the memory of the picture, and of what it is decoded from.
         limits.max_alloc = Some(decoder.total_bytes().saturating_mul(2).saturating_add(MAX_EXTRA_BYTES));
         decoder.set_limits(limits).map_err(failed)?;
     }

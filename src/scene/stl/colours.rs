@@ -20,7 +20,7 @@ pub(super) fn of_attributes(header: &[u8], attributes: &[u16]) -> Vec<Vec3> {
     let of_object = place.and_then(|at| header[at + MAGICS.len()..].first_chunk());
     if let Some([r, g, b, _]) = of_object {
         let of_object = linear([*r, *g, *b].map(|part| f32::from(part) / 255.0));
-        // 0 is black by the letter, but it is also what files have whose facets have no colours of their own.
+        // 0 would be black, but programs also write it for facets that have the colour of the object.
         let is_own = |bits: u16| bits & MARK == 0 && bits != 0;
         return attributes.iter().map(|bits| if is_own(*bits) { low_bits_red(*bits) } else { of_object }).collect();
     }

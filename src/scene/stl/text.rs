@@ -34,8 +34,8 @@ impl<'a> Words<'a> {
         Self { rest: bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes), line: 1 }
     }
 
-    /// Passes over the name of a solid, which may be missing or in any encoding. It ends with the line. Where it does
-    /// not, since the whole file is one line, it ends before the first facet.
+    /// Passes over the name of a solid, which may be missing or in any encoding. The name ends with the line, or before
+    /// the first facet if the whole file is one line.
     fn skip_name(&mut self) {
         let line = self.line;
         loop {
