@@ -3,8 +3,8 @@
 use glam::{Vec2, Vec3};
 
 use crate::layout::{
-    CURVED_START_COSINE, FLAT_NORMAL, Hit, LEAST_NORMAL_SQUARED, LEAST_WEIGHT, PLANE_START_COSINE, PathRay,
-    SURFACE_CLEARANCE, Triangle,
+    CURVED_START_COSINE, FLAT_NORMAL, Hit, LEAST_CLEARANCE_SHARE, LEAST_NORMAL_SQUARED, LEAST_WEIGHT,
+    PLANE_START_COSINE, PathRay, SURFACE_CLEARANCE, Triangle,
 };
 
 /// The surface of a triangle at a hit, as the ray meets it.
@@ -78,7 +78,9 @@ pub fn surface_at(ray: &PathRay, hit: &Hit, t: &Triangle) -> Surface {
         interpolated,
         shading: interpolated,
         is_reversed,
-        clearance: SURFACE_CLEARANCE * magnitude.dot(geometric.abs()),
+        // In a plane through 0, `dot` is 0 whatever the rounding of a test in that plane.
+        clearance: SURFACE_CLEARANCE
+            * magnitude.dot(geometric.abs()).max(LEAST_CLEARANCE_SHARE * magnitude.max_element()),
         from_inside,
     }
 }

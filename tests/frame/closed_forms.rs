@@ -1,5 +1,7 @@
 //! Tests of pictures whose closed form is known.
 
+use std::f32::consts::{SQRT_2, TAU};
+
 use glam::{Vec3, vec3};
 use kdray::{
     frame::{Picture, Primary, RenderOptions},
@@ -9,7 +11,7 @@ use kdray::{
 };
 
 use super::studio::{differing, on_both, options};
-use crate::support::{meshes, scenes};
+use crate::support::{meshes, random::Random, scenes};
 
 /// Returns the largest difference of any channel of any pixel from `radiance`.
 fn worst(picture: &Picture, radiance: Vec3) -> f32 {
@@ -205,6 +207,40 @@ fn a_shadow_ends_where_it_must() {
             let cos = 4.0 / vec3(x, 4.0, z).length();
             let expected = if x.abs().max(z.abs()) < 1.0 { 0.0 } else { cos * cos * cos };
             assert!((pixel[0] - expected).abs() < 1e-4, "at {x}, {z}: {}, not {expected}", pixel[0]);
+        }
+    }
+}
+
+/// Squares that overlap in one plane have no shadows on one another, whether the plane is through 0 or not.
+#[test]
+fn overlapping_faces_of_a_plane_do_not_shadow_one_another() {
+    for (normal, distance) in [(Vec3::Y, 0.0), (Vec3::Y, 1.0), (vec3(0.36, 0.48, 0.8), 0.0), (vec3(0.6, 0.8, 0.0), 0.1)]
+    {
+        let (right, above) = normal.any_orthonormal_pair();
+        let mut scene = scenes::empty();
+        let mut random = Random(3);
+        for _ in 0..8 {
+            let (half, turn) = (random.between(4.0, 7.0), random.between(0.0, TAU));
+            let corner = |ix: usize| {
+                let angle = turn + ix as f32 * TAU / 4.0;
+                distance * normal + SQRT_2 * half * (angle.cos() * right + angle.sin() * above)
+            };
+            let [a, b, c, d] = [0, 1, 2, 3].map(corner);
+            scenes::add(
+                &mut scene,
+                vec![meshes::triangle(a, b, c), meshes::triangle(a, c, d)],
+                scenes::diffuse(Vec3::ONE),
+            );
+        }
+        // The camera sees 3 units of the plane, which all squares cover.
+        scene.camera = Camera { eye: (distance + 3.0) * normal, target: Vec3::ZERO, up: right, ..scene.camera };
+        for slope in [0.1, 0.5, 2.0] {
+            let to_light = (slope * normal + right + 0.3 * above).normalize();
+            scene.lights = vec![scenes::directional_light(to_light, Vec3::ONE)];
+            for picture in on_both(&scene, &options(80, 60, 1)) {
+                let off = worst(&picture, Vec3::splat(normal.dot(to_light)));
+                assert!(off < 1e-4, "normal {normal}, distance {distance}, slope {slope}: {off}");
+            }
         }
     }
 }
