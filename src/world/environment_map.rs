@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::{
@@ -18,11 +18,12 @@ pub struct EnvironmentMap {
     pub size: [u32; 2],
     /// By which the map is turned about +y, in turns, counter-clockwise as seen from above.
     pub turn: f32,
-    /// Linear colours, row by row from the zenith; and densities with which directions are picked, per steradian.
+    /// Linear colours, row by row from the zenith. The fourth number is the density with which the middle of the texel
+    /// is picked, per steradian, times the sine of the polar angle there.
     pub texels: Vec<[f32; 4]>,
-    /// The table of the rows.
+    /// The table by which rows are picked.
     pub rows: Vec<AliasEntry>,
-    /// For each row, the table of its texels.
+    /// For each row, the table by which its texels are picked.
     pub columns: Vec<AliasEntry>,
     mean_luminance: f64,
 }
@@ -34,35 +35,26 @@ impl EnvironmentMap {
         let [width, height] = environment.size();
         let (n_columns, n_rows) = (width as usize, height as usize);
         let colours = environment.colours();
-        let luminances: Vec<f64> = colours.par_iter().map(|colour| luminance(*colour)).collect();
         let ambient = luminance(ambient);
-        // The solid angle of a texel of each row.
-        let solid_angle = |row: usize| {
-            let [above, below] = [row, row + 1].map(|row| (PI * row as f64 / n_rows as f64).cos());
-            2.0 * PI * (above - below) / n_columns as f64
-        };
-        let weights: Vec<f64> = (0..n_rows * n_columns)
-            .into_par_iter()
-            .map(|ix| mean_of_texel(&luminances, [n_columns, n_rows], [ix % n_columns, ix / n_columns]) + ambient)
-            .collect();
-        let columns: Vec<AliasEntry> = weights.par_chunks(n_columns).flat_map_iter(alias_table).collect();
-        let of_rows: Vec<f64> = weights
-            .par_chunks(n_columns)
-            .enumerate()
-            .map(|(row, weights)| weights.iter().sum::<f64>() * solid_angle(row))
-            .collect();
+        let brightness: Vec<f64> = colours.par_iter().map(|colour| luminance(*colour) + ambient).collect();
+        // A black map is picked evenly.
+        let is_dark = !brightness.par_iter().any(|brightness| *brightness > 0.0);
+        let sine = |row: usize| (PI * (row as f64 + 0.5) / n_rows as f64).sin();
+        let weight = |ix: usize| sine(ix / n_columns) * if is_dark { 1.0 } else { brightness[ix] };
+        let weights: Vec<f64> = (0..n_rows * n_columns).into_par_iter().map(weight).collect();
+        let of_rows: Vec<f64> = weights.par_chunks(n_columns).map(|weights| weights.iter().sum()).collect();
         let sum: f64 = of_rows.iter().sum();
-        let texel = |(colour, weight): (&Vec3, &f64)| {
-            let density = if sum > 0.0 { weight / sum } else { 1.0 / (4.0 * PI) };
-            [colour.x, colour.y, colour.z, density as f32]
-        };
+        let sum_of_sines = (0..n_rows).map(sine).sum::<f64>() * n_columns as f64;
+        // A texel's width and height are angles. Their product is its solid angle, apart from the sine.
+        let of_texel = 2.0 * PI * PI / (n_rows * n_columns) as f64;
+        let texel = |(colour, weight): (&Vec3, &f64)| colour.extend((weight / sum / of_texel) as f32).to_array();
         Self {
             size: [width, height],
             turn: environment.turn(),
             texels: colours.par_iter().zip(&weights).map(texel).collect(),
             rows: alias_table(&of_rows),
-            columns,
-            mean_luminance: sum / (4.0 * PI) - ambient,
+            columns: weights.par_chunks(n_columns).flat_map_iter(alias_table).collect(),
+            mean_luminance: if is_dark { 0.0 } else { sum / sum_of_sines - ambient },
         }
     }
 
@@ -71,26 +63,8 @@ impl EnvironmentMap {
         self.mean_luminance.max(0.0)
     }
 
-    /// Returns the colour of a texel.
-    pub fn colour(&self, x: u32, y: u32) -> Vec3 {
-        let [r, g, b, _] = self.texels[(y * self.size[0] + x) as usize];
-        Vec3::new(r, g, b)
+    /// Returns a texel: its colour, and its density.
+    pub fn texel(&self, x: u32, y: u32) -> Vec4 {
+        Vec4::from_array(self.texels[(y * self.size[0] + x) as usize])
     }
-
-    /// Returns the density with which a direction in a texel is picked, per steradian.
-    pub fn density(&self, x: u32, y: u32) -> f32 {
-        self.texels[(y * self.size[0] + x) as usize][3]
-    }
-}
-
-/// Returns the mean over a texel of the luminance that is bilinear between the middles of texels. So a texel has weight
-/// wherever light comes from any of its directions.
-fn mean_of_texel(luminances: &[f64], [n_columns, n_rows]: [usize; 2], [x, y]: [usize; 2]) -> f64 {
-    let columns = [(x + n_columns - 1) % n_columns, x, (x + 1) % n_columns];
-    let rows = [y.saturating_sub(1), y, (y + 1).min(n_rows - 1)];
-    const SHARES: [f64; 3] = [0.125, 0.75, 0.125];
-    let of_row = |row: usize| -> f64 {
-        columns.iter().zip(SHARES).map(|(column, share)| share * luminances[row * n_columns + column]).sum()
-    };
-    rows.iter().zip(SHARES).map(|(row, share)| share * of_row(*row)).sum()
 }

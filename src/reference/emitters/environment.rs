@@ -18,36 +18,42 @@ use crate::{
 
 /// Density of directions that are uniform on the sphere.
 const UNIFORM: f32 = 1.0 / (4.0 * PI);
+/// Lower bound of the sine by which the density in the map is divided. At the poles, the sine is 0.
+const LEAST_MAP_SINE: f32 = 1.0e-6;
 
-/// Where a direction is in the map: to the right and down, both 0 to 1.
-fn environment_place(map: &EnvironmentMap, direction: Vec3) -> Vec2 {
+/// Where a direction is in the map, texels to the right and down from the middle of the first one. `aside`: the sine of
+/// the polar angle.
+fn environment_place(map: &EnvironmentMap, direction: Vec3, aside: f32) -> Vec2 {
     let turns = direction.x.atan2(-direction.z) / TAU + 0.5 + map.turn;
-    let aside = (direction.x * direction.x + direction.z * direction.z).sqrt();
-    Vec2::new(turns - turns.floor(), aside.atan2(direction.y) / PI)
+    let place = Vec2::new(turns - turns.floor(), aside.atan2(direction.y) / PI);
+    let [width, height] = map.size;
+    place * Vec2::new(width as f32, height as f32) - 0.5
 }
 
-/// The map's colour at a place, bilinear between the middles of texels.
-fn map_colour(map: &EnvironmentMap, place: Vec2) -> Vec3 {
+/// What the map has in a direction.
+#[derive(Clone, Copy)]
+struct MapValue {
+    radiance: Vec3,
+    /// Density with which the direction is picked if the environment without the suns is picked, per steradian.
+    density: f32,
+}
+
+/// The map's value at a place. `aside`: the sine of the place's polar angle.
+fn map_value(map: &EnvironmentMap, place: Vec2, aside: f32) -> MapValue {
     let [width, height] = map.size;
-    let at = place * Vec2::new(width as f32, height as f32) - 0.5;
-    let low: IVec2 = at.floor().as_ivec2();
-    let weight = at - low.as_vec2();
+    let low = place.floor();
+    let weight = place - low;
+    let low: IVec2 = low.as_ivec2();
     let row = |i: i32| {
         let y = (low.y + i).clamp(0, height as i32 - 1) as u32;
         let left = if low.x < 0 { width - 1 } else { (low.x as u32).min(width - 1) };
         let right = if left + 1 < width { left + 1 } else { 0 };
-        let a = map.colour(left, y);
-        a + (map.colour(right, y) - a) * weight.x
+        let a = map.texel(left, y);
+        a + (map.texel(right, y) - a) * weight.x
     };
     let upper = row(0);
-    upper + (row(1) - upper) * weight.y
-}
-
-/// The density of the direction at a place if the environment without the suns is picked, per steradian.
-fn map_density(map: &EnvironmentMap, place: Vec2) -> f32 {
-    let [width, height] = map.size;
-    let at = place * Vec2::new(width as f32, height as f32);
-    map.density((at.x as u32).min(width - 1), (at.y as u32).min(height - 1))
+    let value = upper + (row(1) - upper) * weight.y;
+    MapValue { radiance: value.truncate(), density: value.w / aside.max(LEAST_MAP_SINE) }
 }
 
 /// What a ray that leaves the scene meets: the environment and its suns.
@@ -64,17 +70,22 @@ pub fn seen_environment(inputs: &KernelInputs, direction: Vec3) -> SeenEnvironme
 }
 
 fn seen_beyond(emitters: &Emitters, direction: Vec3) -> SeenEnvironment {
-    let (radiance, density) = match &emitters.environment {
+    let value = match &emitters.environment {
         Some(map) => {
-            let place = environment_place(map, direction);
-            (map_colour(map, place), map_density(map, place))
+            let aside = (direction.x * direction.x + direction.z * direction.z).sqrt();
+            map_value(map, environment_place(map, direction, aside), aside)
         }
-        None => (emitters.background, UNIFORM),
+        None => MapValue { radiance: emitters.background, density: UNIFORM },
     };
+    with_suns(emitters, value, direction)
+}
+
+/// Adds the suns to what the environment has in a direction.
+fn with_suns(emitters: &Emitters, value: MapValue, direction: Vec3) -> SeenEnvironment {
     let suns = seen_suns(emitters, direction);
     SeenEnvironment {
-        radiance: radiance + suns.radiance,
-        density: emitters.environment_probability * density + suns.density,
+        radiance: value.radiance + suns.radiance,
+        density: emitters.environment_probability * value.density + suns.density,
     }
 }
 
@@ -87,25 +98,32 @@ fn ambient_from(emitters: &Emitters, direction: Vec3) -> Vec3 {
     if direction[emitters.up_axis] < 0.0 { emitters.ground_ambient } else { emitters.ambient }
 }
 
-/// A direction of the map, and its density.
-fn pick_map_direction(map: &EnvironmentMap, u: Vec2) -> (Vec3, f32) {
+/// How far a place below a tent is from the tent's middle, -1 to 1. `u`: in [0, 1).
+fn below_tent(u: f32) -> f32 {
+    if u < 0.5 { (2.0 * u).sqrt() - 1.0 } else { 1.0 - (2.0 * (1.0 - u)).sqrt() }
+}
+
+/// A direction of the map, and the map's value there.
+fn pick_map_direction(map: &EnvironmentMap, u: Vec2) -> (Vec3, MapValue) {
     let [n_columns, n_rows] = map.size;
     let row = pick_alias(n_rows, |ix| map.rows[ix as usize].parts(), u.x, 0.0);
     let first_column = row.ix * n_columns;
     let column = pick_alias(n_columns, |ix| map.columns[(first_column + ix) as usize].parts(), u.y, 0.0);
-    let is_upper = 2 * row.ix < n_rows;
-    // Rows from the nearer pole to both edges of the row. The middle row of an odd number is bounded by the equator's
-    // far side, which the formulas allow.
-    let first = if is_upper { row.ix as f32 } else { (n_rows - 1 - row.ix) as f32 };
-    let sines = [first, first + 1.0].map(|row| (FRAC_PI_2 / n_rows as f32 * row).sin());
-    let versines = sines.map(|sine| 2.0 * sine * sine);
-    let share = if is_upper { row.rest } else { 1.0 - row.rest };
-    let versine = versines[0] + (versines[1] - versines[0]) * share;
-    let sine = (versine * (2.0 - versine)).max(0.0).sqrt();
-    let turns = (column.ix as f32 + column.rest) / n_columns as f32 - 0.5 - map.turn;
+    // Between a pole and the middle of its row, there is no other row: the tent's half is a rectangle of half a texel.
+    let is_at_pole = if row.rest < 0.5 { row.ix == 0 } else { row.ix == n_rows - 1 };
+    let down = row.ix as f32 + if is_at_pole { row.rest - 0.5 } else { below_tent(row.rest) };
+    let right = column.ix as f32 + below_tent(column.rest);
+    // The polar angle is taken from the nearer pole, where sines are exact.
+    let is_upper = down + 0.5 < 0.5 * n_rows as f32;
+    let from_pole = if is_upper { down + 0.5 } else { n_rows as f32 - 0.5 - down };
+    let half_sine = (FRAC_PI_2 / n_rows as f32 * from_pole).sin();
+    let versine = 2.0 * half_sine * half_sine;
+    let aside = (versine * (2.0 - versine)).max(0.0).sqrt();
+    let turns = (right + 0.5) / n_columns as f32 - 0.5 - map.turn;
     let azimuth = TAU * turns;
     let up = if is_upper { 1.0 - versine } else { versine - 1.0 };
-    (Vec3::new(sine * azimuth.sin(), up, -sine * azimuth.cos()), map.density(column.ix, row.ix))
+    let direction = Vec3::new(aside * azimuth.sin(), up, -aside * azimuth.cos());
+    (direction, map_value(map, Vec2::new(right, down), aside))
 }
 
 /// A direction that is uniform on the sphere.
@@ -123,17 +141,11 @@ fn pick_beyond(emitters: &Emitters, direction: Vec3, seen: SeenEnvironment) -> L
 }
 
 pub(super) fn pick_environment(emitters: &Emitters, u: Vec2) -> LightPick {
-    let (direction, radiance, density) = match &emitters.environment {
-        Some(map) => {
-            // The density is that of the texel that was picked. Rounding may move the direction to its neighbour.
-            let (direction, density) = pick_map_direction(map, u);
-            (direction, map_colour(map, environment_place(map, direction)), density)
-        }
-        None => (pick_any_direction(u), emitters.background, UNIFORM),
+    let (direction, value) = match &emitters.environment {
+        Some(map) => pick_map_direction(map, u),
+        None => (pick_any_direction(u), MapValue { radiance: emitters.background, density: UNIFORM }),
     };
-    let suns = seen_suns(emitters, direction);
-    let density = emitters.environment_probability * density + suns.density;
-    pick_beyond(emitters, direction, SeenEnvironment { radiance: radiance + suns.radiance, density })
+    pick_beyond(emitters, direction, with_suns(emitters, value, direction))
 }
 
 pub(super) fn pick_sun(emitters: &Emitters, sun: &AreaLight, u: Vec2) -> LightPick {

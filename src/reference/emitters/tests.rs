@@ -275,6 +275,26 @@ fn densities_of_environments_are_whole() {
     }
 }
 
+/// Light from a map is picked in proportion to its luminance, also between a bright texel and its dark neighbours. So
+/// what a pick brings hardly varies: by as much as the sine does from row to row.
+#[test]
+fn picks_of_a_map_bring_the_same_light() {
+    let mut colours = vec![Vec3::splat(0.25); 64 * 32];
+    colours[12 * 64 + 20] = Vec3::splat(8000.0);
+    colours[20 * 64 + 63] = vec3(0.0, 500.0, 0.0);
+    let environment = Environment::new([64, 32], colours, (70.0, 1.0)).unwrap().0;
+    let world = world_with(Vec::new(), |scene| scene.environment = Some(environment.clone()));
+    let frame = frame(&world);
+    let inputs = inputs_of(&world, &frame);
+    let found: Vec<f32> = numbers(20_000)
+        .map(|u| pick_light(&inputs, Vec3::ZERO, u))
+        .map(|pick| pick.light.dot(vec3(0.2126, 0.7152, 0.0722)))
+        .collect();
+    let mean = found.iter().sum::<f32>() / found.len() as f32;
+    let worst = found.iter().map(|light| (light / mean - 1.0).abs()).fold(0.0, f32::max);
+    assert!(worst < 0.06, "one pick brings {worst} more or less");
+}
+
 #[test]
 fn picks_have_the_density_of_what_is_seen() {
     let (radiance, radius) = (Vec3::splat(3.0), 1.0);
