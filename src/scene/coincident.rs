@@ -2,7 +2,7 @@
 //!
 //! SketchUp writes a wall twice, once for each side, if both sides have a material. Each is moved to its own side, by a
 //! distance that no picture shows. Of faces with the same side, the first one in the file counts: the others become
-//! copies of it.
+//! triangles without area, which no ray hits and which emit no light.
 
 use std::{
     collections::{HashMap, HashSet},
@@ -71,8 +71,8 @@ impl Part<'_> {
 pub(super) struct Coincident {
     /// The faces that have an opposite one which looks different.
     two_sided: HashSet<FacePlace>,
-    /// Faces that are there again with the same side, each with the first of its kind.
-    repeated: Vec<(FacePlace, FacePlace)>,
+    /// Faces that are there again with the same side, without the first of each kind.
+    repeated: Vec<FacePlace>,
 }
 
 /// The place of a face: the index of its part, and its first corner there.
@@ -113,7 +113,7 @@ impl Coincident {
             self.two_sided.extend(same.iter().chain(&opposite).map(|face| face.place()));
         }
         for side in [same, opposite] {
-            self.repeated.extend(side.iter().skip(1).map(|face| (face.place(), side[0].place())));
+            self.repeated.extend(side.iter().skip(1).map(|face| face.place()));
         }
     }
 }
@@ -203,8 +203,8 @@ pub(super) struct CoincidentTriangles {
 impl CoincidentTriangles {
     /// Returns no triangles of these faces.
     pub fn new(faces: Coincident) -> Self {
-        let places = faces.repeated.iter().flat_map(|(again, first)| [*again, *first]);
-        let triangles = places.chain(faces.two_sided.iter().copied()).map(|place| (place, Vec::new())).collect();
+        let places = faces.repeated.iter().chain(&faces.two_sided);
+        let triangles = places.map(|place| (*place, Vec::new())).collect();
         Self { faces, triangles }
     }
 
@@ -223,10 +223,10 @@ impl CoincidentTriangles {
         }
     }
 
-    /// Makes copies of the first faces of their kinds, and moves opposite faces apart.
+    /// Takes the area of faces that are there again, and moves opposite faces apart.
     pub fn separate(&self, mesh: &mut Mesh) {
-        for (again, first) in &self.faces.repeated {
-            self.triangles[again].iter().zip(&self.triangles[first]).for_each(|(to, from)| copy(mesh, *from, *to));
+        for ix in self.faces.repeated.iter().flat_map(|place| &self.triangles[place]) {
+            mesh.faces[*ix] = [mesh.faces[*ix][0]; 3];
         }
         let mut to_move: Vec<usize> =
             self.faces.two_sided.iter().flat_map(|place| &self.triangles[place]).copied().collect();
@@ -246,22 +246,6 @@ pub(super) fn separate(mesh: &mut Mesh) {
     let mut found = CoincidentTriangles::new(Coincident::of(std::slice::from_ref(&part)));
     found.add((0, &part), 0, || (0..mesh.faces.len()).map(|ix| 3 * ix).collect());
     found.separate(mesh);
-}
-
-/// Makes a triangle of a mesh a copy of another one.
-fn copy(mesh: &mut Mesh, from: usize, to: usize) {
-    mesh.faces[to] = mesh.faces[from];
-    mesh.normals[to] = mesh.normals[from];
-    mesh.slots[to] = mesh.slots[from];
-    for uvs in mesh.uvs.iter_mut().filter(|uvs| !uvs.is_empty()) {
-        uvs[to] = uvs[from];
-    }
-    if !mesh.colours.is_empty() {
-        mesh.colours[to] = mesh.colours[from];
-    }
-    if !mesh.tangents.is_empty() {
-        mesh.tangents[to] = mesh.tangents[from];
-    }
 }
 
 /// Moves faces along their normals. They get points of their own.
