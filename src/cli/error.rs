@@ -2,9 +2,11 @@
 
 use std::io;
 
+#[cfg(feature = "view")]
+use kdray::view::ViewError;
 use kdray::{
     cast::RayFileError, gpu::GpuError, merge::MergeError, output::OutputError, pack::PackError, scene::SceneError,
-    util::memory::OutOfMemory, view::ViewError,
+    util::memory::OutOfMemory,
 };
 
 /// The reason why a command failed. It displays as one line.
@@ -26,6 +28,7 @@ pub enum CliError {
     Memory(#[from] OutOfMemory),
     #[error("{0}; a smaller --size, a --crop or --primary trace takes less")]
     DeviceMemory(GpuError),
+    #[cfg(feature = "view")]
     #[error("{0}")]
     Window(String),
     #[error("the validation layer reported {0} message(s)")]
@@ -47,8 +50,10 @@ impl CliError {
         match self {
             Self::Usage(_) | Self::Output(OutputError::UnknownEnding { .. }) => 2,
             Self::Scene(_) | Self::Rays(_) | Self::Merge(_) | Self::Pack(_) | Self::Memory(_) => 3,
-            Self::Device(_) | Self::DeviceMemory(_) | Self::Window(_) | Self::Validation(_) => 4,
+            Self::Device(_) | Self::DeviceMemory(_) | Self::Validation(_) => 4,
             Self::WrongHits(_) | Self::NoProcessor(_) => 4,
+            #[cfg(feature = "view")]
+            Self::Window(_) => 4,
             Self::Output(_) | Self::Stdout(_) => 5,
         }
     }
@@ -73,6 +78,7 @@ impl From<PackError> for CliError {
     }
 }
 
+#[cfg(feature = "view")]
 impl From<ViewError> for CliError {
     fn from(error: ViewError) -> Self {
         match error {

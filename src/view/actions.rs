@@ -6,6 +6,7 @@ use glam::{DVec3, UVec2, Vec3, uvec2};
 
 use super::{
     gpu_session::GpuSession,
+    in_motion::PictureKind,
     input::Action,
     message::{Message, Topic},
     pick::pick,
@@ -51,7 +52,7 @@ impl Session {
                 self.message = Some(Message::note(Topic::Settings, &format!("{axis} points up")));
             }
             Action::ChangeMotion if self.settings.options.integrator == Integrator::Path => {
-                self.settings.in_motion = self.settings.in_motion.other();
+                self.settings.in_motion = self.settings.in_motion.next();
                 let note = format!("in motion: {}", self.settings.in_motion);
                 self.message = Some(Message::note(Topic::Settings, &note));
             }
@@ -69,7 +70,7 @@ impl Session {
     /// Otherwise the save stays due, while drawing goes on and the window stays responsive.
     pub fn save_if_due(&mut self, gpu: &GpuSession, window: (u32, u32)) {
         let is_whole = |displayed: Displayed| displayed.size == window && displayed.camera == *self.controller.camera();
-        let is_at_rest = gpu.front().options().integrator == self.settings.options.integrator;
+        let is_at_rest = PictureKind::of(gpu.front().options()) == self.at_rest();
         if is_at_rest && gpu.front().displayed().is_some_and(is_whole) {
             self.save_as_it_is(gpu);
         }

@@ -1,6 +1,6 @@
 //! Chooses how large a picture may be, so that it is drawn within a time budget.
 
-use crate::frame::Integrator;
+use super::in_motion::PictureKind;
 
 /// A picture's sides are k / `N_STEPS` of the window's, where the step k is at most `N_STEPS`.
 const N_STEPS: u32 = 16;
@@ -14,13 +14,13 @@ pub const PART_MS: f64 = 100.0;
 /// Weight of the newest frame in the mean cost.
 const NEWEST: f64 = 0.4;
 
-/// Number of budgets: for each integrator, one of views that need all rays, and one of views that need primary rays
-/// only.
-pub const N_BUDGETS: usize = 4;
+/// Number of budgets: for each kind of pictures, one of views that need all rays, and one of views that need primary
+/// rays only.
+pub const N_BUDGETS: usize = 2 * PictureKind::N;
 
 /// Returns the index of a budget.
-pub fn budget_ix(integrator: Integrator, needs_primary_rays_only: bool) -> usize {
-    2 * usize::from(integrator == Integrator::Path) + usize::from(needs_primary_rays_only)
+pub fn budget_ix(kind: PictureKind, needs_primary_rays_only: bool) -> usize {
+    2 * kind as usize + usize::from(needs_primary_rays_only)
 }
 
 /// Chooses the size of pictures that are drawn while the camera moves.

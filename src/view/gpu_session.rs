@@ -5,6 +5,7 @@ use std::sync::Arc;
 use egui::TexturesDelta;
 
 use super::{
+    in_motion::PictureKind,
     loaded_scene::LoadedScene,
     overlay::{Overlay, OverlayFrame},
 };
@@ -23,7 +24,7 @@ pub struct GpuSession {
     /// Choices made for the scene with which the device was opened.
     pub choices: Choices,
     present: Present,
-    /// The renderer of the other integrator, with its pass. It keeps its pipelines and buffers while it is not used.
+    /// The renderer of the other kind of pictures, with its pass. It keeps its pipelines and buffers while it is not used.
     other: Option<(Renderer, Present)>,
     /// Whether the picture of the other renderer is shown, since `renderer` has not drawn any since it was changed to.
     shows_other: bool,
@@ -58,14 +59,14 @@ impl GpuSession {
         Ok(Self { renderer, choices, present, other, shows_other, overlay, presenter, context })
     }
 
-    /// Changes to the renderer of another integrator. It is made at the first change; from then on, both are kept. The
-    /// picture of the previous one stays on screen until the other one has drawn a picture. `options` have the
-    /// integrator, and a size for which the buffers are made.
+    /// Changes to the renderer of another kind of pictures. It is made at the first change; from then on, both are kept.
+    /// The picture of the previous one stays on screen until the other one has drawn a picture. `options` are of that
+    /// kind, and have a size for which the buffers are made.
     ///
     /// # Errors
     /// The buffers exceed the device's memory. Then nothing has changed.
     pub fn change_to(&mut self, options: &RenderOptions) -> Result<(), GpuError> {
-        let is_of = |renderer: &Renderer| renderer.options().integrator == options.integrator;
+        let is_of = |renderer: &Renderer| PictureKind::of(renderer.options()) == PictureKind::of(options);
         let (renderer, present) = match self.other.take_if(|(renderer, _)| is_of(renderer)) {
             Some(other) => other,
             None => {

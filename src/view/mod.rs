@@ -10,6 +10,7 @@ mod error;
 pub mod flight;
 mod gpu_session;
 pub mod history;
+mod in_motion;
 mod input;
 pub mod loaded_scene;
 mod message;
@@ -32,8 +33,9 @@ pub mod watch;
 pub use self::{
     display::{Display, PaceReport, ViewOptions, ViewReport},
     error::ViewError,
+    in_motion::InMotion,
     loaded_scene::{LoadOptions, LoadedScene},
     opened::{Opened, Opener},
-    panel::{InMotion, Settings},
+    panel::Settings,
     tour::Tour,
 };

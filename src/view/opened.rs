@@ -61,7 +61,7 @@ impl Session {
         self.profile = Profile::default();
         // The times and the buffers of the previous scene say nothing about this one.
         self.budgets = [(); N_BUDGETS].map(|()| Budget::new(self.settings.budget_ms));
-        self.rooms = [(0, 0); 2];
+        self.rooms = Default::default();
         self.pace.moved(Instant::now());
         self.clear_message(Topic::Scene);
         true

@@ -7,16 +7,17 @@ use super::{
     controller::Controller,
     gpu_session::GpuSession,
     history::{FrameRecord, History},
+    in_motion::{InMotion, PictureKind},
     loaded_scene::LoadedScene,
     message::{Message, Topic},
     pace::Pace,
-    panel::{Facts, InMotion, Settings},
+    panel::{Facts, Settings},
     pick::Picked,
     saver::Saver,
 };
 use crate::{
     accel::Statistics,
-    frame::{Integrator, Profile, RenderOptions, View},
+    frame::{Denoise, Profile, RenderOptions, View},
     gpu::GpuError,
     layout::Feature,
     scene::RenderDefaults,
@@ -59,11 +60,11 @@ pub struct Session {
     is_moving: bool,
     /// Whether the last frame completed a sample.
     has_new_sample: bool,
-    /// The integrator that draws now.
-    drawing: Integrator,
-    /// Maximum width and maximum height of all pictures so far, pixels. The buffers of the renderers, by
-    /// [`Integrator`], are large enough for them.
-    pub(super) rooms: [(u32, u32); 2],
+    /// The kind of the pictures that are drawn now.
+    drawing: PictureKind,
+    /// For each [`PictureKind`], maximum width and maximum height of all pictures so far, pixels. The buffers of the
+    /// kind's renderer are large enough for them.
+    pub(super) rooms: [(u32, u32); PictureKind::N],
     /// Size of the window for which the last frame was drawn, pixels.
     window: (u32, u32),
     /// Time spent so far on the sample that is being drawn, milliseconds.
@@ -92,7 +93,7 @@ impl Session {
         Self {
             controller: Controller::new(loaded.scene().camera, loaded.bounds()),
             budgets: [(); N_BUDGETS].map(|()| Budget::new(settings.budget_ms)),
-            drawing: settings.options.integrator,
+            drawing: PictureKind::of(&settings.options),
             loaded,
             settings,
             pace: Pace::default(),
@@ -103,7 +104,7 @@ impl Session {
             is_moving: false,
             has_new_sample: false,
             sample_ms: 0.0,
-            rooms: [(0, 0); 2],
+            rooms: Default::default(),
             window: (0, 0),
             picked: None,
             pointed: None,
@@ -123,7 +124,7 @@ impl Session {
             || self.controller.flight.is_under_way()
             || self.pace.is_moving(now)
             || self.is_learning()
-            || options.integrator != self.settings.options.integrator // the picture at rest is due
+            || PictureKind::of(options) != self.at_rest() // the picture at rest is due
             || self.has_new_sample // the overlay shows its figures a frame later
             || !self.is_done(gpu)
     }
@@ -133,22 +134,32 @@ impl Session {
         self.is_interactive && self.budgets[self.budget_ix(self.in_motion())].full_ms().is_none()
     }
 
-    /// Returns the integrator of pictures while the camera moves. Views other than the picture show the numbers of the
-    /// picture's own integrator.
-    fn in_motion(&self) -> Integrator {
+    /// Returns the kind of the picture at rest.
+    pub(super) fn at_rest(&self) -> PictureKind {
+        PictureKind::of(&self.settings.options)
+    }
+
+    /// Returns the kind of pictures while the camera moves. Views other than the picture show the numbers of the
+    /// picture at rest.
+    fn in_motion(&self) -> PictureKind {
         match self.settings.view {
-            View::Picture => self.settings.in_motion.integrator(self.settings.options.integrator),
-            _ => self.settings.options.integrator,
+            View::Picture => self.settings.in_motion.kind(&self.settings.options),
+            _ => self.at_rest(),
         }
     }
 
-    /// Returns the options of a picture of the window's size by an integrator.
-    fn whole(&self, integrator: Integrator, (width, height): (u32, u32)) -> RenderOptions {
+    /// Returns the options of a picture of the window's size, of a kind that is drawn at rest or in motion.
+    fn whole(&self, kind: PictureKind, (width, height): (u32, u32)) -> RenderOptions {
         let features = self.settings.view != View::Picture;
         let at_rest = &self.settings.options;
         let whole = RenderOptions { width, height, features, ..at_rest.clone() };
-        if integrator == at_rest.integrator {
+        let integrator = kind.integrator();
+        if kind == self.at_rest() {
             return whole;
+        }
+        if integrator == at_rest.integrator {
+            let denoise = if kind == PictureKind::FilteredPath { Denoise::Edge } else { Denoise::Off };
+            return RenderOptions { denoise, ..whole };
         }
         // What differs between integrators is what the scene states for this one.
         let RenderDefaults { max_depth, denoise, .. } = self.loaded.scene().defaults.for_integrator(Some(integrator));
@@ -168,9 +179,9 @@ impl Session {
         if needs_one { 1 } else { self.settings.max_samples }
     }
 
-    /// Returns the index of the budget of the current view by an integrator.
-    fn budget_ix(&self, integrator: Integrator) -> usize {
-        budget_ix(integrator, self.settings.view.needs_primary_rays_only())
+    /// Returns the index of the budget of the current view in pictures of a kind.
+    fn budget_ix(&self, kind: PictureKind) -> usize {
+        budget_ix(kind, self.settings.view.needs_primary_rays_only())
     }
 
     /// Returns the budget of what is drawn now.
@@ -199,7 +210,7 @@ impl Session {
         gpu.presenter.set_vsync(self.settings.vsync);
         self.budgets.iter_mut().for_each(|budget| budget.set_budget(self.settings.budget_ms));
         self.fit_window(gpu, window)?;
-        self.drawing = gpu.renderer.options().integrator;
+        self.drawing = PictureKind::of(gpu.renderer.options());
         let whole = self.whole(self.drawing, window);
         let (view, brightest) = self.view();
         let is_other_view = gpu.renderer.set_view(view, brightest);
@@ -215,9 +226,9 @@ impl Session {
         }
         let is_moving = self.pace.is_moving(now) || self.is_learning();
         self.is_moving = self.pace.is_moving(now);
-        let integrator = if is_moving { self.in_motion() } else { self.settings.options.integrator };
-        let whole = self.whole(integrator, window);
-        let is_changed = integrator != gpu.renderer.options().integrator;
+        let kind = if is_moving { self.in_motion() } else { self.at_rest() };
+        let whole = self.whole(kind, window);
+        let is_changed = kind != self.drawing;
         if is_changed {
             self.change_to(gpu, &whole)?;
         }
@@ -256,28 +267,26 @@ impl Session {
         Ok(())
     }
 
-    /// Changes to the renderer of another integrator. If the device refuses it, the one that is used stays.
+    /// Changes to the renderer of another kind of pictures. If the device refuses it, the one that is used stays.
     fn change_to(&mut self, gpu: &mut GpuSession, whole: &RenderOptions) -> Result<(), GpuError> {
         match gpu.change_to(whole) {
             Ok(()) => {
-                self.drawing = whole.integrator;
+                self.drawing = PictureKind::of(whole);
                 let (view, brightest) = self.view();
                 gpu.renderer.set_view(view, brightest);
                 Ok(())
             }
             Err(error) => {
-                // Neither integrator takes the place of the other any more.
+                // No other picture takes the place of the one at rest any more.
                 self.settings.in_motion = InMotion::Path;
                 self.take_back(gpu, error)
             }
         }
     }
 
-    /// Returns whether the picture in motion is by another integrator than the one at rest, so that both renderers are
-    /// kept.
+    /// Returns whether the picture in motion is of another kind than the one at rest, so that both renderers are kept.
     fn keeps_both(&self) -> bool {
-        let at_rest = self.settings.options.integrator;
-        self.settings.in_motion.integrator(at_rest) != at_rest
+        self.settings.in_motion.kind(&self.settings.options) != self.at_rest()
     }
 
     /// Adapts the budgets if the window's size has changed.
@@ -297,7 +306,7 @@ impl Session {
     /// picture's size to `rooms`, since the caller enlarges the buffers if they are too small.
     fn has_room(&mut self, gpu: &GpuSession, whole: &RenderOptions) -> bool {
         let now = gpu.renderer.options();
-        let room = &mut self.rooms[usize::from(whole.integrator == Integrator::Path)];
+        let room = &mut self.rooms[PictureKind::of(whole) as usize];
         let has_room = whole.width <= room.0 && whole.height <= room.1;
         *room = (room.0.max(whole.width), room.1.max(whole.height));
         let filter = |options: &RenderOptions| std::mem::discriminant(&options.noise_filter());
@@ -345,7 +354,7 @@ impl Session {
         if error.is_device_lost() {
             return Err(error);
         }
-        if gpu.renderer.options().integrator == self.settings.options.integrator || !self.keeps_both() {
+        if PictureKind::of(gpu.renderer.options()) == self.at_rest() || !self.keeps_both() {
             self.settings.options = gpu.renderer.options().clone();
         } else {
             self.settings.in_motion = InMotion::Path;

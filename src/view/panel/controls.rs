@@ -4,12 +4,12 @@ use std::fmt::Display;
 
 use egui::{ComboBox, DragValue, Grid, Slider, SliderClamping, Ui};
 
-use super::{InMotion, Settings};
+use super::Settings;
 use crate::{
     accel::{AccelKind, kdtree::Traversal},
     frame::{Denoise, Integrator, Primary, Tonemap, View},
     scene::Projection,
-    view::controller::FOV_DEGREES,
+    view::{InMotion, controller::FOV_DEGREES},
 };
 
 /// Shows the controls. Changes take effect with the next frame. `accel` is the structure in use: only a kd-tree has a

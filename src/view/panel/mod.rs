@@ -12,12 +12,13 @@ use egui::{Align2, Area, Color32, CornerRadius, Frame, Id, Margin, RichText, Scr
 
 use super::{
     history::{History, Percentiles},
+    in_motion::InMotion,
     loaded_scene::LoadedScene,
     message::Message,
     pick::Picked,
 };
 use crate::{
-    frame::{Integrator, Profile, RenderOptions, View},
+    frame::{Profile, RenderOptions, View},
     gpu::MemoryUse,
     layout::Feature,
     scene::Projection,
@@ -43,39 +44,6 @@ pub struct Settings {
     pub view: View,
     /// Factor on the brightness of the views depth, cost and rays.
     pub gain: f32,
-}
-
-/// The picture that is drawn while the camera moves.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum InMotion {
-    /// The picture of [`Integrator::Whitted`], with ambient light in place of light that only paths show.
-    #[default]
-    Whitted,
-    /// The picture at rest with one sample a pixel.
-    Path,
-}
-
-named_enum!(InMotion {
-    Whitted = "whitted": "quick pictures without noise, with ambient light in place of light that only paths show",
-    Path = "path": "the picture at rest with one sample a pixel",
-});
-
-impl InMotion {
-    /// Returns the other picture.
-    pub fn other(self) -> Self {
-        match self {
-            Self::Whitted => Self::Path,
-            Self::Path => Self::Whitted,
-        }
-    }
-
-    /// Returns the integrator in motion. `at_rest`: the one at rest.
-    pub fn integrator(self, at_rest: Integrator) -> Integrator {
-        match self {
-            Self::Whitted => Integrator::Whitted,
-            Self::Path => at_rest,
-        }
-    }
 }
 
 /// What the panel's controls change.
