@@ -24,7 +24,8 @@ pub struct GpuSession {
     /// Choices made for the scene with which the device was opened.
     pub choices: Choices,
     present: Present,
-    /// The renderer of the other kind of pictures, with its pass. It keeps its pipelines and buffers while it is not used.
+    /// The renderer of the other kind of pictures, with its pass. It keeps its pipelines and buffers while it is not
+    /// used.
     other: Option<(Renderer, Present)>,
     /// Whether the picture of the other renderer is shown, since `renderer` has not drawn any since it was changed to.
     shows_other: bool,
@@ -59,8 +60,8 @@ impl GpuSession {
         Ok(Self { renderer, choices, present, other, shows_other, overlay, presenter, context })
     }
 
-    /// Changes to the renderer of another kind of pictures. It is made at the first change; from then on, both are kept.
-    /// The picture of the previous one stays on screen until the other one has drawn a picture. `options` are of that
+    /// Changes to the renderer of another kind of pictures. It is made at the first change; from then on, both are
+    /// kept. The picture of the previous one stays on screen until the other one has drawn a picture. `options` are of that
     /// kind, and have a size for which the buffers are made.
     ///
     /// # Errors
