@@ -61,8 +61,8 @@ impl GpuSession {
     }
 
     /// Changes to the renderer of another kind of pictures. It is made at the first change; from then on, both are
-    /// kept. The picture of the previous one stays on screen until the other one has drawn a picture. `options` are of that
-    /// kind, and have a size for which the buffers are made.
+    /// kept. The picture of the previous one stays on screen until the other one has drawn a picture. `options` are of
+    /// that kind, and have a size for which the buffers are made.
     ///
     /// # Errors
     /// The buffers exceed the device's memory. Then nothing has changed.
