@@ -5,6 +5,8 @@
 //! render   the frame, batch by batch, in the order of its plan
 //!   queue    the rays of a batch
 //!   paths    the passes of a batch of paths
+//!     path_begin, path_scatter   passes whose random numbers are those of `sampler`
+//!     sampler  the random numbers of sixteen paths
 //!   timing   wall-clock times of passes
 //! meter    the exposure of a scene whose light has physical units
 //! trace    the reference's passes that trace rays, with the tracer of this folder
@@ -20,9 +22,12 @@ pub mod octant_bins;
 pub mod packet;
 pub mod packet_traverser;
 pub mod packet_triangle;
+mod path_begin;
+mod path_scatter;
 mod paths;
 mod queue;
 mod render;
+mod sampler;
 pub mod soa;
 mod timing;
 mod trace;

@@ -2,16 +2,20 @@
 
 use bytemuck::Zeroable;
 
-use super::{queue::Queue, tracer::FastTracer};
+use super::{
+    path_begin::{PixelOfBatch, path_begin, pixels_of_batch},
+    path_scatter::path_scatter,
+    queue::Queue,
+    tracer::FastTracer,
+};
 use crate::{
     accel::kdtree::Traversal,
     layout::{Batch, Bounce, Frame, Hit, PathRay, PathState, SCAN_GROUP_SIZE, Segment},
     reference::{
         inputs::KernelInputs,
-        path_begin::path_begin,
         path_compact,
         path_layers::path_layers,
-        path_scatter::{PathBuffers, path_scatter},
+        path_scatter::PathBuffers,
         path_trace::{closest_hits_by, segments_by},
     },
 };
@@ -20,6 +24,7 @@ use crate::{
 /// number of paths.
 #[derive(Default)]
 pub struct Paths {
+    pixels: Vec<PixelOfBatch>,
     pub states: Vec<PathState>,
     segments: Vec<Segment>,
     /// The radiance of each path when the last layer of light was complete.
@@ -40,7 +45,8 @@ impl Paths {
         self.segments.clear();
         self.segments.resize(n, Segment::zeroed());
         self.live[0] = (0..n_paths).collect();
-        path_begin(inputs, batch, &mut queue.rays);
+        self.pixels = pixels_of_batch(inputs, batch);
+        path_begin(inputs, batch, &self.pixels, &mut queue.rays);
     }
 
     /// Finds the hits of the paths that are alive, and tests the segments of the bounce before. Returns the numbers of
@@ -62,7 +68,7 @@ impl Paths {
         queue.scan_blocks.resize(live.len().div_ceil(SCAN_GROUP_SIZE as usize), 0);
         let Queue { rays, hits, child_kinds, scan_blocks, .. } = queue;
         let paths = PathBuffers { rays, states: &mut self.states, segments: &mut self.segments };
-        path_scatter(inputs, batch, (live, hits), paths, (child_kinds, scan_blocks));
+        path_scatter(inputs, (batch, &self.pixels), (live, hits), paths, (child_kinds, scan_blocks));
     }
 
     /// Adds up the layer of light that is complete after the batch's bounce.

@@ -50,7 +50,7 @@ pub fn is_smooth(material: &Material) -> bool {
     }
     let has_lambert = material.kd.max_element() * (1.0 - material.metallic) * (1.0 - material.transmission) > 0.0;
     let has_rough_coat = has_clearcoat(material) && clearcoat_roughness(material) > 0.0;
-    interface_width(material) == 0.0 && !has_lambert && !has_rough_coat && !has_sheen(material)
+    !has_lambert && !has_rough_coat && !has_sheen(material) && interface_width(material) == 0.0
 }
 
 /// Reflectance of the metal where the light's angle to the microfacet's normal has this cosine.
