@@ -5,8 +5,10 @@
 //! render   the frame, batch by batch, in the order of its plan
 //!   queue    the rays of a batch
 //!   paths    the passes of a batch of paths
-//!     path_begin, path_scatter   passes whose random numbers are those of `sampler`
-//!     sampler  the random numbers of sixteen paths
+//!     path_begin, path_scatter   the rays of paths, and their steps at hits
+//!       sampler                  the random numbers of sixteen paths
+//!       matt, area_lights        the steps of sixteen paths at matt surfaces
+//!       vec3x16                  sixteen vectors
 //!   timing   wall-clock times of passes
 //! meter    the exposure of a scene whose light has physical units
 //! trace    the reference's passes that trace rays, with the tracer of this folder
@@ -16,7 +18,9 @@
 //!     packet, packet_triangle, packet_traverser   trace sixteen rays through the tree together
 //! ```
 
+mod area_lights;
 pub mod lanes;
+mod matt;
 mod meter;
 pub mod octant_bins;
 pub mod packet;
@@ -32,6 +36,7 @@ pub mod soa;
 mod timing;
 mod trace;
 pub mod tracer;
+mod vec3x16;
 
 pub use self::{
     meter::metered_exposure,

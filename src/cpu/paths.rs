@@ -1,10 +1,12 @@
 //! The passes of a batch of paths, with the buffers of the paths.
 
 use bytemuck::Zeroable;
+use fearless_simd::Level;
 
 use super::{
+    matt::matt_materials,
     path_begin::{PixelOfBatch, path_begin, pixels_of_batch},
-    path_scatter::path_scatter,
+    path_scatter::{BounceOfPaths, path_scatter},
     queue::Queue,
     tracer::FastTracer,
 };
@@ -25,6 +27,8 @@ use crate::{
 #[derive(Default)]
 pub struct Paths {
     pixels: Vec<PixelOfBatch>,
+    /// Whether each material is matt.
+    are_matt: Vec<bool>,
     pub states: Vec<PathState>,
     segments: Vec<Segment>,
     /// The radiance of each path when the last layer of light was complete.
@@ -68,7 +72,12 @@ impl Paths {
         queue.scan_blocks.resize(live.len().div_ceil(SCAN_GROUP_SIZE as usize), 0);
         let Queue { rays, hits, child_kinds, scan_blocks, .. } = queue;
         let paths = PathBuffers { rays, states: &mut self.states, segments: &mut self.segments };
-        path_scatter(inputs, (batch, &self.pixels), (live, hits), paths, (child_kinds, scan_blocks));
+        if batch.depth == 0 {
+            self.are_matt = matt_materials(inputs);
+        }
+        let (pixels, are_matt) = (&self.pixels, &self.are_matt);
+        let bounce = BounceOfPaths { inputs, batch, pixels, are_matt, hits, level: Level::new() };
+        path_scatter(&bounce, live, paths, (child_kinds, scan_blocks));
     }
 
     /// Adds up the layer of light that is complete after the batch's bounce.

@@ -61,7 +61,18 @@ impl LogWidth<'_> {
     }
 }
 
-impl TextureHit<'_> {
+impl<'a> TextureHit<'a> {
+    fn new(
+        inputs: &KernelInputs<'a>,
+        textures: &'a Textures,
+        (ray, hit): (&'a PathRay, &'a Hit),
+        geometric: Vec3,
+    ) -> Self {
+        let t = &inputs.triangles[hit.triangle_ix as usize];
+        let log_width = LogWidth { cell: OnceCell::new(), frame: inputs.frame(), ray, hit, t, geometric };
+        Self { textures, triangle_ix: hit.triangle_ix, u: hit.u, v: hit.v, log_width }
+    }
+
     /// The level of a texture whose texels are as large as the cone on the surface.
     fn level_of(&self, map: &Texture) -> f32 {
         let [a, b, c] = self.textures.uvs_of(self.triangle_ix, uv_set_of(map));
@@ -119,12 +130,18 @@ impl TextureHit<'_> {
         if squared > LEAST_NORMAL_SQUARED { front * bent * (1.0 / squared.sqrt()) } else { surface.interpolated }
     }
 
+    /// The colour by which textures and the colours of the triangle's corners multiply the material's, and both of these
+    /// with their opacity.
+    fn base_colour(&self, maps: &MaterialMaps) -> (Vec3, Vec4, Vec4) {
+        let corner_colour = self.textures.corner_colour_at(self.triangle_ix, self.u, self.v);
+        let map_colour = if maps.base_colour == NO_TEXTURE { Vec4::ONE } else { self.map_at(maps.base_colour) };
+        (corner_colour.truncate() * map_colour.truncate().max(Vec3::ZERO), corner_colour, map_colour)
+    }
+
     /// Multiplies the material's terms by its textures and by the colours of the triangle's corners. Values that make
     /// no sense are bounded.
     fn apply_maps(&self, maps: &MaterialMaps, material: &mut Material) {
-        let corner_colour = self.textures.corner_colour_at(self.triangle_ix, self.u, self.v);
-        let map_colour = if maps.base_colour == NO_TEXTURE { Vec4::ONE } else { self.map_at(maps.base_colour) };
-        let base = corner_colour.truncate() * map_colour.truncate().max(Vec3::ZERO);
+        let (base, corner_colour, map_colour) = self.base_colour(maps);
         material.kd *= base;
         if maps.flags & MAPS_CUTOUT == 0 {
             if maps.flags & MAPS_CORNERS_HAVE_OPACITY != 0 {
@@ -178,11 +195,20 @@ pub fn shaded_at(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> (Surface, M
     let mut material = inputs.materials[material_ix];
     if let Some(textures) = inputs.textures {
         let maps = &textures.material_maps[material_ix];
-        let (frame, geometric) = (inputs.frame(), surface.geometric);
-        let log_width = LogWidth { cell: OnceCell::new(), frame, ray, hit, t, geometric };
-        let at = TextureHit { textures, triangle_ix: hit.triangle_ix, u: hit.u, v: hit.v, log_width };
+        let at = TextureHit::new(inputs, textures, (ray, hit), surface.geometric);
         at.apply_maps(maps, &mut material);
         surface.shading = at.mapped_normal(maps, &surface);
     }
     (surface, material)
+}
+
+/// Returns the diffuse colour of the material that [`shaded_at`] returns. `geometric`: of the surface.
+///
+/// # Panics
+/// Nothing was hit.
+pub fn colour_at(inputs: &KernelInputs, ray: &PathRay, hit: &Hit, geometric: Vec3) -> Vec3 {
+    let material_ix = inputs.triangle_materials[hit.triangle_ix as usize] as usize;
+    let kd = inputs.materials[material_ix].kd;
+    let Some(textures) = inputs.textures else { return kd };
+    kd * TextureHit::new(inputs, textures, (ray, hit), geometric).base_colour(&textures.material_maps[material_ix]).0
 }
