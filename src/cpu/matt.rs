@@ -54,10 +54,8 @@ fn stays_matt(textures: Option<&Textures>, material_ix: usize) -> bool {
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(64))]
 pub struct MattHits {
-    origin: Vec3sSoa,
     direction: Vec3sSoa,
     throughput: Vec3sSoa,
-    t: [f32; LANES],
     u: [f32; LANES],
     v: [f32; LANES],
     corners: [Vec3sSoa; 3],
@@ -80,8 +78,6 @@ pub struct MattSurfaces {
     tangent: Vec3sSoa,
     bitangent: Vec3sSoa,
     clearance: [f32; LANES],
-    /// The paths whose rays meet a light before the surface. They have no step here.
-    pub before_light: LaneMask,
 }
 
 /// The lights that are picked.
@@ -113,10 +109,9 @@ pub struct MattSteps {
 impl MattHits {
     #[inline(always)]
     pub fn set(&mut self, lane: usize, ray: &PathRay, hit: &Hit, triangle: &Triangle) {
-        set(&mut self.origin, lane, ray.origin);
         set(&mut self.direction, lane, ray.direction);
         set(&mut self.throughput, lane, ray.throughput);
-        (self.t[lane], self.u[lane], self.v[lane]) = (hit.t, hit.u, hit.v);
+        (self.u[lane], self.v[lane]) = (hit.u, hit.v);
         for (corners, v) in self.corners.iter_mut().zip([triangle.v0, triangle.v1, triangle.v2]) {
             set(corners, lane, v);
         }
@@ -209,9 +204,9 @@ fn interpolated<S: Simd>(hits: &MattHits, outward: Vec3x16<S>, [u, v]: [f32x16<S
     Vec3x16::select(is_smooth, n * (1.0 / squared.sqrt()), outward)
 }
 
-/// Returns the surfaces, as `surface_at` and `frame_around` do. `shapes`: the area lights.
+/// Returns the surfaces, as `surface_at` and `frame_around` do.
 #[inline(always)]
-pub fn matt_surfaces<S: Simd>(simd: S, hits: &MattHits, shapes: &[AreaLight]) -> MattSurfaces {
+pub fn matt_surfaces<S: Simd>(simd: S, hits: &MattHits) -> MattSurfaces {
     let [v0, v1, v2] =
         [&hits.corners[0], &hits.corners[1], &hits.corners[2]].map(|corners| Vec3x16::load(simd, corners));
     let (u, v) = (f32x16::load_array_ref(simd, &hits.u), f32x16::load_array_ref(simd, &hits.v));
@@ -236,11 +231,6 @@ pub fn matt_surfaces<S: Simd>(simd: S, hits: &MattHits, shapes: &[AreaLight]) ->
         normal = Vec3x16::select(is_behind, geometric, shading);
     }
     let point_world = at_v0 + at_v1 + at_v2;
-    let t = f32x16::load_array_ref(simd, &hits.t);
-    let before_light = match shapes {
-        [] => 0,
-        _ => meets_light(shapes, Vec3x16::load(simd, &hits.origin), direction, t).to_bitmask() as LaneMask,
-    };
     let (tangent, bitangent) = axes_around(normal);
     MattSurfaces {
         point_world: point_world.to_arrays(),
@@ -249,7 +239,6 @@ pub fn matt_surfaces<S: Simd>(simd: S, hits: &MattHits, shapes: &[AreaLight]) ->
         tangent: tangent.to_arrays(),
         bitangent: bitangent.to_arrays(),
         clearance: (magnitude.dot(geometric.abs()) * SURFACE_CLEARANCE).to_array(),
-        before_light,
     }
 }
 

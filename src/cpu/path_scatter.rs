@@ -2,26 +2,30 @@
 //! random numbers of sixteen paths are computed together, and so are the steps of paths at [matt](super::matt) surfaces.
 
 use arrayvec::ArrayVec;
-use fearless_simd::{Level, dispatch};
+use fearless_simd::{Level, dispatch, f32x16, prelude::*};
 use glam::{Vec2, vec2, vec3};
 use rayon::prelude::*;
 
 use super::{
-    lanes::LANES,
+    area_lights::meets_light,
+    lanes::{LANES, LaneMask},
     matt::{BounceConstants, MattHits, Picks, matt_steps, matt_surfaces},
     path_begin::PixelOfBatch,
     sampler::{KeysSoa, PairsSoa, random_pairs},
+    soa::RaysSoa,
+    vec3x16::Vec3x16,
 };
 use crate::{
-    layout::{Batch, Hit, NO_TRIANGLE, PathRay, PathState, SCAN_GROUP_SIZE, SEGMENT_NONE, Segment},
+    layout::{AreaLight, Batch, Hit, NO_TRIANGLE, PathRay, PathState, SCAN_GROUP_SIZE, SEGMENT_NONE, Segment},
     reference::{
         emitters::pick_emitter,
         inputs::KernelInputs,
         live_paths::{Part, parts},
         maps::colour_at,
         path_scatter::PathBuffers,
-        path_vertex::{PAIRS_OF_HIT, first_pair_of, pairs_of_hit, step_path},
+        path_vertex::{PAIRS_OF_HIT, first_pair_of, step_past_lights, step_path},
         sampler::SampleKey,
+        search_ray::SearchRay,
     },
 };
 
@@ -72,25 +76,29 @@ pub fn path_scatter(
 impl BounceOfPaths<'_> {
     /// Takes the paths of a block one step further. Writes to `kinds` which of them go on.
     fn step_block(&self, live: &[u32], kinds: &mut [u32], paths: &mut PathsOfBlock) {
-        let (mut at_matt, mut others) = (ArrayVec::<_, BLOCK_SIZE>::new(), ArrayVec::<_, BLOCK_SIZE>::new());
+        let mut at_matt = ArrayVec::<_, BLOCK_SIZE>::new();
+        let (mut at_others, mut missed) = (at_matt.clone(), at_matt.clone());
         for (place, &path_ix) in live.iter().enumerate() {
             let hit = &self.hits[path_ix as usize];
-            if hit.triangle_ix == NO_TRIANGLE {
-                kinds[place] = self.step(path_ix, || pairs_of_hit(self.key_of(path_ix), self.batch.depth), paths);
+            let list = if hit.triangle_ix == NO_TRIANGLE {
+                &mut missed
             } else if self.is_matt(hit) {
-                at_matt.push((place, path_ix));
+                &mut at_matt
             } else {
-                others.push((place, path_ix));
-            }
+                &mut at_others
+            };
+            list.push((place, path_ix));
         }
         for group in at_matt.chunks(LANES) {
             if group.len() < LEAST_GROUP {
-                self.step_group(group, kinds, paths)
+                self.step_group(group, &self.pairs_of(group), kinds, paths)
             } else {
                 self.step_matt(group, kinds, paths)
             }
         }
-        others.chunks(LANES).for_each(|group| self.step_group(group, kinds, paths));
+        at_others.chunks(LANES).for_each(|group| self.step_group(group, &self.pairs_of(group), kinds, paths));
+        // Paths that leave the scene need no random numbers.
+        missed.chunks(LANES).for_each(|group| self.step_group(group, &Default::default(), kinds, paths));
     }
 
     fn is_matt(&self, hit: &Hit) -> bool {
@@ -101,11 +109,38 @@ impl BounceOfPaths<'_> {
         self.pixels[(path_ix % self.batch.n_pixels) as usize].key_of_path(self.batch, path_ix)
     }
 
+    /// Returns the area lights.
+    fn shapes(&self) -> &[AreaLight] {
+        self.inputs.emitters.map_or(&[], |emitters| emitters.shapes())
+    }
+
+    /// Returns the paths of a group whose rays meet an area light before their hits.
+    fn before_lights(&self, group: &[(usize, u32)], paths: &mut PathsOfBlock) -> LaneMask {
+        let shapes = self.shapes();
+        if shapes.is_empty() {
+            return 0;
+        }
+        let mut rays = RaysSoa::default();
+        for (lane, &(_, path_ix)) in group.iter().enumerate() {
+            let hit = &self.hits[path_ix as usize];
+            let t_max = if hit.triangle_ix == NO_TRIANGLE { f32::INFINITY } else { hit.t };
+            rays.set(lane, &SearchRay { t_max, ..SearchRay::from(&*paths.rays.of_path(path_ix)) });
+        }
+        dispatch!(self.level, simd => {
+            let (origin, direction) = (Vec3x16::load(simd, &rays.origin), Vec3x16::load(simd, &rays.direction));
+            let t_max = f32x16::load_array_ref(simd, &rays.t_max);
+            meets_light(shapes, origin, direction, t_max).to_bitmask() as LaneMask
+        })
+    }
+
     /// Takes a path one step further. Returns 1 if it goes on, otherwise 0.
-    fn step(&self, path_ix: u32, pairs: impl FnOnce() -> [Vec2; PAIRS_OF_HIT], paths: &mut PathsOfBlock) -> u32 {
+    fn step(&self, path_ix: u32, before_light: bool, pairs: [Vec2; PAIRS_OF_HIT], paths: &mut PathsOfBlock) -> u32 {
         let (ray, state) = (paths.rays.of_path(path_ix), paths.states.of_path(path_ix));
-        let hit = &self.hits[path_ix as usize];
-        let (goes_on, segment) = step_path(self.inputs, pairs, self.batch.depth, hit, ray, state);
+        let (inputs, depth, hit) = (self.inputs, self.batch.depth, &self.hits[path_ix as usize]);
+        let (goes_on, segment) = match before_light {
+            true => step_path(inputs, || pairs, depth, hit, ray, state),
+            false => step_past_lights(inputs, || pairs, depth, hit, ray, state),
+        };
         // A path without a segment has none already.
         if segment.state != SEGMENT_NONE {
             *paths.segments.of_path(path_ix) = segment;
@@ -123,49 +158,53 @@ impl BounceOfPaths<'_> {
     }
 
     /// Takes a group of paths one step further, one after the other.
-    fn step_group(&self, group: &[(usize, u32)], kinds: &mut [u32], paths: &mut PathsOfBlock) {
-        let pairs = self.pairs_of(group);
+    fn step_group(
+        &self,
+        group: &[(usize, u32)],
+        pairs: &[PairsSoa; PAIRS_OF_HIT],
+        kinds: &mut [u32],
+        paths: &mut PathsOfBlock,
+    ) {
+        let before_lights = self.before_lights(group, paths);
         for (lane, &(place, path_ix)) in group.iter().enumerate() {
-            kinds[place] = self.step(path_ix, || pairs_of_lane(&pairs, lane), paths);
+            kinds[place] = self.step(path_ix, before_lights >> lane & 1 == 1, pairs_of_lane(pairs, lane), paths);
         }
     }
 
-    /// Takes a group of paths at matt surfaces one step further.
+    /// Takes a group of paths at matt surfaces one step further. Those that meet a light are stepped as all others.
     fn step_matt(&self, group: &[(usize, u32)], kinds: &mut [u32], paths: &mut PathsOfBlock) {
         let (inputs, frame, depth) = (self.inputs, self.inputs.frame(), self.batch.depth);
-        let shapes = inputs.emitters.map_or(&[][..], |emitters| emitters.shapes());
-        let is_last = depth + 1 >= frame.max_depth;
-        if is_last && shapes.is_empty() {
-            return group.iter().for_each(|&(place, _)| kinds[place] = 0);
+        // The last ray of a path only meets light.
+        if depth + 1 >= frame.max_depth {
+            return self.step_group(group, &Default::default(), kinds, paths);
         }
         let mut hits = MattHits::default();
         for (lane, &(_, path_ix)) in group.iter().enumerate() {
             let hit = &self.hits[path_ix as usize];
             hits.set(lane, paths.rays.of_path(path_ix), hit, &inputs.triangles[hit.triangle_ix as usize]);
         }
-        let surfaces = dispatch!(self.level, simd => matt_surfaces(simd, &hits, shapes));
+        let surfaces = dispatch!(self.level, simd => matt_surfaces(simd, &hits));
         let pairs = self.pairs_of(group);
         let mut picks = Picks::default();
-        if !is_last {
-            for (lane, &(_, path_ix)) in group.iter().enumerate() {
-                let (ray, hit) = (paths.rays.of_path(path_ix), &self.hits[path_ix as usize]);
-                hits.set_colour(lane, colour_at(inputs, ray, hit, surfaces.geometric(lane)));
-                let [to_light, choices, ..] = pairs_of_lane(&pairs, lane);
-                let u = vec3(to_light.x, to_light.y, choices.x);
-                picks.set(lane, &pick_emitter(inputs, surfaces.point_world(lane), u));
-            }
+        for (lane, &(_, path_ix)) in group.iter().enumerate() {
+            let (ray, hit) = (paths.rays.of_path(path_ix), &self.hits[path_ix as usize]);
+            hits.set_colour(lane, colour_at(inputs, ray, hit, surfaces.geometric(lane)));
+            let [to_light, choices, ..] = pairs_of_lane(&pairs, lane);
+            let u = vec3(to_light.x, to_light.y, choices.x);
+            picks.set(lane, &pick_emitter(inputs, surfaces.point_world(lane), u));
         }
-        let bounce = BounceConstants { depth, clamp: frame.clamp, shapes };
+        let bounce = BounceConstants { depth, clamp: frame.clamp, shapes: self.shapes() };
         let steps = dispatch!(self.level, simd => matt_steps(simd, &bounce, (&hits, &surfaces), (&picks, &pairs)));
+        let before_lights = self.before_lights(group, paths);
         for (lane, &(place, path_ix)) in group.iter().enumerate() {
-            if surfaces.before_light >> lane & 1 == 1 {
-                kinds[place] = self.step(path_ix, || pairs_of_lane(&pairs, lane), paths);
+            if before_lights >> lane & 1 == 1 {
+                kinds[place] = self.step(path_ix, true, pairs_of_lane(&pairs, lane), paths);
                 continue;
             }
             let triangle_ix = self.hits[path_ix as usize].triangle_ix;
-            let goes_on = !is_last && steps.go_on >> lane & 1 == 1;
+            let goes_on = steps.go_on >> lane & 1 == 1;
             kinds[place] = goes_on.into();
-            if !is_last && steps.have_segment >> lane & 1 == 1 {
+            if steps.have_segment >> lane & 1 == 1 {
                 *paths.segments.of_path(path_ix) = steps.segment(lane, triangle_ix);
             }
             if goes_on {
@@ -186,6 +225,7 @@ mod tests {
     use std::path::Path;
 
     use bytemuck::Zeroable;
+    use glam::Vec3;
 
     use super::{super::path_begin::pixels_of_batch, *};
     use crate::{

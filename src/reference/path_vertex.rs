@@ -151,7 +151,19 @@ pub fn step_path(
         state.radiance += added_light(inputs, ray.throughput * light, depth);
         return (false, NO_SEGMENT);
     }
-    if is_miss {
+    step_past_lights(inputs, random_pairs, depth, hit, ray, state)
+}
+
+/// Does what [`step_path`] does, for a ray that meets no rectangle, disk or sphere which shines.
+pub fn step_past_lights(
+    inputs: &KernelInputs,
+    random_pairs: impl FnOnce() -> [Vec2; PAIRS_OF_HIT],
+    depth: u32,
+    hit: &Hit,
+    ray: &mut PathRay,
+    state: &mut PathState,
+) -> (bool, Segment) {
+    if hit.triangle_ix == NO_TRIANGLE {
         state.radiance += added_light(inputs, ray.throughput * met_environment(inputs, ray, state, depth), depth);
         return (false, NO_SEGMENT);
     }

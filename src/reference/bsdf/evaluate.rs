@@ -49,6 +49,10 @@ fn add_clearcoat(terms: &BsdfTerms, to_light: Vec3, half_vector: Vec3, sum: &mut
 
 /// Adds the Lambertian lobe.
 fn add_lambert(terms: &BsdfTerms, to_light: Vec3, sum: &mut BsdfValue) {
+    // Of metals and glass, it is often black, and its probability is 0.
+    if terms.below == Vec3::ZERO && terms.between == Vec3::ZERO {
+        return;
+    }
     let albedo = if terms.has_interface { ggx_albedo(to_light.z, terms.width.sqrt()) } else { NO_ALBEDO };
     let left = (1.0 - dielectric_albedo(terms.dielectric, albedo)).max(0.0);
     let reflectance = terms.below * left + terms.between * albedo.loss;

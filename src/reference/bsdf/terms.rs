@@ -80,13 +80,19 @@ fn mix(a: Vec3, b: Vec3, weight: f32) -> Vec3 {
 pub(super) fn split_at(terms: &BsdfTerms, cosine: f32) -> InterfaceSplit {
     let material = terms.material;
     let cosine = cosine.clamp(0.0, 1.0);
+    // Nothing passes, so that the general formula would find the same.
+    if material.metallic == 1.0 || material.transmission == 0.0 {
+        let opaque = || dielectric_reflectance(material, cosine);
+        let reflected = with_metal(material, opaque, || metal_fresnel(material, cosine));
+        return InterfaceSplit { reflected, transmitted: Vec3::ZERO };
+    }
     let opaque = dielectric_reflectance(material, cosine);
     let clear = match terms.is_solid {
         true => Vec3::splat(fresnel(cosine, refraction_cosine(cosine, terms.eta), terms.eta)),
         false => opaque,
     };
-    let reflected = mix(opaque, terms.clear_gain * clear, material.transmission);
-    let reflected = with_metal(material, reflected, metal_fresnel(material, cosine));
+    let reflected = || mix(opaque, terms.clear_gain * clear, material.transmission);
+    let reflected = with_metal(material, reflected, || metal_fresnel(material, cosine));
     // Light passes two boundaries of a solid, and is tinted at both.
     let tint = material.tf * if terms.is_solid { material.kd.map(f32::sqrt) } else { material.kd };
     let passing = terms.clear_gain * passing_share(material) * (1.0 - clear.max_element());
@@ -127,9 +133,9 @@ fn set_lambert(terms: &mut BsdfTerms, albedo: GgxAlbedo, roughness: f32) {
     let mut later = Vec3::ZERO;
     if material.flags & MATERIAL_SINGLE_SCATTERING == 0 && mean.loss > 0.0 {
         later = later_bounces(mean_reflectance(at_normal, at_grazing), mean.loss);
-        let later_metal = later_bounces(mean_reflectance(metal_fresnel(material, 1.0), Vec3::ONE), mean.loss);
-        terms.between =
-            with_metal(material, (1.0 - material.transmission) * later, later_metal) * (albedo.loss / mean.loss);
+        let dielectric = || (1.0 - material.transmission) * later;
+        let metal = || later_bounces(mean_reflectance(metal_fresnel(material, 1.0), Vec3::ONE), mean.loss);
+        terms.between = with_metal(material, dielectric, metal) * (albedo.loss / mean.loss);
     }
     terms.dielectric = Vec3::new(at_normal.max_element(), at_grazing.x, later.max_element());
     let left = 1.0 - dielectric_albedo(terms.dielectric, albedo);
@@ -142,9 +148,9 @@ fn set_lambert(terms: &mut BsdfTerms, albedo: GgxAlbedo, roughness: f32) {
 fn interface_albedo(terms: &BsdfTerms, albedo: GgxAlbedo) -> Vec3 {
     let material = terms.material;
     let at_normal = 1.0 - albedo.loss - albedo.grazing;
-    let opaque = normal_reflectance(material) * at_normal + terms.dielectric.y * albedo.grazing;
-    let metal = metal_fresnel(material, 1.0) * at_normal + albedo.grazing;
-    with_metal(material, (1.0 - material.transmission) * opaque, metal)
+    let opaque = || normal_reflectance(material) * at_normal + terms.dielectric.y * albedo.grazing;
+    let metal = || metal_fresnel(material, 1.0) * at_normal + albedo.grazing;
+    with_metal(material, || (1.0 - material.transmission) * opaque(), metal)
 }
 
 /// Sets the shares of the layers, and the probabilities of the lobes.
