@@ -67,3 +67,38 @@ pub fn path_begin(inputs: &KernelInputs, batch: &Batch, pixels: &[PixelOfBatch],
         }
     });
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use bytemuck::Zeroable;
+    use glam::Vec3;
+
+    use super::*;
+    use crate::{
+        accel::kdtree::BuildOptions,
+        frame::RenderOptions,
+        layout::Frame,
+        reference,
+        scene::Scene,
+        world::{FlatScene, World},
+    };
+
+    #[test]
+    fn camera_rays_are_those_of_the_reference() {
+        let scene = FlatScene::new(&Scene::empty(Path::new("scene"))).expect("a scene");
+        let world = World::of_flat(scene, &BuildOptions::default()).expect("a world");
+        let of_picture = world.frame_constants(&RenderOptions { width: 37, height: 29, ..RenderOptions::default() });
+        let (right, up, forward) = (Vec3::X, Vec3::Y, Vec3::NEG_Z);
+        let frame = Frame { right, up, forward, first_sample: 5, aperture: 0.1, focus: 2.0, ..of_picture };
+        let inputs = KernelInputs::new(&world, &frame);
+        // The last group of sixteen paths is not full, and a pixel's samples are in different tasks.
+        let batch = Batch { first_pixel: 100, n_pixels: 301, ..Batch::default() };
+        let (mut expected, mut found) = (vec![PathRay::zeroed(); 3 * 301], vec![PathRay::zeroed(); 3 * 301]);
+        reference::path_begin::path_begin(&inputs, &batch, &mut expected);
+        path_begin(&inputs, &batch, &pixels_of_batch(&inputs, &batch), &mut found);
+        assert!(found == expected);
+        assert!(found[0].direction != found[301].direction, "samples differ");
+    }
+}

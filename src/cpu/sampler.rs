@@ -14,7 +14,7 @@ pub struct KeysSoa {
     pub sample_ix: [u32; LANES],
 }
 
-/// A pair of random numbers of each of sixteen paths.
+/// A pair of random numbers for each of sixteen paths.
 pub type PairsSoa = [[f32; LANES]; 2];
 
 impl KeysSoa {
