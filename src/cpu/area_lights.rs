@@ -59,3 +59,73 @@ pub fn meets_light<S: Simd>(
     }
     meets
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use fearless_simd::{Level, dispatch};
+    use glam::{Vec3, vec3};
+
+    use super::*;
+    use crate::{
+        accel::kdtree::BuildOptions,
+        cpu::{lanes::LANES, soa::RaysSoa},
+        layout::{AREA_SPHERE, Frame},
+        reference::{chi_square::Uniform, emitters::seen_light, inputs::KernelInputs, search_ray::SearchRay},
+        scene::{Light, Scene},
+        world::{FlatScene, World},
+    };
+
+    /// The box of rays' origins is small, so that many rays meet each light.
+    fn light_of(kind: u32) -> Light {
+        let radiance = Vec3::ONE;
+        match kind {
+            AREA_RECTANGLE => {
+                Light::Rectangle { position: Vec3::Z, edge_u: 1.5 * Vec3::Y, edge_v: vec3(1.0, 0.0, 0.3), radiance }
+            }
+            AREA_DISK => Light::Disk { position: Vec3::Y, towards: vec3(0.3, -1.0, 0.1), radius: 0.7, radiance },
+            _ => Light::Sphere { position: Vec3::X, radius: 0.5, radiance },
+        }
+    }
+
+    /// Rays at random. Some have axes as directions, start at the light's centre or end there.
+    fn ray_at_random(i: usize, light: &AreaLight, random: &mut Uniform) -> SearchRay {
+        let (origin, direction, t) = (random.point() - 0.5, random.point() - 0.5, random.point().x);
+        let direction = if i % 7 == 3 { Vec3::AXES[i % 3] } else { direction.normalize() };
+        let origin = if i % 11 == 5 { light.position } else { origin };
+        let t_max = if i.is_multiple_of(3) { 2.0 * t } else { f32::INFINITY };
+        SearchRay { origin, direction, t_min: 0.0, t_max, source_triangle: 0 }
+    }
+
+    #[test]
+    fn rays_meet_the_lights_that_the_reference_sees() {
+        let mut random = Uniform(3);
+        for kinds in [&[AREA_RECTANGLE][..], &[AREA_DISK], &[AREA_SPHERE], &[AREA_SPHERE, AREA_RECTANGLE, AREA_DISK]] {
+            let lights = kinds.iter().map(|&kind| light_of(kind)).collect();
+            let scene = Scene { lights, ..Scene::empty(Path::new("scene")) };
+            let flat = FlatScene::new(&scene).expect("a scene");
+            let world = World::of_flat(flat, &BuildOptions::default()).expect("a world");
+            let frame = Frame::default();
+            let inputs = KernelInputs::new(&world, &frame).of_paths(&[], world.emitters());
+            let lights = world.emitters().shapes();
+            let mut n_met = 0;
+            for group in 0..1000 {
+                let rays: [_; LANES] =
+                    std::array::from_fn(|lane| ray_at_random(LANES * group + lane, &lights[0], &mut random));
+                let mut soa = RaysSoa::default();
+                rays.iter().enumerate().for_each(|(lane, ray)| soa.set(lane, ray));
+                let found = dispatch!(Level::new(), simd => {
+                    let (origin, direction) = (Vec3x16::load(simd, &soa.origin), Vec3x16::load(simd, &soa.direction));
+                    meets_light(lights, origin, direction, f32x16::load_array_ref(simd, &soa.t_max)).to_bitmask()
+                });
+                for (lane, ray) in rays.iter().enumerate() {
+                    let seen = seen_light(&inputs, ray.origin, ray.direction, ray.t_max);
+                    assert_eq!(found >> lane & 1 == 1, seen.t.is_finite(), "{kinds:?} {ray:?}");
+                    n_met += u32::from(seen.t.is_finite());
+                }
+            }
+            assert!((500..12_000).contains(&n_met), "{kinds:?}: {n_met} of 16,000");
+        }
+    }
+}
