@@ -89,11 +89,16 @@ mod tests {
         }
     }
 
-    /// Rays at random. Some have axes as directions, start at the light's centre or end there.
+    /// A ray at random. Some rays have axes as directions, start at the light's centre, or start around it and so behind
+    /// it.
     fn ray_at_random(i: usize, light: &AreaLight, random: &mut Uniform) -> SearchRay {
         let (origin, direction, t) = (random.point() - 0.5, random.point() - 0.5, random.point().x);
         let direction = if i % 7 == 3 { Vec3::AXES[i % 3] } else { direction.normalize() };
-        let origin = if i % 11 == 5 { light.position } else { origin };
+        let origin = match (i % 11, i % 5) {
+            (5, _) => light.position,
+            (_, 2) => light.position + 2.0 * origin,
+            _ => origin,
+        };
         let t_max = if i.is_multiple_of(3) { 2.0 * t } else { f32::INFINITY };
         SearchRay { origin, direction, t_min: 0.0, t_max, source_triangle: 0 }
     }
