@@ -89,8 +89,8 @@ mod tests {
         }
     }
 
-    /// A ray at random. Some rays have axes as directions, start at the light's centre, or start around it and so behind
-    /// it.
+    /// A ray at random. Some rays have axes as directions, start at the light's centre, or start around it and so
+    /// behind it.
     fn ray_at_random(i: usize, light: &AreaLight, random: &mut Uniform) -> SearchRay {
         let (origin, direction, t) = (random.point() - 0.5, random.point() - 0.5, random.point().x);
         let direction = if i % 7 == 3 { Vec3::AXES[i % 3] } else { direction.normalize() };

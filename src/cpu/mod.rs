@@ -8,7 +8,7 @@
 //!   paths    the passes of a batch of paths
 //!     path_begin, path_scatter   the rays of paths, and their steps at hits
 //!       sampler                  the random numbers of sixteen paths
-//!       matt, area_lights        the steps of sixteen paths at matt surfaces
+//!       matt_surfaces, matt_steps, area_lights   the steps of sixteen paths at matt surfaces
 //!       vec3x16                  sixteen vectors
 //!   timing   wall-clock times of passes
 //! meter    the exposure of a scene whose light has physical units
@@ -21,7 +21,8 @@
 
 mod area_lights;
 pub mod lanes;
-mod matt;
+mod matt_steps;
+mod matt_surfaces;
 mod meter;
 pub mod octant_bins;
 pub mod packet;

@@ -1,5 +1,5 @@
-//! Path begin: the camera rays of a batch's paths. It makes the rays of the reference's pass, with the random numbers of
-//! sixteen paths computed together.
+//! Path begin: the camera rays of a batch's paths. It makes the rays of the reference's pass, with the random numbers
+//! of sixteen paths computed together.
 
 use fearless_simd::{Level, dispatch};
 use glam::{UVec2, vec2};

@@ -1,5 +1,6 @@
-//! Path scatter: the light at the hits of paths, and the way on. It does what the reference's pass does, bit for bit. The
-//! random numbers of sixteen paths are computed together, and so are the steps of paths at [matt](super::matt) surfaces.
+//! Path scatter: the light at the hits of paths, and the way on. It does what the reference's pass does, bit for bit.
+//! The random numbers of sixteen paths are computed together, and so are the steps of paths at
+//! [matt](super::matt_surfaces) surfaces.
 
 use arrayvec::ArrayVec;
 use fearless_simd::{Level, dispatch, f32x16, prelude::*};
@@ -9,7 +10,8 @@ use rayon::prelude::*;
 use super::{
     area_lights::meets_light,
     lanes::{LANES, LaneMask},
-    matt::{BounceConstants, MattHits, Picks, matt_steps, matt_surfaces},
+    matt_steps::{BounceConstants, Picks, matt_steps},
+    matt_surfaces::{MattHits, matt_surfaces},
     path_begin::PixelOfBatch,
     sampler::{KeysSoa, PairsSoa, random_pairs},
     soa::RaysSoa,
@@ -171,12 +173,23 @@ impl BounceOfPaths<'_> {
         }
     }
 
+    /// Ends a group of paths at matt surfaces, with the light that their rays meet before.
+    fn end_at_matt(&self, group: &[(usize, u32)], kinds: &mut [u32], paths: &mut PathsOfBlock) {
+        let before_lights = self.before_lights(group, paths);
+        for (lane, &(place, path_ix)) in group.iter().enumerate() {
+            kinds[place] = 0;
+            if before_lights >> lane & 1 == 1 {
+                self.step(path_ix, true, Default::default(), paths);
+            }
+        }
+    }
+
     /// Takes a group of paths at matt surfaces one step further. Those that meet a light are stepped as all others.
     fn step_matt(&self, group: &[(usize, u32)], kinds: &mut [u32], paths: &mut PathsOfBlock) {
         let (inputs, frame, depth) = (self.inputs, self.inputs.frame(), self.batch.depth);
         // The last ray of a path only meets light.
         if depth + 1 >= frame.max_depth {
-            return self.step_group(group, &Default::default(), kinds, paths);
+            return self.end_at_matt(group, kinds, paths);
         }
         let mut hits = MattHits::default();
         for (lane, &(_, path_ix)) in group.iter().enumerate() {
@@ -230,7 +243,7 @@ mod tests {
     use super::{super::path_begin::pixels_of_batch, *};
     use crate::{
         accel::kdtree::BuildOptions,
-        cpu::matt::matt_materials,
+        cpu::matt_surfaces::matt_materials,
         frame::RenderOptions,
         layout::{FLAT_NORMAL, Frame, MATERIAL_MICROFACET, MATERIAL_UNLIT, Material, Triangle},
         reference::{self, chi_square::Uniform},

@@ -4,7 +4,7 @@ use bytemuck::Zeroable;
 use fearless_simd::Level;
 
 use super::{
-    matt::matt_materials,
+    matt_surfaces::matt_materials,
     path_begin::{PixelOfBatch, path_begin, pixels_of_batch},
     path_scatter::{BounceOfPaths, path_scatter},
     queue::Queue,

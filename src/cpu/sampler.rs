@@ -1,5 +1,5 @@
-//! The random numbers of sixteen paths together. They are those of the reference's [sampler](crate::reference::sampler),
-//! bit for bit.
+//! The random numbers of sixteen paths together. They are those of the reference's
+//! [sampler](crate::reference::sampler), bit for bit.
 
 use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
 

@@ -130,8 +130,8 @@ impl<'a> TextureHit<'a> {
         if squared > LEAST_NORMAL_SQUARED { front * bent * (1.0 / squared.sqrt()) } else { surface.interpolated }
     }
 
-    /// The colour by which textures and the colours of the triangle's corners multiply the material's, and both of these
-    /// with their opacity.
+    /// The colour by which textures and the colours of the triangle's corners multiply the material's. The colours of
+    /// the corners and of the texture follow, with their opacity.
     fn base_colour(&self, maps: &MaterialMaps) -> (Vec3, Vec4, Vec4) {
         let corner_colour = self.textures.corner_colour_at(self.triangle_ix, self.u, self.v);
         let map_colour = if maps.base_colour == NO_TEXTURE { Vec4::ONE } else { self.map_at(maps.base_colour) };
