@@ -1,10 +1,15 @@
-//! The fast CPU engine: renders frames and casts rays without Vulkan. Only the traversal is implemented here.
-//! All other kernels are those of the [reference](crate::reference).
+//! The fast CPU engine: renders frames and casts rays without Vulkan. The traversal is implemented here, and of path
+//! tracing what sixteen paths can do together. All other kernels are those of the [reference](crate::reference), and
+//! all results are the same as its, bit for bit.
 //!
 //! ```text
 //! render   the frame, batch by batch, in the order of its plan
 //!   queue    the rays of a batch
 //!   paths    the passes of a batch of paths
+//!     path_begin, path_scatter   the rays of paths, and their steps at hits
+//!       sampler                  the random numbers of sixteen paths
+//!       matt_surfaces, matt_steps, area_lights   the steps of sixteen paths at matt surfaces
+//!       vec3x16                  sixteen vectors
 //!   timing   wall-clock times of passes
 //! meter    the exposure of a scene whose light has physical units
 //! trace    the reference's passes that trace rays, with the tracer of this folder
@@ -14,19 +19,26 @@
 //!     packet, packet_triangle, packet_traverser   trace sixteen rays through the tree together
 //! ```
 
+mod area_lights;
 pub mod lanes;
+mod matt_steps;
+mod matt_surfaces;
 mod meter;
 pub mod octant_bins;
 pub mod packet;
 pub mod packet_traverser;
 pub mod packet_triangle;
+mod path_begin;
+mod path_scatter;
 mod paths;
 mod queue;
 mod render;
+mod sampler;
 pub mod soa;
 mod timing;
 mod trace;
 pub mod tracer;
+mod vec3x16;
 
 pub use self::{
     meter::metered_exposure,

@@ -1,17 +1,23 @@
 //! The passes of a batch of paths, with the buffers of the paths.
 
 use bytemuck::Zeroable;
+use fearless_simd::Level;
 
-use super::{queue::Queue, tracer::FastTracer};
+use super::{
+    matt_surfaces::matt_materials,
+    path_begin::{PixelOfBatch, path_begin, pixels_of_batch},
+    path_scatter::{BounceOfPaths, path_scatter},
+    queue::Queue,
+    tracer::FastTracer,
+};
 use crate::{
     accel::kdtree::Traversal,
     layout::{Batch, Bounce, Frame, Hit, PathRay, PathState, SCAN_GROUP_SIZE, Segment},
     reference::{
         inputs::KernelInputs,
-        path_begin::path_begin,
         path_compact,
         path_layers::path_layers,
-        path_scatter::{PathBuffers, path_scatter},
+        path_scatter::PathBuffers,
         path_trace::{closest_hits_by, segments_by},
     },
 };
@@ -20,6 +26,9 @@ use crate::{
 /// number of paths.
 #[derive(Default)]
 pub struct Paths {
+    pixels: Vec<PixelOfBatch>,
+    /// Whether each material is matt.
+    are_matt: Vec<bool>,
     pub states: Vec<PathState>,
     segments: Vec<Segment>,
     /// The radiance of each path when the last layer of light was complete.
@@ -40,7 +49,8 @@ impl Paths {
         self.segments.clear();
         self.segments.resize(n, Segment::zeroed());
         self.live[0] = (0..n_paths).collect();
-        path_begin(inputs, batch, &mut queue.rays);
+        self.pixels = pixels_of_batch(inputs, batch);
+        path_begin(inputs, batch, &self.pixels, &mut queue.rays);
     }
 
     /// Finds the hits of the paths that are alive, and tests the segments of the bounce before. Returns the numbers of
@@ -62,7 +72,12 @@ impl Paths {
         queue.scan_blocks.resize(live.len().div_ceil(SCAN_GROUP_SIZE as usize), 0);
         let Queue { rays, hits, child_kinds, scan_blocks, .. } = queue;
         let paths = PathBuffers { rays, states: &mut self.states, segments: &mut self.segments };
-        path_scatter(inputs, batch, (live, hits), paths, (child_kinds, scan_blocks));
+        if batch.depth == 0 {
+            self.are_matt = matt_materials(inputs);
+        }
+        let (pixels, are_matt) = (&self.pixels, &self.are_matt);
+        let bounce = BounceOfPaths { inputs, batch, pixels, are_matt, hits, level: Level::new() };
+        path_scatter(&bounce, live, paths, (child_kinds, scan_blocks));
     }
 
     /// Adds up the layer of light that is complete after the batch's bounce.

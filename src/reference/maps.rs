@@ -1,5 +1,7 @@
 //! The surface and the material at a hit, with the material's textures applied. Twin of `maps.glsl`.
 
+use std::cell::OnceCell;
+
 use glam::{Vec3, Vec4};
 
 use super::{
@@ -22,8 +24,18 @@ struct TextureHit<'a> {
     triangle_ix: u32,
     u: f32,
     v: f32,
-    /// Base-2 logarithm of the cone's width on the surface, divided by the square root of twice the triangle's area.
-    log_width: f32,
+    log_width: LogWidth<'a>,
+}
+
+/// Base-2 logarithm of the width of a ray's cone on a surface, divided by the square root of twice the triangle's area.
+/// It is computed when the first texture needs it.
+struct LogWidth<'a> {
+    cell: OnceCell<f32>,
+    frame: &'a Frame,
+    ray: &'a PathRay,
+    hit: &'a Hit,
+    t: &'a Triangle,
+    geometric: Vec3,
 }
 
 /// Width of the ray's cone at its hit, world units.
@@ -35,15 +47,32 @@ fn cone_width(frame: &Frame, ray: &PathRay, hit: &Hit) -> f32 {
     pixel * (ray.origin.distance(frame.eye) + hit.t)
 }
 
-fn log_width(frame: &Frame, ray: &PathRay, hit: &Hit, t: &Triangle, surface: &Surface) -> f32 {
-    let (e1, e2) = (t.v1 - t.v0, t.v2 - t.v0);
-    let scale = 1.0 / e1.abs().max_element().max(e2.abs().max_element());
-    let doubled_area = (e1 * scale).cross(e2 * scale).length();
-    let cosine = ray.direction.dot(surface.geometric).abs().max(LEAST_COSINE);
-    (cone_width(frame, ray, hit) * scale / cosine).log2() - 0.5 * doubled_area.log2()
+impl LogWidth<'_> {
+    fn get(&self) -> f32 {
+        *self.cell.get_or_init(|| {
+            let t = self.t;
+            let (e1, e2) = (t.v1 - t.v0, t.v2 - t.v0);
+            let scale = 1.0 / e1.abs().max_element().max(e2.abs().max_element());
+            let doubled_area = (e1 * scale).cross(e2 * scale).length();
+            let cosine = self.ray.direction.dot(self.geometric).abs().max(LEAST_COSINE);
+            let cone_width = cone_width(self.frame, self.ray, self.hit);
+            (cone_width * scale / cosine).log2() - 0.5 * doubled_area.log2()
+        })
+    }
 }
 
-impl TextureHit<'_> {
+impl<'a> TextureHit<'a> {
+    fn new(
+        inputs: &KernelInputs<'a>,
+        textures: &'a Textures,
+        (ray, hit): (&'a PathRay, &'a Hit),
+        geometric: Vec3,
+    ) -> Self {
+        let t = &inputs.triangles[hit.triangle_ix as usize];
+        let log_width = LogWidth { cell: OnceCell::new(), frame: inputs.frame(), ray, hit, t, geometric };
+        Self { textures, triangle_ix: hit.triangle_ix, u: hit.u, v: hit.v, log_width }
+    }
+
     /// The level of a texture whose texels are as large as the cone on the surface.
     fn level_of(&self, map: &Texture) -> f32 {
         let [a, b, c] = self.textures.uvs_of(self.triangle_ix, uv_set_of(map));
@@ -51,7 +80,7 @@ impl TextureHit<'_> {
         let scale = (map.m00 * map.m11 - map.m01 * map.m10).abs();
         let (width, height) = ((map.size & 0xffff) as f32, (map.size >> 16) as f32);
         let n_texels = (e1.x * e2.y - e1.y * e2.x).abs() * scale * width * height;
-        if n_texels > 0.0 { self.log_width + 0.5 * n_texels.log2() } else { 0.0 }
+        if n_texels > 0.0 { self.log_width.get() + 0.5 * n_texels.log2() } else { 0.0 }
     }
 
     fn map_at(&self, texture_ix: u32) -> Vec4 {
@@ -101,12 +130,18 @@ impl TextureHit<'_> {
         if squared > LEAST_NORMAL_SQUARED { front * bent * (1.0 / squared.sqrt()) } else { surface.interpolated }
     }
 
+    /// The colour by which textures and the colours of the triangle's corners multiply the material's. The colours of
+    /// the corners and of the texture follow, with their opacity.
+    fn base_colour(&self, maps: &MaterialMaps) -> (Vec3, Vec4, Vec4) {
+        let corner_colour = self.textures.corner_colour_at(self.triangle_ix, self.u, self.v);
+        let map_colour = if maps.base_colour == NO_TEXTURE { Vec4::ONE } else { self.map_at(maps.base_colour) };
+        (corner_colour.truncate() * map_colour.truncate().max(Vec3::ZERO), corner_colour, map_colour)
+    }
+
     /// Multiplies the material's terms by its textures and by the colours of the triangle's corners. Values that make
     /// no sense are bounded.
     fn apply_maps(&self, maps: &MaterialMaps, material: &mut Material) {
-        let corner_colour = self.textures.corner_colour_at(self.triangle_ix, self.u, self.v);
-        let map_colour = if maps.base_colour == NO_TEXTURE { Vec4::ONE } else { self.map_at(maps.base_colour) };
-        let base = corner_colour.truncate() * map_colour.truncate().max(Vec3::ZERO);
+        let (base, corner_colour, map_colour) = self.base_colour(maps);
         material.kd *= base;
         if maps.flags & MAPS_CUTOUT == 0 {
             if maps.flags & MAPS_CORNERS_HAVE_OPACITY != 0 {
@@ -160,10 +195,20 @@ pub fn shaded_at(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> (Surface, M
     let mut material = inputs.materials[material_ix];
     if let Some(textures) = inputs.textures {
         let maps = &textures.material_maps[material_ix];
-        let log_width = log_width(inputs.frame(), ray, hit, t, &surface);
-        let at = TextureHit { textures, triangle_ix: hit.triangle_ix, u: hit.u, v: hit.v, log_width };
+        let at = TextureHit::new(inputs, textures, (ray, hit), surface.geometric);
         at.apply_maps(maps, &mut material);
         surface.shading = at.mapped_normal(maps, &surface);
     }
     (surface, material)
+}
+
+/// Returns the diffuse colour of the material that [`shaded_at`] returns. `geometric`: of the surface.
+///
+/// # Panics
+/// Nothing was hit.
+pub fn colour_at(inputs: &KernelInputs, ray: &PathRay, hit: &Hit, geometric: Vec3) -> Vec3 {
+    let material_ix = inputs.triangle_materials[hit.triangle_ix as usize] as usize;
+    let kd = inputs.materials[material_ix].kd;
+    let Some(textures) = inputs.textures else { return kd };
+    kd * TextureHit::new(inputs, textures, (ray, hit), geometric).base_colour(&textures.material_maps[material_ix]).0
 }

@@ -50,7 +50,7 @@ pub mod kd_boxes;
 pub mod kdtree;
 pub mod leaf;
 pub mod light;
-mod live_paths;
+pub(crate) mod live_paths;
 pub mod maps;
 pub mod material;
 pub mod microfacet;

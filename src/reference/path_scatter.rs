@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::{
     inputs::KernelInputs,
     live_paths::parts,
-    path_vertex::step_path,
+    path_vertex::{pairs_of_hit, step_path},
     paths::{key_of_path, pixel_of_path},
 };
 use crate::layout::{Batch, Hit, PathRay, PathState, SCAN_GROUP_SIZE, SEGMENT_NONE, Segment};
@@ -38,7 +38,8 @@ pub fn path_scatter(
         for (&path_ix, kind) in live.iter().zip(&mut *kinds) {
             let key = key_of_path(inputs, batch, path_ix, pixel_of_path(inputs.frame(), batch, path_ix));
             let (ray, state) = (rays.of_path(path_ix), states.of_path(path_ix));
-            let (goes_on, segment) = step_path(inputs, key, batch.depth, &hits[path_ix as usize], ray, state);
+            let random_pairs = || pairs_of_hit(key, batch.depth);
+            let (goes_on, segment) = step_path(inputs, random_pairs, batch.depth, &hits[path_ix as usize], ray, state);
             // A path without a segment has none already.
             if segment.state != SEGMENT_NONE {
                 *segments.of_path(path_ix) = segment;

@@ -1,6 +1,6 @@
 //! One step of a path: the light at its hit, and the way on. Twin of `path_vertex.glsl`.
 
-use glam::{Vec3, vec3};
+use glam::{Vec2, Vec3, vec3};
 
 use super::{
     bsdf::{BsdfTerms, bsdf_terms, is_smooth, sample_bsdf, value_at},
@@ -20,7 +20,17 @@ use crate::layout::{
 /// The number of pairs of random numbers that come before those of the first hit: in the pixel and in the lens.
 const PAIRS_OF_CAMERA: u32 = 2;
 /// The number of pairs for each hit.
-const PAIRS_OF_HIT: u32 = 4;
+pub const PAIRS_OF_HIT: usize = 4;
+
+/// The place of the first pair of random numbers of a hit.
+pub fn first_pair_of(depth: u32) -> u32 {
+    PAIRS_OF_CAMERA + PAIRS_OF_HIT as u32 * depth
+}
+
+/// The random numbers of a hit.
+pub fn pairs_of_hit(key: SampleKey, depth: u32) -> [Vec2; PAIRS_OF_HIT] {
+    [0, 1, 2, 3].map(|place| random_pair(key, first_pair_of(depth) + place))
+}
 
 /// The share of a way of sampling, whose density is the first one, beside another way.
 pub fn power_share(density: f32, other: f32) -> f32 {
@@ -68,7 +78,7 @@ const NO_SEGMENT: Segment = Segment {
 struct Vertex<'a> {
     depth: u32,
     surface: &'a Surface,
-    terms: &'a BsdfTerms,
+    terms: &'a BsdfTerms<'a>,
     triangle_ix: u32,
     throughput: Vec3,
 }
@@ -76,7 +86,7 @@ struct Vertex<'a> {
 /// The segment to a light that is picked at a hit.
 fn segment_to_light(inputs: &KernelInputs, u: Vec3, vertex: &Vertex) -> Segment {
     let &Vertex { depth, surface, terms, triangle_ix, throughput } = vertex;
-    if is_smooth(&terms.material) {
+    if is_smooth(terms.material) {
         return NO_SEGMENT;
     }
     let pick = pick_light(inputs, surface.point_world, u);
@@ -124,10 +134,11 @@ fn survives(depth: u32, u: f32, throughput: &mut Vec3) -> bool {
 }
 
 /// Adds the light that the path's ray meets to its state, samples a light at the hit, and replaces the ray by the one
-/// with which the path goes on. Returns whether it does, and the segment to the light.
+/// with which the path goes on. Returns whether it does, and the segment to the light. `random_pairs` returns what
+/// [`pairs_of_hit`] does.
 pub fn step_path(
     inputs: &KernelInputs,
-    key: SampleKey,
+    random_pairs: impl FnOnce() -> [Vec2; PAIRS_OF_HIT],
     depth: u32,
     hit: &Hit,
     ray: &mut PathRay,
@@ -140,11 +151,23 @@ pub fn step_path(
         state.radiance += added_light(inputs, ray.throughput * light, depth);
         return (false, NO_SEGMENT);
     }
-    if is_miss {
+    step_past_lights(inputs, random_pairs, depth, hit, ray, state)
+}
+
+/// Does what [`step_path`] does, for a ray that meets no rectangle, disk or sphere which shines.
+pub fn step_past_lights(
+    inputs: &KernelInputs,
+    random_pairs: impl FnOnce() -> [Vec2; PAIRS_OF_HIT],
+    depth: u32,
+    hit: &Hit,
+    ray: &mut PathRay,
+    state: &mut PathState,
+) -> (bool, Segment) {
+    if hit.triangle_ix == NO_TRIANGLE {
         state.radiance += added_light(inputs, ray.throughput * met_environment(inputs, ray, state, depth), depth);
         return (false, NO_SEGMENT);
     }
-    let (surface, material) = shaded_at(inputs, ray, hit);
+    let (surface, mut material) = shaded_at(inputs, ray, hit);
     let mut throughput = ray.throughput * unabsorbed(&material, &surface, hit.t);
     if is_unlit(&material) || material.ke.cmpgt(Vec3::ZERO).any() {
         let light =
@@ -156,9 +179,8 @@ pub fn step_path(
     if is_unlit(&material) || depth + 1 >= inputs.frame().max_depth {
         return (false, NO_SEGMENT);
     }
-    let terms = bsdf_terms(&material, &surface, -ray.direction);
-    let first_pair = PAIRS_OF_CAMERA + PAIRS_OF_HIT * depth;
-    let [to_light, choices, to_next, lobe] = [0, 1, 2, 3].map(|place| random_pair(key, first_pair + place));
+    let terms = bsdf_terms(&mut material, &surface, -ray.direction);
+    let [to_light, choices, to_next, lobe] = random_pairs();
     let vertex = Vertex { depth, surface: &surface, terms: &terms, triangle_ix: hit.triangle_ix, throughput };
     let segment = segment_to_light(inputs, vec3(to_light.x, to_light.y, choices.x), &vertex);
     let next = sample_bsdf(&terms, &surface, vec3(to_next.x, to_next.y, lobe.x));

@@ -38,7 +38,7 @@ fn add_reflection(terms: &BsdfTerms, to_light: Vec3, half_vector: Vec3, sum: &mu
 
 /// Adds the reflection of the clear layer.
 fn add_clearcoat(terms: &BsdfTerms, to_light: Vec3, half_vector: Vec3, sum: &mut BsdfValue) {
-    if !has_clearcoat(&terms.material) || terms.coat_roughness == 0.0 {
+    if !has_clearcoat(terms.material) || terms.coat_roughness == 0.0 {
         return;
     }
     let width = terms.coat_roughness * terms.coat_roughness;
@@ -49,6 +49,10 @@ fn add_clearcoat(terms: &BsdfTerms, to_light: Vec3, half_vector: Vec3, sum: &mut
 
 /// Adds the Lambertian lobe.
 fn add_lambert(terms: &BsdfTerms, to_light: Vec3, sum: &mut BsdfValue) {
+    // Of metals and glass, it is often black, and its probability is 0.
+    if terms.below == Vec3::ZERO && terms.between == Vec3::ZERO {
+        return;
+    }
     let albedo = if terms.has_interface { ggx_albedo(to_light.z, terms.width.sqrt()) } else { NO_ALBEDO };
     let left = (1.0 - dielectric_albedo(terms.dielectric, albedo)).max(0.0);
     let reflectance = terms.below * left + terms.between * albedo.loss;
@@ -58,7 +62,7 @@ fn add_lambert(terms: &BsdfTerms, to_light: Vec3, sum: &mut BsdfValue) {
 
 /// Adds the sheen.
 fn add_sheen(terms: &BsdfTerms, to_light: Vec3, sum: &mut BsdfValue) {
-    if !has_sheen(&terms.material) {
+    if !has_sheen(terms.material) {
         return;
     }
     let lobe = evaluate_sheen(terms.to_viewer, to_light, terms.sheen_roughness) * terms.sheen_bound;
@@ -99,7 +103,8 @@ fn add_transmission(terms: &BsdfTerms, to_light: Vec3, sum: &mut BsdfValue) {
 pub(super) fn value_of(terms: &BsdfTerms, to_light: Vec3) -> BsdfValue {
     let mut sum = BsdfValue { value: Vec3::ZERO, density: 0.0 };
     if to_light.z > 0.0 {
-        let half_vector = (terms.to_viewer + to_light).normalize();
+        let has_microfacets = terms.has_interface || has_clearcoat(terms.material);
+        let half_vector = if has_microfacets { (terms.to_viewer + to_light).normalize() } else { Vec3::Z };
         add_reflection(terms, to_light, half_vector, &mut sum);
         add_lambert(terms, to_light, &mut sum);
         add_clearcoat(terms, to_light, half_vector, &mut sum);

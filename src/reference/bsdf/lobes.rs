@@ -50,7 +50,7 @@ pub fn is_smooth(material: &Material) -> bool {
     }
     let has_lambert = material.kd.max_element() * (1.0 - material.metallic) * (1.0 - material.transmission) > 0.0;
     let has_rough_coat = has_clearcoat(material) && clearcoat_roughness(material) > 0.0;
-    interface_width(material) == 0.0 && !has_lambert && !has_rough_coat && !has_sheen(material)
+    !has_lambert && !has_rough_coat && !has_sheen(material) && interface_width(material) == 0.0
 }
 
 /// Reflectance of the metal where the light's angle to the microfacet's normal has this cosine.
@@ -61,9 +61,16 @@ pub(super) fn metal_fresnel(material: &Material, cosine: f32) -> Vec3 {
     conductor_reflectance(cosine, material.conductor_eta, material.conductor_k)
 }
 
-/// The mean of the reflectances of a dielectric and of a metal, weighted as the material is metallic.
-pub(super) fn with_metal(material: &Material, dielectric: Vec3, metal: Vec3) -> Vec3 {
-    dielectric * (1.0 - material.metallic) + metal * material.metallic
+/// The mean of the reflectances of a dielectric and of a metal, weighted as the material is metallic. One without
+/// weight is not computed.
+pub(super) fn with_metal(material: &Material, dielectric: impl FnOnce() -> Vec3, metal: impl FnOnce() -> Vec3) -> Vec3 {
+    if material.metallic == 0.0 {
+        return dielectric();
+    }
+    if material.metallic == 1.0 {
+        return metal();
+    }
+    dielectric() * (1.0 - material.metallic) + metal() * material.metallic
 }
 
 /// About the share of light that the surface scatters, by colour: what it reflects along its normal, or lets pass. It
@@ -72,8 +79,8 @@ pub fn surface_albedo(material: &Material) -> Vec3 {
     if is_smooth(material) {
         return Vec3::ONE;
     }
-    let dielectric = material.kd + normal_reflectance(material);
-    with_metal(material, dielectric, metal_fresnel(material, 1.0)).clamp(Vec3::ZERO, Vec3::ONE)
+    let dielectric = || material.kd + normal_reflectance(material);
+    with_metal(material, dielectric, || metal_fresnel(material, 1.0)).clamp(Vec3::ZERO, Vec3::ONE)
 }
 
 /// How narrow the surface scatters light, 0..1: the share of its albedo that is not Lambertian, less the wider its

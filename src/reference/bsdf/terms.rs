@@ -29,8 +29,8 @@ use crate::{
 
 /// What all lobes need that depends on the material and the viewer.
 #[derive(Clone, Copy, Debug)]
-pub struct BsdfTerms {
-    pub material: Material,
+pub struct BsdfTerms<'a> {
+    pub material: &'a Material,
     pub(super) frame: LocalFrame,
     pub(super) to_viewer: Vec3,
     /// Width of the interface's distribution of normals. It is 0 if the interface is perfectly smooth.
@@ -78,15 +78,21 @@ fn mix(a: Vec3, b: Vec3, weight: f32) -> Vec3 {
 /// Returns what a microfacet of the interface does with light. `cosine`: between the microfacet's normal and the
 /// viewer.
 pub(super) fn split_at(terms: &BsdfTerms, cosine: f32) -> InterfaceSplit {
-    let material = &terms.material;
+    let material = terms.material;
     let cosine = cosine.clamp(0.0, 1.0);
+    // Nothing passes, so that the general formula would find the same.
+    if material.metallic == 1.0 || material.transmission == 0.0 {
+        let opaque = || dielectric_reflectance(material, cosine);
+        let reflected = with_metal(material, opaque, || metal_fresnel(material, cosine));
+        return InterfaceSplit { reflected, transmitted: Vec3::ZERO };
+    }
     let opaque = dielectric_reflectance(material, cosine);
     let clear = match terms.is_solid {
         true => Vec3::splat(fresnel(cosine, refraction_cosine(cosine, terms.eta), terms.eta)),
         false => opaque,
     };
-    let reflected = mix(opaque, terms.clear_gain * clear, material.transmission);
-    let reflected = with_metal(material, reflected, metal_fresnel(material, cosine));
+    let reflected = || mix(opaque, terms.clear_gain * clear, material.transmission);
+    let reflected = with_metal(material, reflected, || metal_fresnel(material, cosine));
     // Light passes two boundaries of a solid, and is tinted at both.
     let tint = material.tf * if terms.is_solid { material.kd.map(f32::sqrt) } else { material.kd };
     let passing = terms.clear_gain * passing_share(material) * (1.0 - clear.max_element());
@@ -116,7 +122,7 @@ pub(super) const NO_ALBEDO: GgxAlbedo = GgxAlbedo { loss: 0.0, grazing: 0.0 };
 
 /// Sets the terms of the Lambertian lobe. `albedo`: of the interface, towards the viewer.
 fn set_lambert(terms: &mut BsdfTerms, albedo: GgxAlbedo, roughness: f32) {
-    let material = &terms.material;
+    let material = terms.material;
     terms.below = material.kd;
     if !terms.has_interface {
         return;
@@ -127,9 +133,9 @@ fn set_lambert(terms: &mut BsdfTerms, albedo: GgxAlbedo, roughness: f32) {
     let mut later = Vec3::ZERO;
     if material.flags & MATERIAL_SINGLE_SCATTERING == 0 && mean.loss > 0.0 {
         later = later_bounces(mean_reflectance(at_normal, at_grazing), mean.loss);
-        let later_metal = later_bounces(mean_reflectance(metal_fresnel(material, 1.0), Vec3::ONE), mean.loss);
-        terms.between =
-            with_metal(material, (1.0 - material.transmission) * later, later_metal) * (albedo.loss / mean.loss);
+        let dielectric = || (1.0 - material.transmission) * later;
+        let metal = || later_bounces(mean_reflectance(metal_fresnel(material, 1.0), Vec3::ONE), mean.loss);
+        terms.between = with_metal(material, dielectric, metal) * (albedo.loss / mean.loss);
     }
     terms.dielectric = Vec3::new(at_normal.max_element(), at_grazing.x, later.max_element());
     let left = 1.0 - dielectric_albedo(terms.dielectric, albedo);
@@ -140,16 +146,21 @@ fn set_lambert(terms: &mut BsdfTerms, albedo: GgxAlbedo, roughness: f32) {
 
 /// Share of light that the interface reflects, without what a solid reflects of the light that it transmits.
 fn interface_albedo(terms: &BsdfTerms, albedo: GgxAlbedo) -> Vec3 {
-    let material = &terms.material;
+    let material = terms.material;
     let at_normal = 1.0 - albedo.loss - albedo.grazing;
-    let opaque = normal_reflectance(material) * at_normal + terms.dielectric.y * albedo.grazing;
-    let metal = metal_fresnel(material, 1.0) * at_normal + albedo.grazing;
-    with_metal(material, (1.0 - material.transmission) * opaque, metal)
+    let opaque = || normal_reflectance(material) * at_normal + terms.dielectric.y * albedo.grazing;
+    let metal = || metal_fresnel(material, 1.0) * at_normal + albedo.grazing;
+    with_metal(material, || (1.0 - material.transmission) * opaque(), metal)
 }
 
 /// Sets the shares of the layers, and the probabilities of the lobes.
 fn set_layers(terms: &mut BsdfTerms, albedo: GgxAlbedo) {
-    let material = &terms.material;
+    let material = terms.material;
+    // A surface that is only Lambertian has the layers' shares already: what follows would compute the same.
+    if !terms.has_interface && !has_clearcoat(material) && !has_sheen(material) {
+        terms.choice = if mean_of(terms.below) > 0.0 { Vec4::Y } else { Vec4::ZERO };
+        return;
+    }
     let cosine = terms.to_viewer.z;
     let (mut coat, mut sheen) = (0.0, 0.0);
     if has_clearcoat(material) {
@@ -196,30 +207,33 @@ fn clear_loss(terms: &BsdfTerms, albedo: GgxAlbedo) -> f32 {
     solid_loss(terms.to_viewer.z, terms.width.sqrt(), terms.eta)
 }
 
-/// Returns the terms for a viewer.
-pub fn bsdf_terms(material: &Material, surface: &Surface, to_viewer: Vec3) -> BsdfTerms {
-    let mut material = *material;
+/// Returns the terms for a viewer. Bounds the colours of the material.
+pub fn bsdf_terms<'a>(material: &'a mut Material, surface: &Surface, to_viewer: Vec3) -> BsdfTerms<'a> {
     material.kd = material.kd.clamp(Vec3::ZERO, Vec3::ONE);
     material.sheen_colour = material.sheen_colour.clamp(Vec3::ZERO, Vec3::ONE);
     let is_behind = surface.shading.dot(to_viewer) < LEAST_COSINE;
     let frame = frame_around(if is_behind { surface.geometric } else { surface.shading });
     let mut to_viewer = to_local(&frame, to_viewer);
     to_viewer.z = to_viewer.z.max(LEAST_COSINE);
-    let width = interface_width(&material);
-    let is_solid = material.flags & MATERIAL_SOLID != 0 && passing_share(&material) > 0.0;
+    let material = &*material;
+    let has_interface = has_interface(material);
+    let width = if has_interface { interface_width(material) } else { 0.0 };
+    let is_solid = material.flags & MATERIAL_SOLID != 0 && passing_share(material) > 0.0;
     let bends = is_solid && !((material.ni - 1.0).abs() < LEAST_INDEX_STEP);
-    let of_side = if surface.from_inside { material.ni } else { 1.0 / material.ni };
     let roughness = width.sqrt();
-    let has_interface = has_interface(&material);
     let albedo = if has_interface { ggx_albedo(to_viewer.z, roughness) } else { NO_ALBEDO };
     let mut terms = BsdfTerms {
         material,
         frame,
         to_viewer,
         width,
-        coat_roughness: clearcoat_roughness(&material),
+        coat_roughness: clearcoat_roughness(material),
         sheen_roughness: material.sheen_roughness.clamp(LEAST_SHEEN_ROUGHNESS, 1.0),
-        eta: if bends { of_side } else { 1.0 },
+        eta: match bends {
+            true if surface.from_inside => material.ni,
+            true => 1.0 / material.ni,
+            false => 1.0,
+        },
         is_solid,
         has_interface,
         sheen_share: 1.0,
@@ -232,7 +246,9 @@ pub fn bsdf_terms(material: &Material, surface: &Surface, to_viewer: Vec3) -> Bs
         straight_choice: 0.0,
         choice: Vec4::ZERO,
     };
-    terms.clear_gain = 1.0 / (1.0 - clear_loss(&terms, albedo));
+    if has_interface {
+        terms.clear_gain = 1.0 / (1.0 - clear_loss(&terms, albedo));
+    }
     set_lambert(&mut terms, albedo, roughness);
     set_layers(&mut terms, albedo);
     if material.flags & MATERIAL_UNLIT != 0 {

@@ -36,11 +36,18 @@ use super::inputs::KernelInputs;
 use crate::layout::{EMITTER_AREA, EMITTER_LIGHT, EMITTER_SUN, EMITTER_TREE, EMITTER_TRIANGLE, Emitter};
 
 /// The share of the way to a light within which another light hides it. What is beyond counts as the light itself.
-const LIGHT_HIDES_UP_TO: f32 = 0.9999;
+pub const LIGHT_HIDES_UP_TO: f32 = 0.9999;
 
 /// Picks a direction from which light may come to a point. `u` is in [0, 1), and `u.x` selects the emitter. What hides
 /// the light is not asked, except for rectangles, disks and spheres, which only [`seen_light`] knows.
 pub fn pick_light(inputs: &KernelInputs, point_world: Vec3, u: Vec3) -> LightPick {
+    let pick = pick_emitter(inputs, point_world, u);
+    let before = seen_light(inputs, point_world, pick.direction, LIGHT_HIDES_UP_TO * pick.distance);
+    if before.t.is_infinite() { pick } else { LightPick::NONE }
+}
+
+/// Picks as [`pick_light`] does. What hides the light is not asked at all.
+pub fn pick_emitter(inputs: &KernelInputs, point_world: Vec3, u: Vec3) -> LightPick {
     let Some(emitters) = inputs.emitters.filter(|emitters| !emitters.entries.is_empty()) else {
         return LightPick::NONE;
     };
@@ -55,15 +62,13 @@ pub fn pick_light(inputs: &KernelInputs, point_world: Vec3, u: Vec3) -> LightPic
         emitter.probability *= light.probability;
     }
     let (ix, rest) = (emitter.ix as usize, Vec2::new(u.y, u.z));
-    let pick = match emitter.kind {
+    match emitter.kind {
         EMITTER_LIGHT => pick_punctual(&inputs.lights[ix], point_world, emitter.probability),
         EMITTER_AREA => pick_area_light(emitters.shapes()[ix], point_world, rest, emitter.probability),
         EMITTER_SUN => pick_sun(emitters, &emitters.suns()[ix], rest),
         EMITTER_TRIANGLE => pick_triangle(inputs, emitter.ix, point_world, rest, emitter.probability),
         _ => pick_environment(emitters, rest),
-    };
-    let before = seen_light(inputs, point_world, pick.direction, LIGHT_HIDES_UP_TO * pick.distance);
-    if before.t.is_infinite() { pick } else { LightPick::NONE }
+    }
 }
 
 /// The density with which [`pick_light`] picks the point of a triangle that is seen from a point in a direction at a

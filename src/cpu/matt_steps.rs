@@ -1,0 +1,236 @@
+//! One step of sixteen paths at [matt surfaces](super::matt_surfaces). It does the operations of the reference's
+//! `step_path` for such a surface, in the same order, so that the results are the same bit for bit.
+
+use std::f32::consts::PI;
+
+use fearless_simd::{Simd, f32x16, mask32x16, prelude::*};
+
+use super::{
+    area_lights::meets_light,
+    lanes::{LANES, LaneMask},
+    matt_surfaces::{MattHits, MattSurfaces},
+    sampler::PairsSoa,
+    vec3x16::{Vec3sSoa, Vec3x16, get, greater, lesser, set},
+};
+use crate::{
+    layout::{AreaLight, LEAST_SURVIVAL, PathRay, ROULETTE_DEPTH, SEGMENT_SHARE, SEGMENT_WAITS, Segment},
+    reference::{
+        emitters::{LIGHT_HIDES_UP_TO, LightPick},
+        path_vertex::PAIRS_OF_HIT,
+    },
+};
+
+/// The lights that are picked.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(64))]
+pub struct Picks {
+    direction: Vec3sSoa,
+    distance: [f32; LANES],
+    light: Vec3sSoa,
+    density: [f32; LANES],
+}
+
+/// The segments to lights, and the rays with which paths go on.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(64))]
+pub struct MattSteps {
+    segment_origin: Vec3sSoa,
+    segment_direction: Vec3sSoa,
+    segment_light: Vec3sSoa,
+    segment_t_max: [f32; LANES],
+    pub have_segment: LaneMask,
+    origin: Vec3sSoa,
+    direction: Vec3sSoa,
+    throughput: Vec3sSoa,
+    pub density: [f32; LANES],
+    pub go_on: LaneMask,
+}
+
+impl Picks {
+    #[inline(always)]
+    pub fn set(&mut self, lane: usize, pick: &LightPick) {
+        set(&mut self.direction, lane, pick.direction);
+        set(&mut self.light, lane, pick.light);
+        (self.distance[lane], self.density[lane]) = (pick.distance, pick.density);
+    }
+}
+
+impl MattSteps {
+    #[inline(always)]
+    pub fn segment(&self, lane: usize, source_triangle: u32) -> Segment {
+        Segment {
+            origin: get(&self.segment_origin, lane),
+            state: SEGMENT_WAITS,
+            direction: get(&self.segment_direction, lane),
+            source_triangle,
+            light: get(&self.segment_light, lane),
+            t_max: self.segment_t_max[lane],
+        }
+    }
+
+    /// Returns the ray with which a path goes on from a triangle.
+    #[inline(always)]
+    pub fn ray(&self, lane: usize, source_triangle: u32, parent: &PathRay) -> PathRay {
+        PathRay {
+            origin: get(&self.origin, lane),
+            direction: get(&self.direction, lane),
+            throughput: get(&self.throughput, lane),
+            source_triangle,
+            ..*parent
+        }
+    }
+}
+
+/// Sixteen surfaces in registers.
+struct Surfaces<S: Simd> {
+    point_world: Vec3x16<S>,
+    geometric: Vec3x16<S>,
+    normal: Vec3x16<S>,
+    tangent: Vec3x16<S>,
+    bitangent: Vec3x16<S>,
+    clearance: f32x16<S>,
+    kd: Vec3x16<S>,
+    /// The surfaces that are not black.
+    reflects: mask32x16<S>,
+}
+
+impl<S: Simd> Surfaces<S> {
+    #[inline(always)]
+    fn load(simd: S, hits: &MattHits, surfaces: &MattSurfaces) -> Self {
+        let kd = Vec3x16::load(simd, &hits.kd);
+        let [r, g, b] = kd.0;
+        Self {
+            point_world: Vec3x16::load(simd, &surfaces.point_world),
+            geometric: Vec3x16::load(simd, &surfaces.geometric),
+            normal: Vec3x16::load(simd, &surfaces.normal),
+            tangent: Vec3x16::load(simd, &surfaces.tangent),
+            bitangent: Vec3x16::load(simd, &surfaces.bitangent),
+            clearance: f32x16::load_array_ref(simd, &surfaces.clearance),
+            kd,
+            reflects: ((r + g + b) / 3.0).simd_gt(0.0),
+        }
+    }
+
+    /// Returns whether a direction is above the surface, on both the triangle's and the frame's side. `z`: of the
+    /// direction in the frame.
+    #[inline(always)]
+    fn is_above(&self, direction: Vec3x16<S>, z: f32x16<S>) -> mask32x16<S> {
+        self.reflects & (self.geometric.dot(direction) * z).simd_gt(0.0) & z.simd_gt(0.0)
+    }
+
+    /// Returns the vector from the surface to the start of a ray.
+    #[inline(always)]
+    fn offset(&self, direction: Vec3x16<S>) -> Vec3x16<S> {
+        let is_below = direction.dot(self.geometric).simd_lt(0.0);
+        self.geometric * is_below.select(-self.clearance, self.clearance)
+    }
+}
+
+/// The constants of a bounce.
+#[derive(Clone, Copy, Debug)]
+pub struct BounceConstants<'a> {
+    pub depth: u32,
+    /// The bound of the light that is added to a path.
+    pub clamp: f32,
+    pub shapes: &'a [AreaLight],
+}
+
+/// Writes the segments to the lights that were picked, without regard to what hides them from the surfaces except other
+/// area lights.
+#[inline(always)]
+fn set_segments<S: Simd>(
+    steps: &mut MattSteps,
+    bounce: &BounceConstants,
+    surfaces: &Surfaces<S>,
+    (throughput, picks): (Vec3x16<S>, &Picks),
+) {
+    let simd = surfaces.clearance.simd;
+    let (direction, distance) = (Vec3x16::load(simd, &picks.direction), f32x16::load_array_ref(simd, &picks.distance));
+    let (light, pick_density) = (Vec3x16::load(simd, &picks.light), f32x16::load_array_ref(simd, &picks.density));
+    let z = direction.dot(surfaces.normal);
+    let mut exist = surfaces.is_above(direction, z);
+    if !bounce.shapes.is_empty() {
+        exist &= !meets_light(bounce.shapes, surfaces.point_world, direction, distance * LIGHT_HIDES_UP_TO);
+    }
+    let density = z / PI;
+    let value = surfaces.kd * density;
+    let largest = greater(pick_density, density);
+    let (own, other) = (pick_density / largest, density / largest);
+    let one = f32x16::splat(simd, 1.0);
+    let share = pick_density.simd_gt(0.0).select(own * own / (own * own + other * other), one);
+    let arriving = throughput.times(value).times(light) * share;
+    let arriving = arriving.min(f32x16::splat(simd, bounce.clamp));
+    exist &= value.any_positive() & arriving.all_below(1.0e30) & arriving.any_positive();
+    steps.have_segment = exist.to_bitmask() as LaneMask;
+    let offset = surfaces.offset(direction);
+    let to_light = direction * distance - offset;
+    let length = to_light.dot(to_light).sqrt();
+    let is_far = distance.simd_eq(f32::INFINITY);
+    steps.segment_origin = (surfaces.point_world + offset).to_arrays();
+    steps.segment_direction = Vec3x16::select(is_far, direction, to_light / length).to_arrays();
+    steps.segment_light = arriving.max(f32x16::splat(simd, 0.0)).to_arrays();
+    steps.segment_t_max = is_far.select(distance, length * SEGMENT_SHARE).to_array();
+}
+
+/// Writes the rays with which the paths go on. `choices`: the random numbers of Russian roulette.
+#[inline(always)]
+fn set_rays<S: Simd>(
+    steps: &mut MattSteps,
+    depth: u32,
+    surfaces: &Surfaces<S>,
+    (throughput, local, choices): (Vec3x16<S>, Vec3x16<S>, f32x16<S>),
+) {
+    let simd = surfaces.clearance.simd;
+    let [x, y, z] = local.0;
+    let direction = surfaces.tangent * x + surfaces.bitangent * y + surfaces.normal * z;
+    let density = z / PI;
+    let weight = surfaces.kd * density / density;
+    let mut throughput = throughput.times(weight);
+    let mut go_on = surfaces.is_above(direction, z) & density.simd_gt(0.0) & throughput.any_positive();
+    if depth >= ROULETTE_DEPTH {
+        let survival = throughput.max_element();
+        let survival = lesser(f32x16::splat(simd, 1.0), greater(f32x16::splat(simd, LEAST_SURVIVAL), survival));
+        throughput = throughput / survival;
+        go_on &= choices.simd_lt(survival);
+    }
+    steps.origin = (surfaces.point_world + surfaces.offset(direction)).to_arrays();
+    steps.direction = direction.to_arrays();
+    steps.throughput = throughput.to_arrays();
+    steps.density = density.to_array();
+    steps.go_on = go_on.to_bitmask() as LaneMask;
+}
+
+/// Returns directions in the frame of the surface, as `sample_lambert` does. Sines and cosines are computed one by one:
+/// only so are they those of the reference.
+#[inline(always)]
+fn lambert_samples<S: Simd>(simd: S, [ux, uy]: &PairsSoa) -> Vec3x16<S> {
+    let (mut cosines, mut sines) = ([0.0; LANES], [0.0; LANES]);
+    for (uy, (cosine, sine)) in uy.iter().zip(cosines.iter_mut().zip(&mut sines)) {
+        let azimuth = 2.0 * PI * uy;
+        (*cosine, *sine) = (azimuth.cos(), azimuth.sin());
+    }
+    let ux = f32x16::load_array_ref(simd, ux);
+    let (cosines, sines) = (f32x16::load_array(simd, cosines), f32x16::load_array(simd, sines));
+    let radius = ux.sqrt();
+    let z = greater(1.0 - ux, f32x16::splat(simd, 0.0)).sqrt();
+    Vec3x16([radius * cosines, radius * sines, z])
+}
+
+/// Returns the steps of the paths.
+#[inline(always)]
+pub fn matt_steps<S: Simd>(
+    simd: S,
+    bounce: &BounceConstants,
+    (hits, surfaces): (&MattHits, &MattSurfaces),
+    (picks, random_pairs): (&Picks, &[PairsSoa; PAIRS_OF_HIT]),
+) -> MattSteps {
+    let surfaces = Surfaces::load(simd, hits, surfaces);
+    let throughput = Vec3x16::load(simd, &hits.throughput);
+    let [_, choices, to_next, _] = random_pairs;
+    let local = lambert_samples(simd, to_next);
+    let mut steps = MattSteps::default();
+    set_segments(&mut steps, bounce, &surfaces, (throughput, picks));
+    let choices = f32x16::load_array_ref(simd, &choices[1]);
+    set_rays(&mut steps, bounce.depth, &surfaces, (throughput, local, choices));
+    steps
+}

@@ -1,0 +1,393 @@
+//! Path scatter: the light at the hits of paths, and the way on. It does what the reference's pass does, bit for bit.
+//! The random numbers of sixteen paths are computed together, and so are the steps of paths at
+//! [matt](super::matt_surfaces) surfaces.
+
+use arrayvec::ArrayVec;
+use fearless_simd::{Level, dispatch, f32x16, prelude::*};
+use glam::{Vec2, vec2, vec3};
+use rayon::prelude::*;
+
+use super::{
+    area_lights::meets_light,
+    lanes::{LANES, LaneMask},
+    matt_steps::{BounceConstants, Picks, matt_steps},
+    matt_surfaces::{MattHits, matt_surfaces},
+    path_begin::PixelOfBatch,
+    sampler::{KeysSoa, PairsSoa, random_pairs},
+    soa::RaysSoa,
+    vec3x16::Vec3x16,
+};
+use crate::{
+    layout::{AreaLight, Batch, Hit, NO_TRIANGLE, PathRay, PathState, SCAN_GROUP_SIZE, SEGMENT_NONE, Segment},
+    reference::{
+        emitters::pick_emitter,
+        inputs::KernelInputs,
+        live_paths::{Part, parts},
+        maps::colour_at,
+        path_scatter::PathBuffers,
+        path_vertex::{PAIRS_OF_HIT, first_pair_of, step_past_lights, step_path},
+        sampler::SampleKey,
+        search_ray::SearchRay,
+    },
+};
+
+const BLOCK_SIZE: usize = SCAN_GROUP_SIZE as usize;
+/// The number of paths from which on it is faster to take their steps together.
+const LEAST_GROUP: usize = 4;
+
+/// What all steps of a bounce need.
+pub struct BounceOfPaths<'a> {
+    pub inputs: &'a KernelInputs<'a>,
+    pub batch: &'a Batch,
+    /// The pixels of the batch.
+    pub pixels: &'a [PixelOfBatch],
+    /// Whether each material is matt.
+    pub are_matt: &'a [bool],
+    /// The closest hits of paths.
+    pub hits: &'a [Hit],
+    pub level: Level,
+}
+
+/// The paths of a block, one element each.
+struct PathsOfBlock<'a> {
+    rays: Part<'a, PathRay>,
+    states: Part<'a, PathState>,
+    segments: Part<'a, Segment>,
+}
+
+/// Does what [`reference::path_scatter`](crate::reference::path_scatter::path_scatter) does.
+pub fn path_scatter(
+    bounce: &BounceOfPaths,
+    live: &[u32],
+    paths: PathBuffers,
+    (child_kinds, scan_blocks): (&mut [u32], &mut [u32]),
+) {
+    let of_blocks = (live.par_chunks(BLOCK_SIZE), child_kinds.par_chunks_mut(BLOCK_SIZE), scan_blocks.par_iter_mut());
+    let of_paths = (
+        parts(paths.rays, live, BLOCK_SIZE),
+        parts(paths.states, live, BLOCK_SIZE),
+        parts(paths.segments, live, BLOCK_SIZE),
+    );
+    of_blocks.into_par_iter().zip(of_paths).for_each(|(of_block, (rays, states, segments))| {
+        let (live, kinds, n_going_on) = of_block;
+        bounce.step_block(live, kinds, &mut PathsOfBlock { rays, states, segments });
+        *n_going_on = kinds.iter().sum();
+    });
+}
+
+impl BounceOfPaths<'_> {
+    /// Takes the paths of a block one step further. Writes to `kinds` which of them go on.
+    fn step_block(&self, live: &[u32], kinds: &mut [u32], paths: &mut PathsOfBlock) {
+        let mut at_matt = ArrayVec::<_, BLOCK_SIZE>::new();
+        let (mut at_others, mut missed) = (at_matt.clone(), at_matt.clone());
+        for (place, &path_ix) in live.iter().enumerate() {
+            let hit = &self.hits[path_ix as usize];
+            let list = if hit.triangle_ix == NO_TRIANGLE {
+                &mut missed
+            } else if self.is_matt(hit) {
+                &mut at_matt
+            } else {
+                &mut at_others
+            };
+            list.push((place, path_ix));
+        }
+        for group in at_matt.chunks(LANES) {
+            if group.len() < LEAST_GROUP {
+                self.step_group(group, &self.pairs_of(group), kinds, paths)
+            } else {
+                self.step_matt(group, kinds, paths)
+            }
+        }
+        at_others.chunks(LANES).for_each(|group| self.step_group(group, &self.pairs_of(group), kinds, paths));
+        // Paths that leave the scene need no random numbers.
+        missed.chunks(LANES).for_each(|group| self.step_group(group, &Default::default(), kinds, paths));
+    }
+
+    fn is_matt(&self, hit: &Hit) -> bool {
+        self.are_matt[self.inputs.triangle_materials[hit.triangle_ix as usize] as usize]
+    }
+
+    fn key_of(&self, path_ix: u32) -> SampleKey {
+        self.pixels[(path_ix % self.batch.n_pixels) as usize].key_of_path(self.batch, path_ix)
+    }
+
+    /// Returns the area lights.
+    fn shapes(&self) -> &[AreaLight] {
+        self.inputs.emitters.map_or(&[], |emitters| emitters.shapes())
+    }
+
+    /// Returns the paths of a group whose rays meet an area light before their hits.
+    fn before_lights(&self, group: &[(usize, u32)], paths: &mut PathsOfBlock) -> LaneMask {
+        let shapes = self.shapes();
+        if shapes.is_empty() {
+            return 0;
+        }
+        let mut rays = RaysSoa::default();
+        for (lane, &(_, path_ix)) in group.iter().enumerate() {
+            let hit = &self.hits[path_ix as usize];
+            let t_max = if hit.triangle_ix == NO_TRIANGLE { f32::INFINITY } else { hit.t };
+            rays.set(lane, &SearchRay { t_max, ..SearchRay::from(&*paths.rays.of_path(path_ix)) });
+        }
+        dispatch!(self.level, simd => {
+            let (origin, direction) = (Vec3x16::load(simd, &rays.origin), Vec3x16::load(simd, &rays.direction));
+            let t_max = f32x16::load_array_ref(simd, &rays.t_max);
+            meets_light(shapes, origin, direction, t_max).to_bitmask() as LaneMask
+        })
+    }
+
+    /// Takes a path one step further. Returns 1 if it goes on, otherwise 0.
+    fn step(&self, path_ix: u32, before_light: bool, pairs: [Vec2; PAIRS_OF_HIT], paths: &mut PathsOfBlock) -> u32 {
+        let (ray, state) = (paths.rays.of_path(path_ix), paths.states.of_path(path_ix));
+        let (inputs, depth, hit) = (self.inputs, self.batch.depth, &self.hits[path_ix as usize]);
+        let (goes_on, segment) = match before_light {
+            true => step_path(inputs, || pairs, depth, hit, ray, state),
+            false => step_past_lights(inputs, || pairs, depth, hit, ray, state),
+        };
+        // A path without a segment has none already.
+        if segment.state != SEGMENT_NONE {
+            *paths.segments.of_path(path_ix) = segment;
+        }
+        goes_on.into()
+    }
+
+    /// Returns the random numbers of a group of paths.
+    fn pairs_of(&self, group: &[(usize, u32)]) -> [PairsSoa; PAIRS_OF_HIT] {
+        let mut keys = KeysSoa::default();
+        for (lane, &(_, path_ix)) in group.iter().enumerate() {
+            keys.set(lane, self.key_of(path_ix));
+        }
+        dispatch!(self.level, simd => random_pairs(simd, &keys, first_pair_of(self.batch.depth)))
+    }
+
+    /// Takes a group of paths one step further, one after the other.
+    fn step_group(
+        &self,
+        group: &[(usize, u32)],
+        pairs: &[PairsSoa; PAIRS_OF_HIT],
+        kinds: &mut [u32],
+        paths: &mut PathsOfBlock,
+    ) {
+        let before_lights = self.before_lights(group, paths);
+        for (lane, &(place, path_ix)) in group.iter().enumerate() {
+            kinds[place] = self.step(path_ix, before_lights >> lane & 1 == 1, pairs_of_lane(pairs, lane), paths);
+        }
+    }
+
+    /// Ends a group of paths at matt surfaces, with the light that their rays meet before.
+    fn end_at_matt(&self, group: &[(usize, u32)], kinds: &mut [u32], paths: &mut PathsOfBlock) {
+        let before_lights = self.before_lights(group, paths);
+        for (lane, &(place, path_ix)) in group.iter().enumerate() {
+            kinds[place] = 0;
+            if before_lights >> lane & 1 == 1 {
+                self.step(path_ix, true, Default::default(), paths);
+            }
+        }
+    }
+
+    /// Takes a group of paths at matt surfaces one step further. Those that meet a light are stepped as all others.
+    fn step_matt(&self, group: &[(usize, u32)], kinds: &mut [u32], paths: &mut PathsOfBlock) {
+        let (inputs, frame, depth) = (self.inputs, self.inputs.frame(), self.batch.depth);
+        // The last ray of a path only meets light.
+        if depth + 1 >= frame.max_depth {
+            return self.end_at_matt(group, kinds, paths);
+        }
+        let mut hits = MattHits::default();
+        for (lane, &(_, path_ix)) in group.iter().enumerate() {
+            let hit = &self.hits[path_ix as usize];
+            hits.set(lane, paths.rays.of_path(path_ix), hit, &inputs.triangles[hit.triangle_ix as usize]);
+        }
+        let surfaces = dispatch!(self.level, simd => matt_surfaces(simd, &hits));
+        let pairs = self.pairs_of(group);
+        let mut picks = Picks::default();
+        for (lane, &(_, path_ix)) in group.iter().enumerate() {
+            let (ray, hit) = (paths.rays.of_path(path_ix), &self.hits[path_ix as usize]);
+            hits.set_colour(lane, colour_at(inputs, ray, hit, surfaces.geometric(lane)));
+            let [to_light, choices, ..] = pairs_of_lane(&pairs, lane);
+            let u = vec3(to_light.x, to_light.y, choices.x);
+            picks.set(lane, &pick_emitter(inputs, surfaces.point_world(lane), u));
+        }
+        let bounce = BounceConstants { depth, clamp: frame.clamp, shapes: self.shapes() };
+        let steps = dispatch!(self.level, simd => matt_steps(simd, &bounce, (&hits, &surfaces), (&picks, &pairs)));
+        let before_lights = self.before_lights(group, paths);
+        for (lane, &(place, path_ix)) in group.iter().enumerate() {
+            if before_lights >> lane & 1 == 1 {
+                kinds[place] = self.step(path_ix, true, pairs_of_lane(&pairs, lane), paths);
+                continue;
+            }
+            let triangle_ix = self.hits[path_ix as usize].triangle_ix;
+            let goes_on = steps.go_on >> lane & 1 == 1;
+            kinds[place] = goes_on.into();
+            if steps.have_segment >> lane & 1 == 1 {
+                *paths.segments.of_path(path_ix) = steps.segment(lane, triangle_ix);
+            }
+            if goes_on {
+                let ray = paths.rays.of_path(path_ix);
+                *ray = steps.ray(lane, triangle_ix, ray);
+                paths.states.of_path(path_ix).density = steps.density[lane];
+            }
+        }
+    }
+}
+
+fn pairs_of_lane(pairs: &[PairsSoa; PAIRS_OF_HIT], lane: usize) -> [Vec2; PAIRS_OF_HIT] {
+    pairs.each_ref().map(|[x, y]| vec2(x[lane], y[lane]))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use bytemuck::Zeroable;
+    use glam::Vec3;
+
+    use super::{super::path_begin::pixels_of_batch, *};
+    use crate::{
+        accel::kdtree::BuildOptions,
+        cpu::matt_surfaces::matt_materials,
+        frame::RenderOptions,
+        layout::{FLAT_NORMAL, Frame, MATERIAL_MICROFACET, MATERIAL_UNLIT, Material, Triangle},
+        reference::{self, chi_square::Uniform},
+        scene::{Light, Scene},
+        world::{FlatScene, World},
+    };
+
+    /// Matt materials first, with a black one, and then others.
+    fn materials() -> (usize, Vec<Material>) {
+        let matt = |kd| Material { kd, ni: 1.5, d: 1.0, ns: 1.0, roughness: 1.0, ..Material::default() };
+        let grey = matt(Vec3::splat(0.7));
+        let matts = [grey, matt(vec3(0.9, 0.0, 0.1)), matt(Vec3::ZERO), matt(vec3(2.0, -1.0, 0.5))];
+        let others = [
+            Material { flags: MATERIAL_MICROFACET, ks: Vec3::ONE, roughness: 0.5, ..grey },
+            Material { metallic: 1.0, roughness: 0.3, ..grey },
+            Material { transmission: 1.0, ..grey },
+            Material { ke: Vec3::X, ..grey },
+            Material { clearcoat: 1.0, ..grey },
+            Material { sheen_colour: Vec3::ONE, ..grey },
+            Material { flags: MATERIAL_UNLIT, ..grey },
+        ];
+        (matts.len(), matts.into_iter().chain(others).collect())
+    }
+
+    /// A world of triangles of all materials, of which some have normals and some no area.
+    fn world(lights: Vec<Light>, random: &mut Uniform) -> World {
+        let mut scene = FlatScene::new(&Scene { lights, ..Scene::empty(Path::new("scene")) }).expect("a scene");
+        let mut corner = || 4.0 * random.point() - 2.0;
+        let triangle = |i: usize| {
+            let v0 = corner();
+            let v1 = if i % 31 == 30 { v0 } else { corner() };
+            let normals = if i % 5 == 4 { [7, 8, 9] } else { [FLAT_NORMAL; 3] };
+            Triangle { v0, v1, v2: corner(), n0: normals[0], n1: normals[1], n2: normals[2] }
+        };
+        scene.triangles = (0..300).map(triangle).collect();
+        scene.materials = materials().1;
+        scene.material_names = vec![String::new(); scene.materials.len()];
+        // Two of three triangles are matt.
+        let material_of = |i| if i % 3 < 2 { i % materials().0 } else { i % scene.materials.len() };
+        scene.triangle_materials = (0..300).map(|i| material_of(i) as u32).collect();
+        World::of_flat(scene, &BuildOptions::default()).expect("a world")
+    }
+
+    /// The lights of three scenes: none, one without a size, and area lights.
+    fn lights() -> [Vec<Light>; 3] {
+        let radiance = vec3(3.0, 2.0, 1.0);
+        let areas = [
+            Light::Rectangle { position: vec3(0.0, 0.0, 2.0), edge_u: 0.5 * Vec3::Y, edge_v: Vec3::X, radiance },
+            Light::Disk { position: vec3(0.0, 2.0, 0.0), towards: Vec3::NEG_Y, radius: 0.7, radiance },
+            Light::Sphere { position: vec3(0.5, -1.0, 0.5), radius: 0.4, radiance },
+            Light::Sphere { position: vec3(-1.5, 0.0, 0.0), radius: 0.2, radiance },
+        ];
+        [Vec::new(), vec![Light::Point { position: Vec3::Z, intensity: radiance }], areas.to_vec()]
+    }
+
+    /// All that a bounce changes.
+    #[derive(Clone, Debug, PartialEq)]
+    struct Paths {
+        rays: Vec<PathRay>,
+        states: Vec<PathState>,
+        segments: Vec<Segment>,
+        kinds: Vec<u32>,
+        blocks: Vec<u32>,
+    }
+
+    impl Paths {
+        fn at_random(n: usize, random: &mut Uniform) -> Self {
+            let ray = |random: &mut Uniform| PathRay {
+                origin: 4.0 * random.point() - 2.0,
+                direction: (random.point() - 0.5).normalize(),
+                throughput: random.point(),
+                t_max: f32::INFINITY,
+                ..PathRay::zeroed()
+            };
+            Self {
+                rays: (0..n).map(|_| ray(random)).collect(),
+                states: (0..n).map(|_| PathState { radiance: random.point(), density: random.point().x }).collect(),
+                segments: vec![Segment::zeroed(); n],
+                kinds: vec![9; n],
+                blocks: vec![9; n.div_ceil(BLOCK_SIZE)],
+            }
+        }
+
+        fn buffers(&mut self) -> (PathBuffers<'_>, (&mut [u32], &mut [u32])) {
+            let Self { rays, states, segments, kinds, blocks } = self;
+            (PathBuffers { rays, states, segments }, (kinds, blocks))
+        }
+
+        /// Returns the bits of all floats, of which those of NaN are not told apart.
+        fn bits(&self) -> Vec<u32> {
+            let words = [bytemuck::cast_slice(&self.rays), bytemuck::cast_slice(&self.states)];
+            let all = words.concat().into_iter().chain(bytemuck::cast_slice::<_, u32>(&self.segments).iter().copied());
+            let all = all.chain(self.kinds.clone()).chain(self.blocks.clone());
+            all.map(|word: u32| if word & 0x7fff_ffff > 0x7f80_0000 { f32::NAN.to_bits() } else { word }).collect()
+        }
+    }
+
+    fn hit_at_random(random: &mut Uniform, special: bool) -> Hit {
+        let (weights, which) = (random.point(), random.point());
+        let triangle_ix = if which.y < 0.1 { NO_TRIANGLE } else { (which.x * 300.0) as u32 };
+        let sum = weights.x + weights.y + weights.z;
+        let (u, v) = if special { (0.0, (which.z * 2.0).floor()) } else { (weights.x / sum, weights.y / sum) };
+        Hit { t: 3.0 * which.z, triangle_ix, u, v }
+    }
+
+    #[test]
+    fn steps_are_those_of_the_reference() {
+        const N: usize = 3000;
+        let mut random = Uniform(1);
+        let (mut n_matt, mut n_going_on, mut n_segments) = (0, 0, 0);
+        for (lights, depth) in lights().into_iter().flat_map(|lights| [0, 2, 3, 4].map(|depth| (lights.clone(), depth)))
+        {
+            let world = world(lights, &mut random);
+            let frame = world.frame_constants(&RenderOptions { max_depth: 5, ..RenderOptions::default() });
+            let materials = &world.scene().materials;
+            let inputs = &KernelInputs::new(&world, &frame).of_paths(materials, world.emitters());
+            let batch = &Batch { n_pixels: 700, depth, ..Batch::default() };
+            let mut expected = Paths::at_random(N, &mut random);
+            let hits: Vec<_> = (0..N).map(|i| hit_at_random(&mut random, i % 9 == 0)).collect();
+            let (pixels, are_matt) = (&pixels_of_batch(inputs, batch)[..], &matt_materials(inputs)[..]);
+            let live: Vec<_> = (0..N as u32).filter(|i| i % 7 != 0).collect();
+            expected.kinds.truncate(live.len());
+            expected.blocks.truncate(live.len().div_ceil(BLOCK_SIZE));
+            let begun = expected.clone();
+            let (paths, results) = expected.buffers();
+            reference::path_scatter::path_scatter(inputs, batch, (&live, &hits), paths, results);
+            for level in [Level::new(), Level::baseline()] {
+                let mut found = begun.clone();
+                let (paths, results) = found.buffers();
+                let bounce = BounceOfPaths { inputs, batch, pixels, are_matt, hits: &hits, level };
+                n_matt += hits.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE && bounce.is_matt(hit)).count();
+                path_scatter(&bounce, &live, paths, results);
+                assert!(found.bits() == expected.bits(), "depth {depth}");
+                n_going_on += found.blocks.iter().sum::<u32>();
+                n_segments += found.segments.iter().filter(|segment| segment.state != SEGMENT_NONE).count();
+            }
+        }
+        assert!(n_matt > 10_000 && n_going_on > 10_000 && n_segments > 5000, "{n_matt} {n_going_on} {n_segments}");
+    }
+
+    #[test]
+    fn only_lambertian_materials_are_matt() {
+        let (world, frame) = (world(Vec::new(), &mut Uniform(1)), Frame::default());
+        let are_matt = matt_materials(&KernelInputs::new(&world, &frame));
+        assert!(are_matt.iter().enumerate().all(|(i, &is_matt)| is_matt == (i < materials().0)), "{are_matt:?}");
+    }
+}
