@@ -10,8 +10,8 @@ use super::{
 };
 use crate::{
     layout::{
-        FLAT_NORMAL, Hit, LEAST_COSINE, LEAST_NORMAL_SQUARED, LEAST_WEIGHT, MATERIAL_SOLID, MATERIAL_UNLIT, Material,
-        NO_TEXTURE, PathRay, SURFACE_CLEARANCE, Triangle,
+        FLAT_NORMAL, Hit, LEAST_CLEARANCE_SHARE, LEAST_COSINE, LEAST_NORMAL_SQUARED, LEAST_WEIGHT, MATERIAL_SOLID,
+        MATERIAL_UNLIT, Material, NO_TEXTURE, PathRay, SURFACE_CLEARANCE, Triangle,
     },
     reference::inputs::KernelInputs,
     world::Textures,
@@ -145,6 +145,7 @@ pub fn matt_surfaces<S: Simd>(simd: S, hits: &MattHits) -> MattSurfaces {
     let [x, y, z] = (weights / (x + y + z)).0;
     let (at_v0, at_v1, at_v2) = (v0 * x, v1 * y, v2 * z);
     let magnitude = at_v0.abs() + at_v1.abs() + at_v2.abs();
+    let least_clearance = magnitude.max_element() * LEAST_CLEARANCE_SHARE;
     let (e1, e2) = (v1 - v0, v2 - v0);
     let ([ax, ay, az], [bx, by, bz]) = (e1.abs().0, e2.abs().0);
     let scale = 1.0 / greater(greater(ax, bx), greater(greater(ay, by), greater(az, bz)));
@@ -167,7 +168,7 @@ pub fn matt_surfaces<S: Simd>(simd: S, hits: &MattHits) -> MattSurfaces {
         normal: normal.to_arrays(),
         tangent: tangent.to_arrays(),
         bitangent: bitangent.to_arrays(),
-        clearance: (magnitude.dot(geometric.abs()) * SURFACE_CLEARANCE).to_array(),
+        clearance: (greater(magnitude.dot(geometric.abs()), least_clearance) * SURFACE_CLEARANCE).to_array(),
     }
 }
 
