@@ -86,6 +86,7 @@ pub(super) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result
         light: lacks_light,
         background: lacks_light,
         integrator: true,
+        exposure: true,
     };
     Ok((scene, lacks))
 }

@@ -290,11 +290,44 @@ fn materials(described: Vec<Described>, images: &mut Images) -> Result<Vec<Mater
         }
     }
     let mut materials = Vec::new();
-    for described in described {
+    for described in &described {
         let named = |what| SceneError::file(&described.path, format!("material `{}`: {what}", described.name));
-        materials.push(material(&described, images).map_err(named)?);
+        materials.push(material(described, images).map_err(named)?);
     }
+    note_cut_outs(&described, images);
     Ok(materials)
+}
+
+/// Tells the user once of materials that are cut out without a statement that says so.
+fn note_cut_outs(described: &[Described], images: &Images) {
+    let mut cut_out = described.iter().filter(|described| described.cut_out(images).is_some());
+    let Some(first) = cut_out.next() else { return };
+    let others = match cut_out.count() {
+        0 => String::new(),
+        n => format!(" and {n} more"),
+    };
+    tracing::info!(
+        "{}: material `{}`{others}: the image of `map_Kd` is cut out by its opacity, as a leaf is, though no `map_d` \
+         says so",
+        shown(&first.path),
+        first.name.escape_debug()
+    );
+}
+
+impl Described {
+    /// Returns the map of colours if its image is cut out, as that of a leaf, and the material says nothing of opacity.
+    /// Many programs leave out `map_d`, and the background of a leaf is not meant to be seen.
+    fn cut_out(&self, images: &Images) -> Option<&Map> {
+        let Self { spec, more, .. } = self;
+        let is_opacity = |map: &Map| matches!(map.term, Term::Opacity | Term::Transparency);
+        let is_stated = more.maps.iter().any(is_opacity)
+            || spec.d.is_some_and(|d| d != 1.0)
+            || spec.tr.is_some_and(|tr| tr != 0.0)
+            || matches!(spec.illum, Some(4 | 6 | 7 | 9));
+        let is_cut_out =
+            |map: &&Map| map.term == Term::BaseColour && images.get(map.file).is_ok_and(|image| image.is_cut_out());
+        if is_stated { None } else { more.maps.iter().rev().find(is_cut_out) }
+    }
 }
 
 fn warn_of_image(path: &Path, map: &Map, what: &str) {
@@ -332,7 +365,7 @@ fn material(described: &Described, images: &mut Images) -> Checked<Material> {
             ..Microfacet::default()
         });
         material.ks = glam::Vec3::ONE;
-        // The opacity of an image of colours is not meant unless map_d names it.
+        // The opacity of an image of colours is not meant unless map_d names it, or the image is cut out.
         if !has_opacity && material.d == 1.0 {
             material.alpha = Alpha::Opaque;
         }
@@ -342,6 +375,9 @@ fn material(described: &Described, images: &mut Images) -> Checked<Material> {
             let set = set_map(&mut material, map.term, &map.options, images, map.file);
             set.unwrap_or_else(|what| warn_of_image(path, map, &what));
         }
+    }
+    if let Some(map) = described.cut_out(images) {
+        set_map(&mut material, Term::Opacity, &map.options, images, map.file)?;
     }
     // The image of the base colour has this opacity already.
     let maps = &mut material.maps;
