@@ -22,6 +22,7 @@ mod standard;
 mod strangers;
 #[path = "../support/mod.rs"]
 mod support;
+mod tiles;
 
 use std::{fs, path::Path};
 
