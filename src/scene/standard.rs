@@ -110,8 +110,9 @@ pub(super) fn fill_in(path: &Path, scene: &mut Scene, lacks: Lacks, options: &Lo
 }
 
 /// Gives a scene what it needs beside its lamps. Those of a mesh file are bright by the units of its program, and need
-/// an exposure, and so do those of a scene file that are too weak to count as lamps unless it says so. Outside, such a file gets the standard ambient light and background, as bright beside the lamps as they
-/// are beside the standard lights: shadows would be black, and things could not be told from what is beyond.
+/// an exposure, and so do those of a scene file that are too weak to count as lamps unless it says so. Outside, a mesh
+/// file gets the standard ambient light and background, as bright beside the lamps as they are beside the standard
+/// lights: shadows would be black, and things could not be told from what is beyond.
 fn set_lamplight(
     path: &Path,
     scene: &mut Scene,

@@ -7,7 +7,8 @@ use super::{materials::png, strangers::loaded};
 
 /// Four triangles, in the tiles 1001, 1002, 1011 and 1003.
 const TILED: &str = "mtllib m.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 1 0\nvt 0 1\nvt 2 0\n\
-                     vt 1 1\nvt 0 2\nvt 1 2\nvt 3 0\nvt 2 1\nf 1/1 2/2 3/3\nf 1/2 2/4 4/5\nf 1/3 3/5 4/6\nf 2/4 3/8 4/9\n";
+                     vt 1 1\nvt 0 2\nvt 1 2\nvt 3 0\nvt 2 1\nf 1/1 2/2 3/3\n\
+                     f 1/2 2/4 4/5\nf 1/3 3/5 4/6\nf 2/4 3/8 4/9\n";
 
 fn load(mtl: &str, images: &[&str]) -> (Scene, Vec<String>) {
     let files: Vec<(&str, Vec<u8>)> =

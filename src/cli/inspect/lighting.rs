@@ -9,8 +9,7 @@ use crate::cli::table::table;
 /// What lights a scene beside its lights, and where all of its light comes from.
 #[derive(Serialize)]
 pub struct Lighting {
-    /// The choice of kdray: `outside`, `inside` or `surfaces`. It is absent if the file has lights, or the user has
-    /// chosen some.
+    /// The choice of kdray: `outside`, `inside` or `surfaces`. It is absent if the file states what lights the scene.
     pub chosen: Option<&'static str>,
     /// Ambient light on surfaces that face up, linear RGB.
     pub ambient: [f32; 3],
@@ -52,7 +51,7 @@ impl Lighting {
             Some("outside") => "a main light and a second one from outside, chosen by kdray",
             Some("inside") => "one in the middle and one at the eye, chosen by kdray",
             Some(_) => "none, since surfaces that shine light the scene",
-            None => "as the file or the user states",
+            None => "as the file states",
         };
         let studio =
             self.studio.map_or("none".to_owned(), |towards| format!("set up for a viewer at {}", vector(towards)));

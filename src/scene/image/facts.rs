@@ -50,8 +50,8 @@ impl Examined {
         *known.get_or_init(|| is_nearly_binary(&self.image, channel))
     }
 
-    /// Returns whether an image of colours is cut out, as that of a leaf: its opacity is almost everywhere 0 or 1, and a
-    /// considerable part of it is 0.
+    /// Returns whether an image of colours is cut out, as that of a leaf: its opacity is almost everywhere 0 or 1, and
+    /// a considerable part of it is 0.
     pub fn is_cut_out(&self) -> bool {
         *self.is_cut_out.get_or_init(|| has_holes(&self.image) && self.is_nearly_binary(Channel::Alpha))
     }
