@@ -55,6 +55,8 @@ const FILL: Lamp = Lamp { azimuth: 60.0, elevation: 20.0, irradiance: 0.22 };
 /// have their own colours.
 const AMBIENT: [Vec3; 2] = [Vec3::new(0.25, 0.26, 0.28), Vec3::new(0.15, 0.14, 0.12)];
 const AMBIENT_OF_INTERIORS: [Vec3; 2] = [Vec3::splat(0.4), Vec3::splat(0.3)];
+/// Factor on the ambient light and the background beside lamps, whose light shows best in the dark.
+const BESIDE_LAMPS: f32 = 0.5;
 /// In an interior, the irradiance of the light in its middle, at a distance of a mean half extent.
 const MIDDLE_IRRADIANCE: f32 = 0.35;
 /// Height of that light above the middle, in half extents.
@@ -111,8 +113,8 @@ pub(super) fn fill_in(path: &Path, scene: &mut Scene, lacks: Lacks, options: &Lo
 
 /// Gives a scene what it needs beside its lamps. Those of a mesh file are bright by the units of its program, and need
 /// an exposure, and so do those of a scene file that are too weak to count as lamps unless it says so. Outside, a mesh
-/// file gets the standard ambient light and background, as bright beside the lamps as they are beside the standard
-/// lights: shadows would be black, and things could not be told from what is beyond.
+/// file gets the standard ambient light and background in the units of its lamps, but less of them than beside the
+/// standard lights. Without them, shadows would be black, and things could not be told from what is beyond.
 fn set_lamplight(
     path: &Path,
     scene: &mut Scene,
@@ -130,9 +132,10 @@ fn set_lamplight(
     scene.defaults.is_metered |= lacks.exposure && (lacks.ground || lamplight.is_stated);
     // With the user's light, the exposure is not measured.
     if lacks.ground && !has_users_light && lamplight.mean > 0.0 {
-        let [sky, ground] = AMBIENT.map(|ambient| ambient * lamplight.mean);
+        let scale = BESIDE_LAMPS * lamplight.mean;
+        let [sky, ground] = AMBIENT.map(|ambient| ambient * scale);
         (scene.ambient, scene.ground) = (sky, Some(Ground { ambient: ground, up }));
-        scene.background = BACKGROUND * lamplight.mean;
+        scene.background = BACKGROUND * scale;
     }
 }
 

@@ -74,8 +74,7 @@ fn lamps_light_nothing_if_a_scene_file_states_whitted() {
     assert_eq!((scene.ambient, scene.background, scene.defaults.is_metered), (Vec3::ZERO, Vec3::ZERO, false));
 }
 
-/// Beside lamps, there is some light from everywhere, in the units of the lamps: the mean of the light on the floor is
-/// to the ambient light as 1 to a quarter.
+/// Beside lamps, there is some light from everywhere, in the units of the lamps: an eighth of the mean of their light.
 #[test]
 fn shadows_beside_lamps_are_not_black() {
     let of = |half: f32, lamp: &str| {
@@ -87,7 +86,7 @@ fn shadows_beside_lamps_are_not_black() {
     };
     let (ambient, background) = of(4.0, "Ke 8");
     // A lamp as large as the sky gives white paper a radiance of 8. This one covers about half of what the floor sees.
-    assert!((0.7..1.7).contains(&ambient) && background > ambient, "{ambient} {background}");
+    assert!((0.35..0.85).contains(&ambient) && background > ambient, "{ambient} {background}");
     let (of_bright, _) = of(4.0, "Ke 8000");
     assert!((of_bright / ambient - 1000.0).abs() < 1.0, "{of_bright}");
 }
