@@ -174,6 +174,38 @@ fn inspect_describes_the_scene_and_its_tree() {
     }
 }
 
+#[test]
+fn inspect_tells_which_light_is_chosen() {
+    let directory = TempDir::new().unwrap();
+    let write = |name: &str, content: &str| fs::write(directory.path().join(name), content).unwrap();
+    let lighting = |name: &str| {
+        let text = stdout(&succeed(directory.path(), &["inspect", name]));
+        let json = succeed(directory.path(), &["inspect", name, "--json"]).stdout;
+        let row = text.lines().find(|line| line.starts_with("lights ")).unwrap().to_owned();
+        (row, serde_json::from_slice::<Value>(&json).unwrap()["lighting"].clone())
+    };
+    write("m.obj", "mtllib m.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\n");
+    write("m.mtl", "newmtl m\nPm 1\nPr 0.1\n");
+    let (row, json) = lighting("m.obj");
+    assert!(row.ends_with("a main light and a second one from outside, chosen by kdray"), "{row}");
+    assert_eq!((json["chosen"].as_str(), json["integrator"].as_str()), (Some("outside"), Some("whitted")));
+    assert!(json["studio"].is_array() && json["ambient"][0].as_f64() > json["ambient_from_below"][0].as_f64());
+    assert_eq!((json["exposure"].as_f64(), json["background"][1].as_f64().is_some()), (Some(1.0), true));
+    write("m.toml", "ambient = [0.5, 0.5, 0.5]\n[[mesh]]\nfile = 'm.obj'\n");
+    let (row, json) = lighting("m.toml");
+    assert!(row.ends_with("as the file states") && json["chosen"].is_null(), "{row}");
+    assert_eq!(json["ambient"], json["ambient_from_below"]);
+    write("m.mtl", "newmtl m\nKe 9\n");
+    let (row, json) = lighting("m.obj");
+    assert!(row.ends_with("none, since surfaces that shine light the scene"), "{row}");
+    assert_eq!((json["chosen"].as_str(), json["integrator"].as_str()), (Some("surfaces"), Some("path")));
+    assert!(json["exposure"].is_null() && json["studio"].is_null());
+    write("r.toml", "[[mesh]]\ngenerator = 'room'\nsize = [6, 3, 9]\n");
+    let (row, json) = lighting("r.toml");
+    assert!(row.ends_with("one in the middle and one at the eye, chosen by kdray"), "{row}");
+    assert_eq!(json["chosen"].as_str(), Some("inside"));
+}
+
 /// Inspection counts the lights of paths, and tells whether a tree picks them.
 #[test]
 fn inspect_tells_how_paths_pick_lights() {

@@ -56,6 +56,7 @@ pub fn knot(n_triangles: u32) -> Scene {
         materials: vec![Material::default()],
         images: Vec::new(),
         lights: Vec::new(),
+        chosen_light: None,
         cameras: Vec::new(),
         camera: Camera {
             eye: Vec3::Z,

@@ -93,6 +93,7 @@ impl File<'_> {
 /// `options`: they name the materials that the user replaces beside those that the file does.
 fn assemble(file: &File, description: Description, options: &LoadOptions) -> Result<(Scene, Lacks), SceneError> {
     let has_beyond = description.environment.is_some() || description.sky.is_some();
+    let render = description.render.as_ref().map(|render| render.as_ref());
     let lacks = Lacks {
         up: Up::Y,
         // The file says what there is.
@@ -100,7 +101,8 @@ fn assemble(file: &File, description: Description, options: &LoadOptions) -> Res
         camera: description.camera.is_none() && description.cameras.is_empty(),
         light: description.light.is_empty() && description.ambient.is_none() && !has_beyond,
         background: description.background.is_none() && !has_beyond,
-        integrator: description.render.as_ref().is_none_or(|render| render.as_ref().integrator.is_none()),
+        integrator: render.is_none_or(|render| render.integrator.is_none()),
+        exposure: render.is_none_or(|render| render.exposure.is_none() && render.metered.is_none()),
     };
     let mut scene = Scene::empty(file.path);
     let replace = description.replace.as_ref().map(|spec| file.check("replace", spec, |words| choices(words)));

@@ -4,8 +4,9 @@
 use std::path::Path;
 
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
-use super::{Scene, SceneError};
+use super::{Scene, SceneError, mesh_file::bounds_of};
 
 /// Smallest length of a scene's longest side. Smaller scenes are refused, because products of their coordinates would
 /// underflow.
@@ -47,14 +48,37 @@ impl MeshOrigin {
         }
     }
 
-    /// Returns the origin with which a file has to be read again, if there is one. `bounds` are those of the mesh, as
-    /// it has been read with the first origin.
-    pub fn second(self, bounds: (Vec3, Vec3)) -> Option<DVec3> {
-        match self {
-            Self::At(_) => None,
-            Self::Near => Measure::of(bounds).filter(|it| it.is_coarse).map(|it| it.middle),
+    /// Returns the origin with which a file has to be read again, if there is one. `points` are those of the mesh, as
+    /// it has been read with the first origin. A few of them may be far away from the rest, as one at 0 in a file of a
+    /// map is: the origin is near the rest.
+    pub fn second(self, points: &[Vec3]) -> Option<DVec3> {
+        if let Self::At(_) = self {
+            return None;
         }
+        let coarse = |bounds: (Vec3, Vec3)| Measure::of(bounds).filter(|it| it.is_coarse);
+        let of_most = || bounds_of_most(points).filter(|(min, max)| min != max);
+        let all = bounds_of(points.par_iter().copied().filter(|p| p.is_finite()));
+        coarse(all).or_else(|| coarse(of_most()?)).map(|it| it.middle)
     }
+}
+
+/// Most points of a sample that tells where most points of a mesh are.
+const N_SAMPLE: usize = 2048;
+/// Share of the sample that is left out at each end of each axis.
+const LEFT_OUT: f64 = 0.1;
+
+/// Returns the box around most of the points, or `None` if there are none.
+fn bounds_of_most(points: &[Vec3]) -> Option<(Vec3, Vec3)> {
+    let step = points.len().div_ceil(N_SAMPLE).max(1);
+    let sample: Vec<Vec3> = points.iter().step_by(step).copied().filter(|p| p.is_finite()).collect();
+    let n_left_out = (sample.len() as f64 * LEFT_OUT) as usize;
+    let ends = |axis: usize| {
+        let mut places: Vec<f32> = sample.iter().map(|p| p[axis]).collect();
+        places.sort_by(f32::total_cmp);
+        Some((*places.get(n_left_out)?, *places.get(places.len() - 1 - n_left_out)?))
+    };
+    let [x, y, z] = [ends(0)?, ends(1)?, ends(2)?];
+    Some((Vec3::new(x.0, y.0, z.0), Vec3::new(x.1, y.1, z.1)))
 }
 
 /// The size of a box around points, and what single precision makes of it.

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{Camera, Instance, Mesh, Projection, Scene};
+use super::{Camera, Instance, Mesh, Projection, Scene, near::NearPart};
 
 /// Vertical field of view unless the user states one, degrees.
 pub(super) const VERTICAL_FOV_DEGREES: f32 = 40.0;
@@ -82,10 +82,10 @@ pub(super) struct Frame {
     pub vertical_fov_degrees: f32,
 }
 
-/// Returns a camera that sees a whole scene from outside, and that is as close as it can be. If the bounding box is
-/// long or flat, it is seen from a direction that shows much of its sides.
-pub(super) fn camera(scene: &Scene, bounds: (Vec3, Vec3), frame: &Frame) -> Camera {
-    let bounds = BoundingBox::new(bounds);
+/// Returns a camera that sees the near part of a scene, which mostly is the whole scene, from outside, and that is as
+/// close as it can be. If the bounding box is long or flat, it is seen from a direction that shows much of its sides.
+pub(super) fn camera(scene: &Scene, near: &NearPart, frame: &Frame) -> Camera {
+    let bounds = BoundingBox::new(near.bounds);
     let (usual_direction, usual) = usual(&bounds, frame);
     let others: Vec<_> =
         Direction::others().map(|direction| (direction, View::new(&bounds, direction, frame))).collect();
@@ -97,7 +97,7 @@ pub(super) fn camera(scene: &Scene, bounds: (Vec3, Vec3), frame: &Frame) -> Came
         _ => (usual_direction, &usual),
     };
     // The box's own corners are mostly empty.
-    let of_scene = |directions| support(scene, bounds.centre, directions);
+    let of_scene = |directions| support(scene, near, bounds.centre, directions);
     if bounds.is_enlarged {
         view.camera(frame)
     } else {
@@ -115,15 +115,16 @@ fn usual(bounds: &BoundingBox, frame: &Frame) -> (Direction, View) {
     if is_high || sees_top { (USUAL, view) } else { (HIGHER, View::new(bounds, HIGHER, frame)) }
 }
 
-/// Returns how far the triangles of a scene reach from a point in some directions, in lengths of each.
-fn support(scene: &Scene, from: DVec3, directions: [DVec3; 4]) -> [f64; 4] {
+/// Returns how far the triangles of a scene's near part reach from a point in some directions, in lengths of each.
+fn support(scene: &Scene, near: &NearPart, from: DVec3, directions: [DVec3; 4]) -> [f64; 4] {
     const NOTHING: [f64; 4] = [f64::NEG_INFINITY; 4];
     let most = |a: [f64; 4], b: [f64; 4]| std::array::from_fn(|ix| a[ix].max(b[ix]));
     let corners: Vec<Vec<Vec3>> = scene.meshes.par_iter().map(Mesh::corners).collect();
     let of_instance = |Instance { mesh_ix, transform, .. }: &Instance| {
         let object = directions.map(|direction| transform.height_in_object_space(direction, from));
         let of_corner = |p: &Vec3| object.map(|(direction, constant)| direction.dot(p.as_dvec3()) + constant);
-        corners[*mesh_ix].par_iter().map(of_corner).reduce(|| NOTHING, most)
+        let is_near = |p: &&Vec3| near.is_whole() || near.contains(transform.point(**p));
+        corners[*mesh_ix].par_iter().filter(is_near).map(of_corner).reduce(|| NOTHING, most)
     };
     scene.instances.par_iter().map(of_instance).reduce(|| NOTHING, most)
 }

@@ -1,8 +1,10 @@
 //! The rule that tells surfaces which light a scene, as lamps do, from those which only glow, as the lights of a car
 //! do.
 //!
-//! A file without lights that has lamps is shown in their light alone. So they have to light most of the picture: what
-//! is left would be black.
+//! A file without lights that has lamps is shown in their light. So they have to light most of the picture: what is
+//! left would be nearly black. A scene file that states an integrator has decided already: only paths show such light.
+
+use std::f32::consts::PI;
 
 use glam::Vec3;
 
@@ -12,6 +14,7 @@ use super::{
     lighting::N_PLACES,
     material::Material,
 };
+use crate::frame::Integrator;
 
 /// Least power of all lamps of a scene for its whole area, in units of white paper in full light.
 const LEAST_LAMPLIGHT: f64 = 0.1;
@@ -39,15 +42,52 @@ struct Triangle {
     normal: Vec3,
 }
 
+/// The light of lamps.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lamplight {
+    /// Mean radiance of white paper at the places that the camera sees, as if nothing cast shadows. It is 0 in
+    /// interiors, if the camera sees nothing but lamps, and if they are too weak to be taken for lamps unless the file
+    /// says so.
+    pub mean: f32,
+    /// Whether surfaces count as lamps only because the file states the integrator `path`.
+    pub is_stated: bool,
+}
+
+/// The triangles that give off light, each with the sum of all powers up to its own, and the indices of its instance
+/// and its face.
+type Lamps = Vec<(f64, (usize, usize))>;
+
 impl Scene {
-    /// Returns whether surfaces light the scene as lamps do. Some are brighter than white paper in full light, and
-    /// together they give off so much light that other surfaces get some of it. In an interior that is enough, since
-    /// its walls send the light everywhere. Outside, the lamps must reach most of what the camera sees.
-    pub(super) fn has_lamps(&self, is_interior: bool) -> bool {
-        if !self.materials.iter().any(|material| material.ke.max_element() > 1.0) {
-            return false;
+    /// Returns the light of surfaces if they light the scene as lamps do. Some are brighter than white paper in full
+    /// light, and together they give off so much light that other surfaces get some of it. In an interior that is
+    /// enough, since its walls send the light everywhere. Outside, the lamps must reach most of what the camera sees.
+    ///
+    /// `stated`: the integrator that the file states. `Path` shows the light of all bright surfaces, and that is why it
+    /// is stated; `Whitted` shows none.
+    pub(super) fn lamplight(&self, is_interior: bool, stated: Option<Integrator>) -> Option<Lamplight> {
+        let is_bright = self.materials.iter().any(|material| material.ke.max_element() > 1.0);
+        if !is_bright || stated == Some(Integrator::Whitted) {
+            return None;
         }
         let emission: Vec<f32> = self.materials.iter().map(|material| self.mean_emission(material)).collect();
+        let (area, lamps) = self.lamps(&emission);
+        let (power, _) = *lamps.last()?;
+        let by_rule = if power < LEAST_LAMPLIGHT * area {
+            None
+        } else if is_interior {
+            Some(0.0)
+        } else {
+            self.even_lamplight(&emission, &lamps)
+        };
+        match (by_rule, stated) {
+            (Some(mean), _) => Some(Lamplight { mean, is_stated: false }),
+            (None, Some(_)) => Some(Lamplight { mean: 0.0, is_stated: true }),
+            (None, None) => None,
+        }
+    }
+
+    /// Returns the area of all triangles, and the lamps.
+    fn lamps(&self, emission: &[f32]) -> (f64, Lamps) {
         let (mut area, mut power, mut lamps) = (0.0, 0.0, Vec::new());
         for (instance_ix, instance) in self.instances.iter().enumerate() {
             for face_ix in 0..self.meshes[instance.mesh_ix].faces.len() {
@@ -60,14 +100,14 @@ impl Scene {
                 }
             }
         }
-        let is_enough = !lamps.is_empty() && power >= LEAST_LAMPLIGHT * area;
-        is_enough && (is_interior || self.lit_share(&emission, &lamps) >= LEAST_LIT)
+        (area, lamps)
     }
 
-    /// Returns the share of what the camera sees that lamps light, or 1 if it sees nothing but lamps. What casts
-    /// shadows does not count. `lamps`: the lamps' triangles, each with the sum of all powers up to its own.
-    fn lit_share(&self, emission: &[f32], lamps: &[(f64, (usize, usize))]) -> f32 {
+    /// Returns the mean radiance of white paper where the camera sees it, if lamps light most of that. It is 0 if the
+    /// camera sees nothing but lamps. What casts shadows does not count.
+    fn even_lamplight(&self, emission: &[f32], lamps: &Lamps) -> Option<f32> {
         let points = self.lamp_points(lamps);
+        let power_of_point = lamps.last().map_or(0.0, |(power, _)| *power as f32) / N_LAMP_POINTS as f32;
         let rays = view_rays(&self.camera, self.defaults.width as f32 / self.defaults.height as f32, N_SEEN);
         let hits = hits(self, &rays);
         let irradiance = |(ray, hit): (&Ray, Hit)| {
@@ -80,11 +120,12 @@ impl Scene {
         let seen: Vec<f32> = seen.collect();
         let mean = seen.iter().sum::<f32>() / seen.len().max(1) as f32;
         let n_lit = seen.iter().filter(|irradiance| **irradiance > LEAST_IRRADIANCE * mean).count();
-        if seen.is_empty() { 1.0 } else { n_lit as f32 / seen.len() as f32 }
+        let is_lit = n_lit as f32 >= LEAST_LIT * seen.len() as f32;
+        is_lit.then_some(mean * power_of_point / PI)
     }
 
     /// Returns points on lamps, in proportion to the power of their triangles.
-    fn lamp_points(&self, lamps: &[(f64, (usize, usize))]) -> Vec<LampPoint> {
+    fn lamp_points(&self, lamps: &Lamps) -> Vec<LampPoint> {
         let power = lamps.last().map_or(0.0, |(power, _)| *power);
         let point = |ix: usize| {
             let at = power * (ix as f64 + 0.5) / N_LAMP_POINTS as f64;
@@ -120,8 +161,8 @@ impl Scene {
 }
 
 impl Triangle {
-    /// Returns the irradiance, in any unit, at the place where a ray hits the triangle at `t`, on the side that the ray
-    /// meets, as if nothing cast shadows.
+    /// Returns the irradiance at the place where a ray hits the triangle at `t`, on the side that the ray meets, as if
+    /// nothing cast shadows and each point of a lamp had the power 1.
     fn irradiance(&self, ray: &Ray, t: f32, lamps: &[LampPoint]) -> f32 {
         let position = ray.origin + t * ray.direction;
         let normal = if self.normal.dot(ray.direction) > 0.0 { -self.normal } else { self.normal };

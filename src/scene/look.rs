@@ -154,6 +154,7 @@ impl Look {
             }
             // The lights that had physical units are gone.
             scene.defaults.is_metered = false;
+            scene.chosen_light = None;
         }
         if let Some(background) = self.background {
             scene.background = background;

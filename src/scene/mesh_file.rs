@@ -157,7 +157,7 @@ impl Shape {
             ShapeKind::Stl(mesh) => mesh,
             ShapeKind::Obj(_) => return Ok(made),
         };
-        match origin.second(bounds_of(mesh.positions.par_iter().copied())) {
+        match origin.second(&mesh.positions) {
             Some(nearer) => parse(read_mesh(path)?, nearer),
             None => Ok(made),
         }

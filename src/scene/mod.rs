@@ -32,6 +32,7 @@ mod material;
 mod material_spec;
 pub mod mesh;
 mod mesh_file;
+mod near;
 mod needs;
 mod obj;
 mod outside;
@@ -76,6 +77,7 @@ pub use self::{
     preset::{MaterialChoice, Preset},
     sky::Sky,
     sources::{source_files, source_files_with},
+    standard::ChosenLight,
     terms::{Term, TermValue},
     texture::{Channel, Encoding, Image, Pixels, Texture, Wrap},
     transform::Transform,
@@ -109,6 +111,8 @@ pub struct Scene {
     pub images: Vec<Image>,
     /// Lights, possibly none.
     pub lights: Vec<Light>,
+    /// Which lights were chosen, if the file has none and the user has not chosen any.
+    pub chosen_light: Option<ChosenLight>,
     /// The image of what is seen beyond the scene; without one, that is `background`. Only the path tracer knows it.
     pub environment: Option<Environment>,
     /// The sky and its sun. The path tracer knows both, in place of `environment`, and otherwise only the sun is known.
@@ -205,7 +209,7 @@ impl Scene {
     pub fn of_text(name: &str, text: &str) -> Result<Scene, SceneError> {
         let (path, options) = (Path::new(name), LoadOptions::default());
         let (mut scene, lacks) = assemble::parse_toml(path, text, &options)?;
-        standard::fill_in(&mut scene, lacks, &options).map_err(|what| SceneError::file(path, what))?;
+        standard::fill_in(path, &mut scene, lacks, &options).map_err(|what| SceneError::file(path, what))?;
         Ok(scene)
     }
 
@@ -228,7 +232,7 @@ impl Scene {
         if let Some(name) = &options.camera {
             scene.choose_camera(name).map_err(|what| SceneError::file(path, what))?;
         }
-        standard::fill_in(&mut scene, lacks, options).map_err(|what| SceneError::file(path, what))?;
+        standard::fill_in(path, &mut scene, lacks, options).map_err(|what| SceneError::file(path, what))?;
         Ok(scene)
     }
 
@@ -301,6 +305,7 @@ impl Scene {
             materials: Vec::new(),
             images: Vec::new(),
             lights: Vec::new(),
+            chosen_light: None,
             camera: Camera {
                 eye: Vec3::ZERO,
                 target: Vec3::NEG_Z,
@@ -354,7 +359,16 @@ fn load_mesh_file(path: &Path, options: &LoadOptions) -> Result<(Scene, Lacks), 
     scene.push_mesh(mesh, Transform::IDENTITY, slots).map_err(|what| SceneError::file(path, what))?;
     extent::check(path, scene.bounds())?;
     scene.defaults.samples = standard::SAMPLES;
-    Ok((scene, Lacks { camera: true, up: guess.up, ground: true, light: true, background: true, integrator: true }))
+    let lacks = Lacks {
+        camera: true,
+        up: guess.up,
+        ground: true,
+        light: true,
+        background: true,
+        integrator: true,
+        exposure: true,
+    };
+    Ok((scene, lacks))
 }
 
 /// Refuses the choice of a scene for a file that has only one.

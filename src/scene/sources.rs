@@ -59,7 +59,7 @@ fn libraries(mesh: &Path, access: Access) -> Vec<PathBuf> {
     let bytes = read_bytes(mesh).unwrap_or_default();
     match MeshFormat::of(mesh, &bytes) {
         MeshFormat::Gltf => gltf::named_files(mesh, &bytes, access),
-        MeshFormat::Ply => named_images(mesh, access),
+        MeshFormat::Ply => named_images(mesh, &bytes, access),
         MeshFormat::Stl => Vec::new(),
         MeshFormat::Obj => named_files(mesh, &lossy_text(bytes), access),
     }
@@ -72,6 +72,20 @@ mod tests {
     use tempfile::TempDir;
 
     use super::*;
+
+    /// Old programs write comments in the encoding of their system.
+    #[test]
+    fn images_of_ply_files_are_named_whatever_the_headers_encoding_is() {
+        let directory = TempDir::new().unwrap();
+        let path = |name: &str| directory.path().join(name);
+        for header in [&b"ply\nformat ascii 1.0\ncomment caf\xe9\n"[..], b"ply\rformat ascii 1.0\r"] {
+            let line_end = &header[3..4];
+            let lines = [&b"comment TextureFile a.png"[..], b"element vertex 0", b"property float x", b"end_header"];
+            let rest = lines.map(|line| [line, line_end].concat()).concat();
+            fs::write(path("m.ply"), [header, &rest].concat()).unwrap();
+            assert_eq!(source_files(&path("m.ply")), [path("a.png"), path("m.ply")]);
+        }
+    }
 
     #[test]
     fn a_scene_names_its_meshes_and_they_their_libraries() {

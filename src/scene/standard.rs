@@ -1,5 +1,7 @@
 //! Standard cameras and lights, for scenes that lack their own.
 
+use std::path::Path;
+
 use glam::Vec3;
 
 use super::{
@@ -7,7 +9,9 @@ use super::{
     error::Checked,
     framing::{self, Frame, WorldAxes},
     interior,
+    lamps::Lamplight,
     look::Up,
+    near::NearPart,
 };
 use crate::frame::Integrator;
 
@@ -25,6 +29,19 @@ pub(super) struct Lacks {
     pub background: bool,
     /// How light is computed. If the file leaves it out, the scene's content decides.
     pub integrator: bool,
+    /// The exposure, and whether it is measured.
+    pub exposure: bool,
+}
+
+/// The lights that are chosen for a scene whose file has none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ChosenLight {
+    /// Two directional lights and ambient light, for a scene that is seen from outside.
+    Outside,
+    /// Two point lights and ambient light, for an interior.
+    Inside,
+    /// No lights, since surfaces that shine light the scene.
+    Surfaces,
 }
 
 /// Samples per pixel of a picture of a file that is no scene file, enough to smooth its edges.
@@ -38,6 +55,8 @@ const FILL: Lamp = Lamp { azimuth: 60.0, elevation: 20.0, irradiance: 0.22 };
 /// have their own colours.
 const AMBIENT: [Vec3; 2] = [Vec3::new(0.25, 0.26, 0.28), Vec3::new(0.15, 0.14, 0.12)];
 const AMBIENT_OF_INTERIORS: [Vec3; 2] = [Vec3::splat(0.4), Vec3::splat(0.3)];
+/// Factor on the ambient light and the background beside lamps, whose light shows best in the dark.
+const BESIDE_LAMPS: f32 = 0.5;
 /// In an interior, the irradiance of the light in its middle, at a distance of a mean half extent.
 const MIDDLE_IRRADIANCE: f32 = 0.35;
 /// Height of that light above the middle, in half extents.
@@ -46,15 +65,16 @@ const MIDDLE_HEIGHT: f32 = 0.3;
 const EYE_IRRADIANCE: f32 = 0.25;
 const BACKGROUND: Vec3 = Vec3::new(0.32, 0.36, 0.42);
 
-/// Gives a scene what its file lacks, and what the user has chosen.
-pub(super) fn fill_in(scene: &mut Scene, lacks: Lacks, options: &LoadOptions) -> Checked<()> {
+/// Gives a scene what its file lacks, and what the user has chosen. `path` is the scene's file.
+pub(super) fn fill_in(path: &Path, scene: &mut Scene, lacks: Lacks, options: &LoadOptions) -> Checked<()> {
     let look = &options.look;
     let up = look.up.unwrap_or(lacks.up);
     let axes = WorldAxes::with_up(up.vector());
     let lacks_light = lacks.light && look.sky.is_none();
     let needs_ground = lacks.ground && look.sky.is_some();
     let needs_bounds = lacks.camera || lacks_light || needs_ground;
-    let bounds = if needs_bounds { scene.bounds() } else { Default::default() };
+    let near = if needs_bounds { NearPart::of(scene) } else { NearPart::default() };
+    let bounds = near.bounds;
     let is_interior = needs_bounds && interior::is_interior(scene, bounds);
     if lacks.camera {
         let aspect = options.aspect.unwrap_or(scene.defaults.width as f32 / scene.defaults.height as f32);
@@ -62,7 +82,10 @@ pub(super) fn fill_in(scene: &mut Scene, lacks: Lacks, options: &LoadOptions) ->
         let frame = |standard| Frame { axes, aspect: f64::from(aspect), vertical_fov_degrees: fov(standard) };
         let (outside, inside) = (frame(framing::VERTICAL_FOV_DEGREES), frame(interior::VERTICAL_FOV_DEGREES));
         let of_interior = if is_interior { interior::camera(scene, bounds, [&outside, &inside]) } else { None };
-        scene.camera = of_interior.unwrap_or_else(|| framing::camera(scene, bounds, &outside));
+        scene.camera = of_interior.unwrap_or_else(|| framing::camera(scene, &near, &outside));
+        if look.eye.is_none() {
+            near.warn_of_far(path, scene);
+        }
     }
     look.set_camera(scene)?;
     if look.sky.is_some() {
@@ -72,29 +95,69 @@ pub(super) fn fill_in(scene: &mut Scene, lacks: Lacks, options: &LoadOptions) ->
             scene.add_ground(bounds, up)?;
         }
     }
-    let has_lamps = lacks_light && scene.has_lamps(is_interior);
+    let stated = (!lacks.integrator).then_some(scene.defaults.integrator);
+    let lamplight = if lacks_light { scene.lamplight(is_interior, stated) } else { None };
     // What only glows lights nothing, and the picture is there sooner and without noise if no light is sought there.
-    let only_glows = lacks_light && !has_lamps && lacks.ground;
+    let only_glows = lacks_light && lamplight.is_none();
     if lacks.integrator && scene.needs_path() && !only_glows {
         scene.defaults.integrator = Integrator::Path;
     }
-    // Lamps of a mesh file are bright by the units of its program, and need an exposure.
-    scene.defaults.is_metered |= has_lamps && lacks.ground;
-    if lacks_light && !has_lamps {
-        let lamps = if is_interior { lamps_inside(scene, bounds) } else { lamps_outside(scene, &axes) };
-        let [sky, ground] = if is_interior { AMBIENT_OF_INTERIORS } else { AMBIENT };
-        (scene.ambient, scene.ground) = (sky, Some(Ground { ambient: ground, up }));
-        scene.lights = lamps.to_vec();
-        if lacks.background {
-            scene.background = BACKGROUND;
-        }
-        if !is_interior && scene.has_mirrors() {
-            let level = Lamp { azimuth: 0.0, elevation: 0.0, irradiance: 0.0 };
-            scene.studio = Some(lamp_towards(scene, &axes, &level));
-        }
+    match lamplight {
+        Some(lamplight) => set_lamplight(path, scene, lamplight, (lacks, up, look.light.is_some())),
+        None if lacks_light => set_lights(scene, lacks, (is_interior, bounds), (&axes, up)),
+        None => {}
     }
     look.set_light(scene);
     Ok(())
+}
+
+/// Gives a scene what it needs beside its lamps. Those of a mesh file are bright by the units of its program, and need
+/// an exposure, and so do those of a scene file that are too weak to count as lamps unless it says so. Outside, a mesh
+/// file gets the standard ambient light and background in the units of its lamps, but less of them than beside the
+/// standard lights. Without them, shadows would be black, and things could not be told from what is beyond.
+fn set_lamplight(
+    path: &Path,
+    scene: &mut Scene,
+    lamplight: Lamplight,
+    (lacks, up, has_users_light): (Lacks, Up, bool),
+) {
+    scene.chosen_light = Some(ChosenLight::Surfaces);
+    if lamplight.is_stated {
+        tracing::info!(
+            "{}: the surfaces that shine are its only light, since it states `integrator = \"path\"`; `ambient = [0.3, \
+             0.3, 0.3]` adds some",
+            path.display()
+        );
+    }
+    scene.defaults.is_metered |= lacks.exposure && (lacks.ground || lamplight.is_stated);
+    // With the user's light, the exposure is not measured.
+    if lacks.ground && !has_users_light && lamplight.mean > 0.0 {
+        let scale = BESIDE_LAMPS * lamplight.mean;
+        let [sky, ground] = AMBIENT.map(|ambient| ambient * scale);
+        (scene.ambient, scene.ground) = (sky, Some(Ground { ambient: ground, up }));
+        scene.background = BACKGROUND * scale;
+    }
+}
+
+/// Gives a scene the standard lights, and a background if it lacks one.
+fn set_lights(
+    scene: &mut Scene,
+    lacks: Lacks,
+    (is_interior, bounds): (bool, (Vec3, Vec3)),
+    (axes, up): (&WorldAxes, Up),
+) {
+    let lamps = if is_interior { lamps_inside(scene, bounds) } else { lamps_outside(scene, axes) };
+    let [sky, ground] = if is_interior { AMBIENT_OF_INTERIORS } else { AMBIENT };
+    scene.chosen_light = Some(if is_interior { ChosenLight::Inside } else { ChosenLight::Outside });
+    (scene.ambient, scene.ground) = (sky, Some(Ground { ambient: ground, up }));
+    scene.lights = lamps.to_vec();
+    if lacks.background {
+        scene.background = BACKGROUND;
+    }
+    if !is_interior && scene.has_mirrors() {
+        let level = Lamp { azimuth: 0.0, elevation: 0.0, irradiance: 0.0 };
+        scene.studio = Some(lamp_towards(scene, axes, &level));
+    }
 }
 
 /// A directional light. Its direction is relative to the viewer: `azimuth` to the right, `elevation` upwards, degrees.

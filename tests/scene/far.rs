@@ -109,6 +109,25 @@ fn bare_files_keep_their_details() {
     assert_eq!(corners(&scene), [coarse]);
 }
 
+/// A point at 0 in the file of a map is not to cost the map its details, whether a face names it or not.
+#[test]
+fn stray_points_cost_no_details() {
+    let corner = |ix: usize| FAR + dvec3((ix % 10) as f64, 0.0625, (ix / 10) as f64 + 0.125);
+    let points: String = (0..100).map(|ix| format!("v {}\n", words(corner(ix)))).collect();
+    let faces: String = (0..89).map(|ix| format!("f {} {} {}\n", ix + 1, ix + 2, ix + 11)).collect();
+    let stray = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\n";
+    for more in ["", "f 101 102 103\n"] {
+        // A weight is read the careful way.
+        for points in [points.clone(), points.replacen(&words(corner(0)), &format!("{} 1", words(corner(0))), 1)] {
+            let files = Files::new(&[("a.obj", &format!("{points}{stray}{faces}{more}"))]);
+            let scene = files.load("a.obj", &recentred());
+            assert!((scene.origin - FAR).abs().max_element() < 20.0, "{more}: {}", scene.origin);
+            assert_eq!(corners(&scene)[0], [0, 1, 10].map(corner), "{more}");
+            assert!(scene.camera.eye.length() < 100.0, "{more}: {:?}", scene.camera);
+        }
+    }
+}
+
 #[test]
 fn other_files_stay_where_they_are() {
     for points in [POINTS, POINTS.map(|p| 1000.0 * p + dvec3(0.0, 5000.0, 0.0))] {

@@ -38,6 +38,7 @@ fn scene(instances: Vec<Instance>) -> Scene {
         instances,
         materials: ["red", "green", "blue"].map(named).into(),
         lights: vec![Light::Point { position: Vec3::Z, intensity: Vec3::ONE }],
+        chosen_light: None,
         images: Vec::new(),
         cameras: Vec::new(),
         camera: Camera {

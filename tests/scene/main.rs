@@ -8,8 +8,10 @@ mod far;
 mod generators;
 mod gltf;
 mod instances;
+mod lamps;
 mod materials;
 mod mesh_files;
+mod near;
 mod obj;
 mod odd_files;
 mod path;
@@ -20,6 +22,7 @@ mod standard;
 mod strangers;
 #[path = "../support/mod.rs"]
 mod support;
+mod tiles;
 
 use std::{fs, path::Path};
 

@@ -21,6 +21,7 @@ pub fn empty() -> Scene {
         materials: Vec::new(),
         images: Vec::new(),
         lights: Vec::new(),
+        chosen_light: None,
         camera: Camera {
             eye: vec3(0.0, 0.0, 4.0),
             target: Vec3::ZERO,

@@ -1,6 +1,7 @@
 //! `kdray inspect`: the contents of a scene, and the figures of its acceleration structure.
 
 mod contents;
+mod lighting;
 mod text;
 
 use glam::DVec3;
@@ -17,6 +18,7 @@ use serde::Serialize;
 
 use self::{
     contents::{Contents, MaterialDetails, TextureMemory},
+    lighting::Lighting,
     text::{cut_table, shortened},
 };
 use super::{args::InspectArgs, build, error::CliError, print, print_raw, progress::Progress, table::table};
@@ -29,6 +31,7 @@ pub fn run(args: &InspectArgs) -> Result<(), CliError> {
     });
     let scene = scene?;
     let contents = Contents::from(&scene);
+    let lighting = Lighting::from(&scene);
     let details: Vec<_> = scene.materials.iter().map(|material| MaterialDetails::new(material, &scene)).collect();
     let flat = FlatScene::new(&scene).map_err(GpuError::from)?;
     // The unflattened scene is freed here, because building the structure needs the memory.
@@ -55,6 +58,7 @@ pub fn run(args: &InspectArgs) -> Result<(), CliError> {
         bounds: world.bounds().map(|corner| corner.to_array()),
         materials: material_uses(scene, details),
         lights: scene.lights.iter().map(LightUse::from).collect(),
+        lighting,
         contents,
         texture_memory: TextureMemory::from(&scene.textures),
         path_lights: PathLights::from(world.emitters()),
@@ -84,6 +88,7 @@ struct Inspection {
     origin: Option<[f64; 3]>,
     materials: Vec<MaterialUse>,
     lights: Vec<LightUse>,
+    lighting: Lighting,
     #[serde(flatten)]
     contents: Contents,
     texture_memory: TextureMemory,
@@ -218,6 +223,8 @@ impl Inspection {
         text += &cut_table(header, &self.lights, |_, light| {
             [light.kind.to_owned(), vector(light.position), vector(light.intensity)]
         });
+        text.push('\n');
+        text += &self.lighting.text();
         text.push('\n');
         text += &self.accel_text();
         text.push('\n');

@@ -28,7 +28,6 @@ use std::path::Path;
 use glam::{DVec3, Vec3};
 use gltf::json::{Node, mesh::Primitive};
 use hashbrown::{HashMap, HashSet};
-use rayon::prelude::*;
 
 pub(super) use self::document::named_files;
 use self::{
@@ -45,7 +44,6 @@ use super::{
     extent::{self, MeshOrigin},
     image::MAX_PIXELS,
     look::Up,
-    mesh_file::bounds_of,
     needs::{MeshSize, require_for_mesh},
     outside::Access,
     preset::MaterialChoice,
@@ -86,6 +84,7 @@ pub(super) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result
         light: lacks_light,
         background: lacks_light,
         integrator: true,
+        exposure: true,
     };
     Ok((scene, lacks))
 }
@@ -315,7 +314,7 @@ impl<'a> Loader<'a> {
         if whole.faces.is_empty() {
             return Ok(None);
         }
-        let far = MeshOrigin::Near.second(bounds_of(whole.positions.par_iter().copied()));
+        let far = MeshOrigin::Near.second(&whole.positions);
         let origin = far.filter(|_| skin.is_some()).unwrap_or_default();
         if let (Some(skin), true) = (&mut skin, origin != DVec3::ZERO) {
             skin.origin = origin;

@@ -8,12 +8,17 @@ use crate::scene::texture::{Channel, Image};
 /// Share of the opacities that are 0 or 1 in the map of a surface with holes, such as a leaf.
 const CUTOUT_SHARE: f64 = 0.95;
 
+/// Least and largest share of the pixels that are wholly transparent, in an image that is a cut-out. Fewer are a
+/// blemish, and an image of more shows nothing.
+const HOLES: (f64, f64) = (0.05, 0.98);
+
 /// An image and what is known about it.
 #[derive(Debug)]
 pub(in crate::scene) struct Examined {
     image: Image,
     is_see_through: OnceCell<bool>,
     shows_normals: OnceCell<bool>,
+    is_cut_out: OnceCell<bool>,
     /// For each channel, whether almost all of its values are 0 or 1.
     is_nearly_binary: [OnceCell<bool>; Channel::ALL.len()],
 }
@@ -21,8 +26,8 @@ pub(in crate::scene) struct Examined {
 impl Examined {
     /// Wraps an image of which nothing is known yet.
     pub fn new(image: Image) -> Self {
-        let (is_see_through, shows_normals) = (OnceCell::new(), OnceCell::new());
-        Self { image, is_see_through, shows_normals, is_nearly_binary: Default::default() }
+        let [is_see_through, shows_normals, is_cut_out] = [const { OnceCell::new() }; 3];
+        Self { image, is_see_through, shows_normals, is_cut_out, is_nearly_binary: Default::default() }
     }
 
     pub fn image(&self) -> &Image {
@@ -45,6 +50,12 @@ impl Examined {
         *known.get_or_init(|| is_nearly_binary(&self.image, channel))
     }
 
+    /// Returns whether an image of colours is cut out, as that of a leaf: its opacity is almost everywhere 0 or 1, and
+    /// a considerable part of it is 0.
+    pub fn is_cut_out(&self) -> bool {
+        *self.is_cut_out.get_or_init(|| has_holes(&self.image) && self.is_nearly_binary(Channel::Alpha))
+    }
+
     /// Returns whether an image under `bump` is a normal map and no height map: its mean colour is blue, as normals
     /// along +z are, while heights are grey.
     pub fn shows_normals(&self) -> bool {
@@ -59,6 +70,12 @@ fn is_nearly_binary(Image { pixels, .. }: &Image, channel: Channel) -> bool {
     // Whatever its encoding, a colour whose luminance is 0 or 1 is black or white.
     let n_ends = (0..n).filter(|ix| is_end(channel.of(pixels.get(*ix)))).count();
     n_ends as f64 >= CUTOUT_SHARE * n as f64
+}
+
+fn has_holes(Image { pixels, .. }: &Image) -> bool {
+    let n_holes = (0..pixels.len()).filter(|ix| pixels.get(*ix)[3] < 0.5 / 255.0).count();
+    let share = n_holes as f64 / pixels.len() as f64;
+    (HOLES.0..=HOLES.1).contains(&share)
 }
 
 fn shows_normals(Image { pixels, .. }: &Image) -> bool {
@@ -91,11 +108,19 @@ mod tests {
     }
 
     #[test]
+    fn cut_outs_have_holes() {
+        let of = |opacities: [u8; 4]| examined(opacities.repeat(5).into_iter().map(|a| [90, 90, 20, a]).collect());
+        assert!(of([255, 0, 255, 255]).is_cut_out() && of([0, 0, 255, 0]).is_cut_out());
+        // A picture without holes, one of nothing, and a mask of gloss.
+        assert!(!of([255; 4]).is_cut_out() && !of([0; 4]).is_cut_out() && !of([0, 80, 160, 255]).is_cut_out());
+    }
+
+    #[test]
     fn facts_are_found_once() {
         let mut image = examined(vec![[40, 90, 20, 0]]);
         let facts = |it: &Examined| {
             let is_binary = Channel::ALL.map(|channel| it.is_nearly_binary(channel));
-            (it.opacity_channel(), it.shows_normals(), is_binary)
+            (it.opacity_channel(), it.shows_normals(), it.is_cut_out(), is_binary)
         };
         let found = facts(&image);
         // Whoever asks again is told what was found before.

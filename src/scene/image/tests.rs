@@ -110,6 +110,18 @@ fn gif_and_tiff_are_read() {
     assert_eq!((floats_of(&image)[0], image.is_linear), ([4.0, 0.5, 0.25, 1.0], true));
 }
 
+/// A strip that says that it is large is not read, however small the picture is.
+#[test]
+fn strips_of_tiff_files_are_limited() {
+    let mut bytes = encoded(with_alpha(), ImageFormat::Tiff);
+    // The entry of the directory: the strips' numbers of bytes, one number of 32 bits.
+    let entry = [0x17, 0x01, 4, 0, 1, 0, 0, 0];
+    let at = bytes.windows(8).position(|part| part == entry).expect("one strip") + entry.len();
+    bytes[at..at + 4].copy_from_slice(&(1_u32 << 30).to_le_bytes());
+    let error = decoded("a", bytes).unwrap_err();
+    assert!(error.to_lowercase().contains("limit"), "{error}");
+}
+
 #[test]
 fn other_formats_are_called_by_their_names() {
     for (bytes, what) in [

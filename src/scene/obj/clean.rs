@@ -15,7 +15,7 @@ use std::{
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use crate::scene::{error::Checked, mesh_file::bounds_of, needs::MeshSize};
+use crate::scene::{error::Checked, needs::MeshSize};
 
 /// How a face is shaded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -130,14 +130,14 @@ pub struct CleanObj {
 }
 
 impl CleanObj {
-    /// Returns the least and the greatest coordinates of all points.
-    pub fn bounds(&self) -> (Vec3, Vec3) {
+    /// Returns all points whose coordinates are finite.
+    pub fn points(&self) -> Vec<Vec3> {
         let point = |line: &str| {
             let mut numbers = line.split_ascii_whitespace().skip(1).flat_map(str::parse::<f32>);
             let point = Vec3::new(numbers.next()?, numbers.next()?, numbers.next()?);
             point.is_finite().then_some(point)
         };
-        bounds_of(self.text[0].par_lines().filter_map(point))
+        self.text[0].par_lines().filter_map(point).collect()
     }
 
     /// Returns the text for tobj. Its first line names a material library, so that tobj calls its material loader.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::{
     clean::{split_keyword, statements},
     maps::{MapKind, MapOptions},
+    tiles::files_of_tiles,
 };
 use crate::scene::{
     error::Checked,
@@ -31,13 +32,18 @@ pub fn named_files(obj: &Path, text: &str, access: Access) -> Vec<PathBuf> {
 fn named_images(reach: Reach, mtl: &Path) -> Vec<PathBuf> {
     let text = read_lossy(mtl).unwrap_or_default();
     let folder = mtl.parent().unwrap_or(Path::new(""));
-    let file = |statement: &str| match split_keyword(statement) {
+    let files = |statement: &str| match split_keyword(statement) {
         (keyword, rest) if matches!(MapKind::of(keyword), MapKind::Shown(_)) => {
-            map_file(reach, folder, &MapOptions::new(rest).ok()?.name).ok().map(|file| file.path)
+            let Ok(MapOptions { name, .. }) = MapOptions::new(rest) else { return Vec::new() };
+            let tiles = files_of_tiles(reach, folder, &name);
+            match tiles.is_empty() {
+                true => map_file(reach, folder, &name).into_iter().map(|file| file.path).collect(),
+                false => tiles.into_iter().map(|(_, file)| file.path).collect(),
+            }
         }
-        _ => None,
+        _ => Vec::new(),
     };
-    statements(&text).filter_map(|(_, statement)| file(&statement)).collect()
+    statements(&text).flat_map(|(_, statement)| files(&statement)).collect()
 }
 
 /// Returns the files that a `mtllib` line names. The rest of the line is one name, possibly with spaces, if such a

@@ -2,7 +2,7 @@
 
 use glam::Vec2;
 
-use super::clean::split_keyword;
+use super::{clean::split_keyword, tiles};
 use crate::scene::{
     error::Checked,
     image_files::{Images, View},
@@ -84,6 +84,12 @@ impl MapOptions {
         }
         options.name = rest.trim_matches('"').trim().to_owned();
         if options.name.is_empty() { Err("names no file".to_owned()) } else { Ok(options) }
+    }
+
+    /// Returns the options of the map for a tile, whose image does not repeat.
+    pub fn for_tile(&self, tile: u32) -> Self {
+        let (u, v) = tiles::corner(tile);
+        Self { offset: self.offset - Vec2::new(u, v), clamp: true, ..self.clone() }
     }
 
     /// Reads an option's values. Returns what follows them, or nothing if there is no such option.

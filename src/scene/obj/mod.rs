@@ -7,6 +7,7 @@ mod model;
 mod mtl;
 mod polypaint;
 mod quick;
+mod tiles;
 
 use std::{collections::HashMap, path::Path};
 
@@ -68,18 +69,18 @@ pub(super) fn read_obj(
     let first = origin.first();
     // The quick way keeps points as they are written.
     let quick = if first == DVec3::ZERO { quick_obj(&text, progress) } else { None };
-    let (content, bounds) = match quick {
+    let (content, points) = match quick {
         Some(quick) => {
-            let bounds = quick.bounds();
-            (ObjContent::Quick(quick), bounds)
+            let points = quick.points();
+            (ObjContent::Quick(quick), points)
         }
         None => {
             let clean = careful(path, &text, first)?;
-            let bounds = clean.bounds();
-            (ObjContent::Careful(clean), bounds)
+            let points = clean.points();
+            (ObjContent::Careful(clean), points)
         }
     };
-    Ok(match origin.second(bounds) {
+    Ok(match origin.second(&points) {
         Some(origin) => ObjFile { content: ObjContent::Careful(careful(path, &text, origin)?), text, origin },
         None => ObjFile { content, text, origin: first },
     })
@@ -95,7 +96,7 @@ pub(super) fn obj_mesh(path: &Path, file: ObjFile, loading: &mut Loading) -> Res
     let ObjFile { text, content, origin } = file;
     let clean = content.clean();
     require_for_mesh(n_loaded as u64, &clean.size).map_err(|what| SceneError::file(path, what))?;
-    let materials = mtl::load_libraries(path, &clean.libraries, access, images)?;
+    let (materials, tiles) = mtl::load_libraries(path, &clean.libraries, access, images)?;
     if let Some((line, statement)) = &clean.unknown {
         tracing::warn!("{}:{line}: unknown statement `{}`", path.display(), statement.escape_debug());
     }
@@ -108,7 +109,7 @@ pub(super) fn obj_mesh(path: &Path, file: ObjFile, loading: &mut Loading) -> Res
         ObjContent::Quick(quick) => quick.models(|name| by_name.get(name).copied()),
         ObjContent::Careful(_) => None,
     };
-    let (mesh, uses_crease) = match quick_models {
+    let (mut mesh, uses_crease) = match quick_models {
         Some(models) => model::mesh(&models, no_material, by_kind),
         None => {
             let cleaned = match content {
@@ -124,6 +125,7 @@ pub(super) fn obj_mesh(path: &Path, file: ObjFile, loading: &mut Loading) -> Res
             model::mesh(&models, no_material, by_kind)
         }
     };
+    tiles.assign(path, &mut mesh);
     Ok(Loaded { mesh, origin, materials, uses_crease })
 }
 

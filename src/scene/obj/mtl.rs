@@ -3,7 +3,7 @@
 //! A colour of one number is a grey in MTL, but tobj 4.0.5 panics on it; so it is rewritten as three numbers.
 
 use std::{
-    collections::{HashMap, HashSet},
+    collections::{BTreeSet, HashMap, HashSet},
     fmt::Write,
     path::{Path, PathBuf},
 };
@@ -12,6 +12,7 @@ use super::{
     clean::{split_keyword, statements, words},
     files::{library_files, map_file},
     maps::{MapKind, MapOptions, Term, set_map},
+    tiles::{TOKEN, Tiles, files_of_tiles},
 };
 use crate::scene::{
     error::{Checked, SceneError},
@@ -31,7 +32,7 @@ const DEFAULT_ROUGHNESS: f32 = 0.5;
 const NAMELESS: &str = "(nameless)";
 
 /// A material as its file describes it.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Described {
     spec: MaterialSpec,
     name: String,
@@ -40,7 +41,7 @@ struct Described {
 }
 
 /// What tobj does not read of a material.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 struct More {
     /// Pr, Pm, Ps, Pc and Pcr by their keywords.
     numbers: HashMap<String, f32>,
@@ -49,25 +50,27 @@ struct More {
     begins_with_illum: bool,
 }
 
-/// A map of a material.
-#[derive(Debug)]
+/// A map of a material, or one tile of it.
+#[derive(Clone, Debug)]
 struct Map {
     line: usize,
     term: Term,
     options: MapOptions,
     /// Index of the image's file.
     file: usize,
+    /// The number of the tile (UDIM) that the image is for, if there are several.
+    tile: Option<u32>,
 }
 
 /// Reads the materials in the files that the `mtllib` lines of an OBJ file name, relative to its folder. If several
 /// materials have the same name, the last one counts. Warns of files that do not exist, and of names that leave the
-/// folder.
+/// folder. Materials whose images are in tiles come with one more material for each tile.
 pub fn load_libraries(
     obj: &Path,
     libraries: &[(usize, String)],
     access: Access,
     images: &mut Images,
-) -> Result<Vec<Material>, SceneError> {
+) -> Result<(Vec<Material>, Tiles), SceneError> {
     let reach = access.beside(obj);
     let mut described = Vec::new();
     let mut read = HashSet::new();
@@ -90,7 +93,34 @@ pub fn load_libraries(
             }
         }
     }
-    materials(described, images)
+    let (described, tiles) = with_tiles(described);
+    Ok((materials(described, images)?, tiles))
+}
+
+/// Adds a copy of a material for each tile of its images. The copies have its name and precede it, so that the name
+/// stands for the material itself, which has no image in tiles.
+fn with_tiles(described: Vec<Described>) -> (Vec<Described>, Tiles) {
+    let (mut all, mut tiles) = (Vec::new(), Tiles::default());
+    for Described { spec, name, path, more } in described {
+        let numbers: BTreeSet<u32> = more.maps.iter().filter_map(|map| map.tile).collect();
+        let base = all.len() + numbers.len();
+        let copy = |tile: Option<u32>| {
+            let is_shown = |map: &&Map| map.tile.is_none() || map.tile == tile;
+            let placed = |map: &Map| Map {
+                options: map.tile.map_or_else(|| map.options.clone(), |tile| map.options.for_tile(tile)),
+                ..map.clone()
+            };
+            let maps = more.maps.iter().filter(is_shown).map(placed).collect();
+            let more = More { maps, numbers: more.numbers.clone(), ..more };
+            Described { spec: spec.clone(), name: name.clone(), path: path.clone(), more }
+        };
+        for tile in numbers {
+            tiles.add(base, tile, all.len());
+            all.push(copy(Some(tile)));
+        }
+        all.push(copy(None));
+    }
+    (all, tiles)
 }
 
 fn load_library(reach: Reach, path: &Path, images: &mut Images) -> Result<Vec<Described>, SceneError> {
@@ -252,20 +282,34 @@ fn read_more(reach: Reach, path: &Path, text: &str, images: &mut Images) -> Vec<
             }
             MapKind::Shown(term) => term,
         };
-        if rest.to_ascii_uppercase().contains("<UDIM>") {
-            let what = "stands for the images of several tiles, and a material shows one image: export a material for \
-                        each tile";
-            warn(line, rest, format!("`{keyword}` is not shown: `<UDIM>` {what}"));
-            continue;
+        let options = MapOptions::new(rest);
+        if let Ok(options) = &options {
+            let tiles = files_of_tiles(reach, folder, &options.name);
+            if !tiles.is_empty() {
+                let add = |(tile, file): (u32, NamedFile)| Map {
+                    line,
+                    term,
+                    options: options.clone(),
+                    file: images.add(file.path),
+                    tile: Some(tile),
+                };
+                material.maps.extend(tiles.into_iter().map(add));
+                continue;
+            }
+            if options.name.to_ascii_uppercase().contains(TOKEN) {
+                let what = "stands for the number of a tile, from 1001 on, and there is no such image";
+                warn(line, rest, format!("`{keyword}` is not shown: `{TOKEN}` {what}"));
+                continue;
+            }
         }
-        let found = MapOptions::new(rest).and_then(|options| Ok((map_file(reach, folder, &options.name)?, options)));
+        let found = options.and_then(|options| Ok((map_file(reach, folder, &options.name)?, options)));
         match found {
             Err(what) => warn(line, rest, format!("`{keyword}` is not shown: {what}")),
             Ok((NamedFile { path, is_other_case }, options)) => {
                 if is_other_case {
                     warn(line, &options.name, format!("`{}`: {} is taken", options.name, shown(&path)));
                 }
-                material.maps.push(Map { line, term, options, file: images.add(path) });
+                material.maps.push(Map { line, term, options, file: images.add(path), tile: None });
             }
         }
     }
@@ -290,11 +334,44 @@ fn materials(described: Vec<Described>, images: &mut Images) -> Result<Vec<Mater
         }
     }
     let mut materials = Vec::new();
-    for described in described {
+    for described in &described {
         let named = |what| SceneError::file(&described.path, format!("material `{}`: {what}", described.name));
-        materials.push(material(&described, images).map_err(named)?);
+        materials.push(material(described, images).map_err(named)?);
     }
+    note_cut_outs(&described, images);
     Ok(materials)
+}
+
+/// Tells the user once of materials that are cut out without a statement that says so.
+fn note_cut_outs(described: &[Described], images: &Images) {
+    let mut cut_out = described.iter().filter(|described| described.cut_out(images).is_some());
+    let Some(first) = cut_out.next() else { return };
+    let others = match cut_out.count() {
+        0 => String::new(),
+        n => format!(" and {n} more"),
+    };
+    tracing::info!(
+        "{}: material `{}`{others}: the image of `map_Kd` is cut out by its opacity, as a leaf is, though no `map_d` \
+         says so",
+        shown(&first.path),
+        first.name.escape_debug()
+    );
+}
+
+impl Described {
+    /// Returns the map of colours if its image is cut out, as that of a leaf, and the material says nothing of opacity.
+    /// Many programs leave out `map_d`, and the background of a leaf is not meant to be seen.
+    fn cut_out(&self, images: &Images) -> Option<&Map> {
+        let Self { spec, more, .. } = self;
+        let is_opacity = |map: &Map| matches!(map.term, Term::Opacity | Term::Transparency);
+        let is_stated = more.maps.iter().any(is_opacity)
+            || spec.d.is_some_and(|d| d != 1.0)
+            || spec.tr.is_some_and(|tr| tr != 0.0)
+            || matches!(spec.illum, Some(4 | 6 | 7 | 9));
+        let is_cut_out =
+            |map: &&Map| map.term == Term::BaseColour && images.get(map.file).is_ok_and(|image| image.is_cut_out());
+        if is_stated { None } else { more.maps.iter().rev().find(is_cut_out) }
+    }
 }
 
 fn warn_of_image(path: &Path, map: &Map, what: &str) {
@@ -332,7 +409,7 @@ fn material(described: &Described, images: &mut Images) -> Checked<Material> {
             ..Microfacet::default()
         });
         material.ks = glam::Vec3::ONE;
-        // The opacity of an image of colours is not meant unless map_d names it.
+        // The opacity of an image of colours is not meant unless map_d names it, or the image is cut out.
         if !has_opacity && material.d == 1.0 {
             material.alpha = Alpha::Opaque;
         }
@@ -342,6 +419,9 @@ fn material(described: &Described, images: &mut Images) -> Checked<Material> {
             let set = set_map(&mut material, map.term, &map.options, images, map.file);
             set.unwrap_or_else(|what| warn_of_image(path, map, &what));
         }
+    }
+    if let Some(map) = described.cut_out(images) {
+        set_map(&mut material, Term::Opacity, &map.options, images, map.file)?;
     }
     // The image of the base colour has this opacity already.
     let maps = &mut material.maps;

@@ -11,10 +11,7 @@ use super::{
     clean::{CleanObj, Cleaner, Corner, FaceKind, FaceShading, split_keyword, statements},
     model::Model,
 };
-use crate::{
-    scene::mesh_file::bounds_of,
-    util::progress::{Meter, Progress, Work},
-};
+use crate::util::progress::{Meter, Progress, Work};
 
 /// Least number of bytes of the text that one thread reads at a time.
 const CHUNK_BYTES: usize = 1 << 20;
@@ -332,9 +329,9 @@ fn joined(mut chunks: Vec<Chunk>) -> Option<QuickObj> {
 }
 
 impl QuickObj {
-    /// Returns the least and the greatest coordinates of all points.
-    pub fn bounds(&self) -> (Vec3, Vec3) {
-        bounds_of(self.positions.par_chunks_exact(3).map(Vec3::from_slice))
+    /// Returns all points.
+    pub fn points(&self) -> Vec<Vec3> {
+        self.positions.par_chunks_exact(3).map(Vec3::from_slice).collect()
     }
 
     /// Returns the models of the file, as tobj divides it: faces that follow each other, of one kind and one material.

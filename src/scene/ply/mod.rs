@@ -8,7 +8,7 @@ mod quick;
 mod vertex;
 
 use std::{
-    io::{self, BufRead, BufReader, Read},
+    io::{self, BufRead, Read},
     path::{Path, PathBuf},
 };
 
@@ -24,7 +24,6 @@ use self::{
 };
 use super::{
     error::Checked,
-    files,
     image_files::{Images, View},
     material::{Material, MaterialSpec},
     mesh::Mesh,
@@ -430,8 +429,9 @@ fn check_indices(mut indices: impl Iterator<Item = i64>, n: usize, what: impl Fn
 }
 
 /// Returns the images that the comments of a file's header name. Names that are refused are left out.
-pub(super) fn named_images(path: &Path, access: Access) -> Vec<PathBuf> {
-    let reader = files::open(path).ok().and_then(|file| PlyReader::from_reader(BufReader::new(file)).ok());
+pub(super) fn named_images(path: &Path, bytes: &[u8], access: Access) -> Vec<PathBuf> {
+    let mended = mended(bytes);
+    let reader = PlyReader::from_reader(&*mended).ok();
     let reach = access.beside(path);
     let comments = reader.map(|reader| reader.header().comments.clone()).unwrap_or_default();
     texture_files(&comments).filter_map(|name| Some(reach.find(reach.root, name).ok()?.path)).collect()

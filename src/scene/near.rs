@@ -1,0 +1,198 @@
+//! The part of a scene that a new camera shows: all of it, but for a few small things that are far away from the rest.
+//!
+//! Programs leave such things behind: a speck at the origin of a map, a copy that was moved away, a broken facet. In a
+//! picture of everything, the rest would be a dot.
+
+use std::path::Path;
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::{Instance, Scene};
+
+/// Least ratio of the longest side of a box to that of its core, where things in the box are far away from the core. In
+/// a picture 1024 pixels wide, the core would cover 32 of them.
+const FAR: usize = 32;
+/// Most of the area of all triangles that things far away may have together, as a share.
+const FAR_AREA: f64 = 0.01;
+/// Most of all triangles that may be far away, as a share.
+const FAR_TRIANGLES: f64 = 0.1;
+
+/// Number of slices into which a box is cut along each axis.
+const N_SLICES: usize = 1024;
+/// Number of times that a box is made smaller, each time by a factor of at least [`FAR`] / 3.
+const N_CUTS: usize = 8;
+/// Number of triangles that one thread looks at at a time.
+const TRIANGLES_PER_CHUNK: usize = 65_536;
+/// Number of units of area in the square of the diagonal of the scene's box. Areas are whole numbers, whose sums do not
+/// depend on the order of the summands. 2^31 triangles of the largest area fit into 128 bits.
+const AREA_UNITS: f64 = (1_u128 << 96) as f64;
+
+/// A box: its smallest and largest coordinates, world space.
+type Bounds = (Vec3, Vec3);
+
+/// The part of a scene that a picture shows.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct NearPart {
+    /// The box around its triangles.
+    pub bounds: Bounds,
+    /// Number of triangles that are not in it.
+    n_far: usize,
+    /// Whether some of them have an area.
+    has_visible_far: bool,
+}
+
+impl NearPart {
+    /// Finds the near part of a scene.
+    pub fn of(scene: &Scene) -> Self {
+        let mut near = Self { bounds: scene.bounds(), n_far: 0, has_visible_far: false };
+        let diagonal = f64::from((near.bounds.1 - near.bounds.0).length());
+        let triangles = Triangles { scene, unit: diagonal * diagonal / AREA_UNITS };
+        let mut all = None;
+        for _ in 0..N_CUTS {
+            let Some(core) = triangles.core(near.bounds) else { break };
+            let all = *all.get_or_insert_with(|| triangles.within(near.bounds));
+            // What is beside the core belongs to it.
+            let margin = Vec3::splat((core.1 - core.0).max_element());
+            let kept = triangles.within((core.0 - margin, core.1 + margin));
+            let n_far = all.n - kept.n;
+            let is_little = (all.area - kept.area) as f64 <= FAR_AREA * all.area as f64
+                && n_far as f64 <= FAR_TRIANGLES * all.n as f64;
+            if !is_little || n_far == near.n_far {
+                break;
+            }
+            near = Self { bounds: kept.bounds, n_far, has_visible_far: kept.area < all.area };
+        }
+        near
+    }
+
+    /// Returns whether it is the whole scene.
+    pub fn is_whole(&self) -> bool {
+        self.n_far == 0
+    }
+
+    /// Returns whether a point of world space is in its box.
+    pub fn contains(&self, point: Vec3) -> bool {
+        let (min, max) = self.bounds;
+        point.cmpge(min).all() && point.cmple(max).all()
+    }
+
+    /// Tells the user of what the picture leaves out. `path` is the scene's file.
+    pub fn warn_of_far(&self, path: &Path, scene: &Scene) {
+        if self.has_visible_far {
+            tracing::warn!(
+                "{}: {} of {} triangles are so far away that the others would be a dot in a picture of all: the \
+                 picture shows the others; --eye and --target show all",
+                path.display(),
+                self.n_far,
+                scene.n_triangles()
+            );
+        }
+    }
+}
+
+/// The triangles of a scene.
+struct Triangles<'a> {
+    scene: &'a Scene,
+    /// Unit of areas.
+    unit: f64,
+}
+
+/// Some triangles, all together.
+#[derive(Clone, Copy)]
+struct Sum {
+    n: usize,
+    bounds: Bounds,
+    area: u128,
+}
+
+/// Area along each axis, by the places of the triangles' corners.
+struct Slices([Vec<u128>; 3]);
+
+impl Triangles<'_> {
+    /// Folds all triangles, of which each is three points of world space and has an area.
+    fn fold<T: Send>(
+        &self,
+        none: impl Fn() -> T + Sync,
+        add: impl Fn(&mut T, [Vec3; 3], u128) + Sync,
+        join: impl Fn(T, T) -> T + Sync,
+    ) -> T {
+        let of_instance = |Instance { mesh_ix, transform, .. }: &Instance| {
+            let mesh = &self.scene.meshes[*mesh_ix];
+            let of_faces = |mut sum: T, face: &[u32; 3]| {
+                let corners @ [a, b, c] = face.map(|ix| transform.point(mesh.positions[ix as usize]));
+                let [a, b, c] = [a, b, c].map(|p| p.as_dvec3());
+                add(&mut sum, corners, ((b - a).cross(c - a).length() / 2.0 / self.unit) as u128);
+                sum
+            };
+            let faces = mesh.faces.par_iter().with_min_len(TRIANGLES_PER_CHUNK);
+            faces.fold(&none, of_faces).reduce(&none, &join)
+        };
+        self.scene.instances.iter().map(of_instance).fold(none(), &join)
+    }
+
+    /// Returns the sum of the triangles that are in a box with all corners.
+    fn within(&self, (min, max): Bounds) -> Sum {
+        let none = || Sum { n: 0, bounds: (Vec3::INFINITY, Vec3::NEG_INFINITY), area: 0 };
+        let join = |a: Sum, b: Sum| Sum {
+            n: a.n + b.n,
+            bounds: (a.bounds.0.min(b.bounds.0), a.bounds.1.max(b.bounds.1)),
+            area: a.area + b.area,
+        };
+        let add = |sum: &mut Sum, [a, b, c]: [Vec3; 3], area: u128| {
+            let bounds @ (least, most) = (a.min(b).min(c), a.max(b).max(c));
+            if least.cmpge(min).all() && most.cmple(max).all() {
+                *sum = join(*sum, Sum { n: 1, bounds, area });
+            }
+        };
+        self.fold(none, add, join)
+    }
+
+    /// Returns the core of a box: the slices that are left if [`FAR_AREA`] of the area is taken from each end of each
+    /// axis. Returns `None` if the core is not much smaller than the box.
+    fn core(&self, bounds @ (min, max): Bounds) -> Option<Bounds> {
+        let size = max - min;
+        let Slices(slices) = self.slices(bounds);
+        let kept = slices.map(|slices| kept_slices(&slices));
+        let place = |ix: [usize; 3]| min + size * Vec3::from_array(ix.map(|ix| ix as f32 / N_SLICES as f32));
+        let core = (place(kept.map(|(first, _)| first)), place(kept.map(|(_, last)| last + 1)));
+        let is_small = (core.1 - core.0).max_element() * FAR as f32 <= size.max_element();
+        is_small.then_some(core)
+    }
+
+    fn slices(&self, (min, max): Bounds) -> Slices {
+        let scale = N_SLICES as f32 / (max - min).max(Vec3::splat(f32::MIN_POSITIVE));
+        let add = |Slices(slices): &mut Slices, corners: [Vec3; 3], area: u128| {
+            let is_in = |p: &Vec3| p.cmpge(min).all() && p.cmple(max).all();
+            if !corners.iter().all(is_in) {
+                return;
+            }
+            for corner in corners {
+                let place = (corner - min) * scale;
+                for (axis, slices) in slices.iter_mut().enumerate() {
+                    slices[(place[axis] as usize).min(N_SLICES - 1)] += area;
+                }
+            }
+        };
+        let none = || Slices([const { Vec::new() }; 3].map(|_: Vec<u128>| vec![0; N_SLICES]));
+        let join = |Slices(mut a): Slices, Slices(b): Slices| {
+            a.iter_mut().zip(&b).for_each(|(a, b)| a.iter_mut().zip(b).for_each(|(a, b)| *a += b));
+            Slices(a)
+        };
+        self.fold(none, add, join)
+    }
+}
+
+/// Returns the first and the last slice of those that are left.
+fn kept_slices(slices: &[u128]) -> (usize, usize) {
+    let most = (slices.iter().sum::<u128>() as f64 * FAR_AREA) as u128;
+    let n_left_out = |slices: &mut dyn Iterator<Item = &u128>| {
+        let sums = slices.scan(0, |sum, area| {
+            *sum += area;
+            Some(*sum)
+        });
+        sums.take_while(|sum| *sum <= most).count()
+    };
+    let (first, after) = (n_left_out(&mut slices.iter()), n_left_out(&mut slices.iter().rev()));
+    (first.min(N_SLICES - 1), N_SLICES - 1 - after.min(N_SLICES - 1))
+}
