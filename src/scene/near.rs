@@ -22,6 +22,8 @@ const FAR_TRIANGLES: f64 = 0.1;
 const N_SLICES: usize = 1024;
 /// Number of times that a box is made smaller, each time by a factor of at least [`FAR`] / 3.
 const N_CUTS: usize = 8;
+/// Number of triangles of a sample that tells of most scenes that nothing in them is far away.
+const N_SAMPLED: usize = 1 << 17;
 /// Number of triangles that one thread looks at at a time.
 const TRIANGLES_PER_CHUNK: usize = 65_536;
 /// Number of units of area in the square of the diagonal of the scene's box. Areas are whole numbers, whose sums do not
@@ -48,9 +50,17 @@ impl NearPart {
         let mut near = Self { bounds: scene.bounds(), n_far: 0, has_visible_far: false };
         let diagonal = f64::from((near.bounds.1 - near.bounds.0).length());
         let triangles = Triangles { scene, unit: diagonal * diagonal / AREA_UNITS };
+        let step = scene.n_triangles().div_ceil(N_SAMPLED).max(1);
+        // Of a sample, the core may be a little larger.
+        if step > 1 && !is_small(triangles.core(near.bounds, step), near.bounds, FAR / 2) {
+            return near;
+        }
         let mut all = None;
         for _ in 0..N_CUTS {
-            let Some(core) = triangles.core(near.bounds) else { break };
+            let core = triangles.core(near.bounds, 1);
+            if !is_small(core, near.bounds, FAR) {
+                break;
+            }
             let all = *all.get_or_insert_with(|| triangles.within(near.bounds));
             // What is beside the core belongs to it.
             let margin = Vec3::splat((core.1 - core.0).max_element());
@@ -110,9 +120,10 @@ struct Sum {
 struct Slices([Vec<u128>; 3]);
 
 impl Triangles<'_> {
-    /// Folds all triangles, of which each is three points of world space and has an area.
+    /// Folds every `step`-th triangle of each mesh. A triangle is three points of world space and has an area.
     fn fold<T: Send>(
         &self,
+        step: usize,
         none: impl Fn() -> T + Sync,
         add: impl Fn(&mut T, [Vec3; 3], u128) + Sync,
         join: impl Fn(T, T) -> T + Sync,
@@ -125,7 +136,7 @@ impl Triangles<'_> {
                 add(&mut sum, corners, ((b - a).cross(c - a).length() / 2.0 / self.unit) as u128);
                 sum
             };
-            let faces = mesh.faces.par_iter().with_min_len(TRIANGLES_PER_CHUNK);
+            let faces = mesh.faces.par_iter().step_by(step).with_min_len(TRIANGLES_PER_CHUNK);
             faces.fold(&none, of_faces).reduce(&none, &join)
         };
         self.scene.instances.iter().map(of_instance).fold(none(), &join)
@@ -145,22 +156,20 @@ impl Triangles<'_> {
                 *sum = join(*sum, Sum { n: 1, bounds, area });
             }
         };
-        self.fold(none, add, join)
+        self.fold(1, none, add, join)
     }
 
     /// Returns the core of a box: the slices that are left if [`FAR_AREA`] of the area is taken from each end of each
-    /// axis. Returns `None` if the core is not much smaller than the box.
-    fn core(&self, bounds @ (min, max): Bounds) -> Option<Bounds> {
+    /// axis. Every `step`-th triangle counts.
+    fn core(&self, bounds @ (min, max): Bounds, step: usize) -> Bounds {
         let size = max - min;
-        let Slices(slices) = self.slices(bounds);
+        let Slices(slices) = self.slices(bounds, step);
         let kept = slices.map(|slices| kept_slices(&slices));
         let place = |ix: [usize; 3]| min + size * Vec3::from_array(ix.map(|ix| ix as f32 / N_SLICES as f32));
-        let core = (place(kept.map(|(first, _)| first)), place(kept.map(|(_, last)| last + 1)));
-        let is_small = (core.1 - core.0).max_element() * FAR as f32 <= size.max_element();
-        is_small.then_some(core)
+        (place(kept.map(|(first, _)| first)), place(kept.map(|(_, last)| last + 1)))
     }
 
-    fn slices(&self, (min, max): Bounds) -> Slices {
+    fn slices(&self, (min, max): Bounds, step: usize) -> Slices {
         let scale = N_SLICES as f32 / (max - min).max(Vec3::splat(f32::MIN_POSITIVE));
         let add = |Slices(slices): &mut Slices, corners: [Vec3; 3], area: u128| {
             let is_in = |p: &Vec3| p.cmpge(min).all() && p.cmple(max).all();
@@ -179,8 +188,13 @@ impl Triangles<'_> {
             a.iter_mut().zip(&b).for_each(|(a, b)| a.iter_mut().zip(b).for_each(|(a, b)| *a += b));
             Slices(a)
         };
-        self.fold(none, add, join)
+        self.fold(step, none, add, join)
     }
+}
+
+/// Returns whether a core is smaller than its box by at least a factor.
+fn is_small(core: Bounds, bounds: Bounds, factor: usize) -> bool {
+    (core.1 - core.0).max_element() * factor as f32 <= (bounds.1 - bounds.0).max_element()
 }
 
 /// Returns the first and the last slice of those that are left.
