@@ -63,7 +63,6 @@ Surface surface_at(PathRay ray, Hit hit, Triangle t) {
     s.is_reversed = dot(interpolated, s.geometric) < 0.0;
     s.interpolated = s.is_reversed ? -interpolated : interpolated;
     s.shading = s.interpolated;
-    // In a plane through 0, `dot` is 0 whatever the rounding of a test in that plane.
     float largest = max(magnitude.x, max(magnitude.y, magnitude.z));
     s.clearance = SURFACE_CLEARANCE * max(dot(magnitude, abs(s.geometric)), LEAST_CLEARANCE_SHARE * largest);
     return s;

@@ -33,6 +33,7 @@ pub enum CliError {
     Window(String),
     #[error("the validation layer reported {0} message(s)")]
     Validation(usize),
+    #[cfg(feature = "bench")]
     #[error("{0}")]
     WrongHits(String),
     #[error("{0}")]
@@ -51,7 +52,9 @@ impl CliError {
             Self::Usage(_) | Self::Output(OutputError::UnknownEnding { .. }) => 2,
             Self::Scene(_) | Self::Rays(_) | Self::Merge(_) | Self::Pack(_) | Self::Memory(_) => 3,
             Self::Device(_) | Self::DeviceMemory(_) | Self::Validation(_) => 4,
-            Self::WrongHits(_) | Self::NoProcessor(_) => 4,
+            Self::NoProcessor(_) => 4,
+            #[cfg(feature = "bench")]
+            Self::WrongHits(_) => 4,
             #[cfg(feature = "view")]
             Self::Window(_) => 4,
             Self::Output(_) | Self::Stdout(_) => 5,

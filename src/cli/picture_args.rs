@@ -84,8 +84,9 @@ pub fn listed(what: &str, default: &str, descriptions: &str) -> String {
 }
 
 const INTEGRATOR: &str = "How light is computed";
-const INTEGRATOR_DEFAULT: &str =
-    "the scene's; if its file states none, path if surfaces, an environment or a sky give off light, else whitted";
+const INTEGRATOR_DEFAULT: &str = "the scene's; if its file states none, path if lights with an area, an environment or \
+                                  a sky light the scene, or surfaces that shine where kdray chooses no lights; else \
+                                  whitted";
 const FILTER: &str = "How samples are spread around the centre of their pixel, for --integrator path";
 const TONEMAP: &str = "Tone curve from radiance to what a display shows";
 const ACCEL: &str = "Acceleration structure that leads rays to triangles";
@@ -153,16 +154,19 @@ pub fn traversal_long_help() -> String {
 }
 
 /// Returns the help text of `--traversal` of a benchmark, which measures the default of the device.
+#[cfg(feature = "bench")]
 pub fn fixed_traversal_help() -> String {
     with_words(TRAVERSAL, Some(&default_traversals()), &Traversal::words())
 }
 
 /// Returns the help text of `--traversal` of a benchmark with all words explained.
+#[cfg(feature = "bench")]
 pub fn fixed_traversal_long_help() -> String {
     listed(TRAVERSAL, &default_traversals(), &Traversal::descriptions())
 }
 
 /// Returns the default traversals of devices and of the CPU, as a phrase of a help text.
+#[cfg(feature = "bench")]
 fn default_traversals() -> String {
     format!("{}, with --cpu {}", traversals_of_devices(), Traversal::OF_CPU)
 }
@@ -178,6 +182,7 @@ pub fn build_long_help() -> String {
 }
 
 /// Returns the default traversals of GPUs and software drivers, as a phrase of a help text.
+#[cfg(feature = "bench")]
 pub fn traversals_of_devices() -> String {
     format!("{}, {} on software drivers", Traversal::OF_GPUS, Traversal::OF_SOFTWARE_DRIVERS)
 }

@@ -78,7 +78,6 @@ pub fn surface_at(ray: &PathRay, hit: &Hit, t: &Triangle) -> Surface {
         interpolated,
         shading: interpolated,
         is_reversed,
-        // In a plane through 0, `dot` is 0 whatever the rounding of a test in that plane.
         clearance: SURFACE_CLEARANCE
             * magnitude.dot(geometric.abs()).max(LEAST_CLEARANCE_SHARE * magnitude.max_element()),
         from_inside,

@@ -97,7 +97,7 @@ fn assemble(file: &File, description: Description, options: &LoadOptions) -> Res
     let lacks = Lacks {
         up: Up::Y,
         // The file says what there is.
-        ground: false,
+        description: false,
         camera: description.camera.is_none() && description.cameras.is_empty(),
         light: description.light.is_empty() && description.ambient.is_none() && !has_beyond,
         background: description.background.is_none() && !has_beyond,

@@ -71,7 +71,7 @@ impl Part<'_> {
 pub(super) struct Coincident {
     /// The faces that have an opposite one which looks different.
     two_sided: HashSet<FacePlace>,
-    /// Faces that are there again with the same side, without the first of each kind.
+    /// Repeated faces with the same side: all except the first one of each group.
     repeated: Vec<FacePlace>,
 }
 
@@ -223,7 +223,7 @@ impl CoincidentTriangles {
         }
     }
 
-    /// Takes the area of faces that are there again, and moves opposite faces apart.
+    /// Makes repeated faces triangles without area, and moves opposite faces apart.
     pub fn separate(&self, mesh: &mut Mesh) {
         for ix in self.faces.repeated.iter().flat_map(|place| &self.triangles[place]) {
             mesh.faces[*ix] = [mesh.faces[*ix][0]; 3];

@@ -22,8 +22,8 @@ const LEAST_LAMPLIGHT: f64 = 0.1;
 const N_SEEN: (usize, usize) = (12, 8);
 /// Number of points on lamps that stand for all of them.
 const N_LAMP_POINTS: usize = 64;
-/// A place is lit if its irradiance is at least this share of the mean of all places. The exposure is measured, so that
-/// only the ratio counts.
+/// A place is lit if its irradiance is more than this share of the mean of all places. The exposure is measured, so
+/// that only the ratio counts.
 const LEAST_IRRADIANCE: f32 = 0.2;
 /// Least share of the places that are lit, where lamps light a scene.
 const LEAST_LIT: f32 = 0.75;
@@ -46,8 +46,8 @@ struct Triangle {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lamplight {
     /// Mean radiance of white paper at the places that the camera sees, as if nothing cast shadows. It is 0 in
-    /// interiors, if the camera sees nothing but lamps, and if they are too weak to be taken for lamps unless the file
-    /// says so.
+    /// interiors, if the camera sees nothing but lamps, and if surfaces count as lamps only because the file states the
+    /// integrator `path`.
     pub mean: f32,
     /// Whether surfaces count as lamps only because the file states the integrator `path`.
     pub is_stated: bool,

@@ -362,7 +362,7 @@ fn load_mesh_file(path: &Path, options: &LoadOptions) -> Result<(Scene, Lacks), 
     let lacks = Lacks {
         camera: true,
         up: guess.up,
-        ground: true,
+        description: true,
         light: true,
         background: true,
         integrator: true,

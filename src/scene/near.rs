@@ -1,4 +1,4 @@
-//! The part of a scene that a new camera shows: all of it, but for a few small things that are far away from the rest.
+//! The part of a scene that a new camera shows: all of it, except a few small things that are far away from the rest.
 //!
 //! Programs leave such things behind: a speck at the origin of a map, a copy that was moved away, a broken facet. In a
 //! picture of everything, the rest would be a dot.
@@ -8,7 +8,7 @@ use std::path::Path;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{Instance, Scene};
+use super::{Instance, Scene, ground::Ground};
 
 /// Least ratio of the longest side of a box to that of its core, where things in the box are far away from the core. In
 /// a picture 1024 pixels wide, the core would cover 32 of them.
@@ -22,7 +22,8 @@ const FAR_TRIANGLES: f64 = 0.1;
 const N_SLICES: usize = 1024;
 /// Number of times that a box is made smaller, each time by a factor of at least [`FAR`] / 3.
 const N_CUTS: usize = 8;
-/// Number of triangles of a sample that tells of most scenes that nothing in them is far away.
+/// Number of triangles of a sample. Of most scenes, the sample shows that nothing is far away, and the full search is
+/// skipped.
 const N_SAMPLED: usize = 1 << 17;
 /// Number of triangles that one thread looks at at a time.
 const TRIANGLES_PER_CHUNK: usize = 65_536;
@@ -45,13 +46,14 @@ pub(super) struct NearPart {
 }
 
 impl NearPart {
-    /// Finds the near part of a scene.
-    pub fn of(scene: &Scene) -> Self {
-        let mut near = Self { bounds: scene.bounds(), n_far: 0, has_visible_far: false };
+    /// Finds the near part of some instances of a scene.
+    pub fn of(scene: &Scene, instances: &[Instance]) -> Self {
+        let mut near = Self { bounds: scene.bounds_of(instances), n_far: 0, has_visible_far: false };
         let diagonal = f64::from((near.bounds.1 - near.bounds.0).length());
-        let triangles = Triangles { scene, unit: diagonal * diagonal / AREA_UNITS };
-        let step = scene.n_triangles().div_ceil(N_SAMPLED).max(1);
-        // Of a sample, the core may be a little larger.
+        let triangles = Triangles { scene, instances, unit: diagonal * diagonal / AREA_UNITS };
+        let n_triangles: usize = instances.iter().map(|instance| scene.meshes[instance.mesh_ix].faces.len()).sum();
+        let step = n_triangles.div_ceil(N_SAMPLED).max(1);
+        // The core of a sample may be larger than that of all triangles, so this test is half as strict.
         if step > 1 && !is_small(triangles.core(near.bounds, step), near.bounds, FAR / 2) {
             return near;
         }
@@ -101,9 +103,23 @@ impl NearPart {
     }
 }
 
-/// The triangles of a scene.
+impl Scene {
+    /// Returns the bounds of what a picture of the scene is about: without the ground that a mesh gets under a sky, and
+    /// without a few things that are far away. Those of a scene without triangles are a cube around the origin.
+    pub fn shown_bounds(&self) -> (Vec3, Vec3) {
+        let n_grounds = usize::from(Ground::of(self).is_some());
+        let things = &self.instances[..self.instances.len() - n_grounds];
+        if things.iter().all(|instance| self.meshes[instance.mesh_ix].faces.is_empty()) {
+            return (Vec3::NEG_ONE, Vec3::ONE);
+        }
+        NearPart::of(self, things).bounds
+    }
+}
+
+/// The triangles of some instances of a scene.
 struct Triangles<'a> {
     scene: &'a Scene,
+    instances: &'a [Instance],
     /// Unit of areas.
     unit: f64,
 }
@@ -120,7 +136,8 @@ struct Sum {
 struct Slices([Vec<u128>; 3]);
 
 impl Triangles<'_> {
-    /// Folds every `step`-th triangle of each mesh. A triangle is three points of world space and has an area.
+    /// Folds every `step`-th triangle of each mesh. A triangle is three points of world space and has an area. The area
+    /// is multiplied, so that those of a mesh's sample have about the sum of all.
     fn fold<T: Send>(
         &self,
         step: usize,
@@ -130,16 +147,18 @@ impl Triangles<'_> {
     ) -> T {
         let of_instance = |Instance { mesh_ix, transform, .. }: &Instance| {
             let mesh = &self.scene.meshes[*mesh_ix];
+            let (n_faces, n_sampled) = (mesh.faces.len() as u128, mesh.faces.len().div_ceil(step).max(1) as u128);
             let of_faces = |mut sum: T, face: &[u32; 3]| {
                 let corners @ [a, b, c] = face.map(|ix| transform.point(mesh.positions[ix as usize]));
                 let [a, b, c] = [a, b, c].map(|p| p.as_dvec3());
-                add(&mut sum, corners, ((b - a).cross(c - a).length() / 2.0 / self.unit) as u128);
+                let area = ((b - a).cross(c - a).length() / 2.0 / self.unit) as u128;
+                add(&mut sum, corners, area * n_faces / n_sampled);
                 sum
             };
             let faces = mesh.faces.par_iter().step_by(step).with_min_len(TRIANGLES_PER_CHUNK);
             faces.fold(&none, of_faces).reduce(&none, &join)
         };
-        self.scene.instances.iter().map(of_instance).fold(none(), &join)
+        self.instances.iter().map(of_instance).fold(none(), &join)
     }
 
     /// Returns the sum of the triangles that are in a box with all corners.
@@ -209,4 +228,47 @@ fn kept_slices(slices: &[u128]) -> (usize, usize) {
     };
     let (first, after) = (n_left_out(&mut slices.iter()), n_left_out(&mut slices.iter().rev()));
     (first.min(N_SLICES - 1), N_SLICES - 1 - after.min(N_SLICES - 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DQuat, DVec3};
+
+    use super::*;
+    use crate::scene::{Mesh, Transform};
+
+    /// Returns a mesh of triangles in a row, each with an area of a half.
+    fn row(n: usize) -> Mesh {
+        let positions = (0..n).flat_map(|ix| [Vec3::ZERO, Vec3::X, Vec3::Y].map(|p| p + (ix % 50) as f32 * Vec3::Z));
+        let faces: Vec<[u32; 3]> = (0..n as u32).map(|ix| [3 * ix, 3 * ix + 1, 3 * ix + 2]).collect();
+        let (normals, slots) = (vec![[Vec3::Z; 3]; n], vec![0; n]);
+        Mesh { positions: positions.collect(), faces, normals, slots, ..Mesh::default() }
+    }
+
+    fn scene_of(meshes: [(usize, f64); 2]) -> Scene {
+        let mut scene = Scene::empty(Path::new("scene"));
+        for (n, x) in meshes {
+            let place = Transform::new(DVec3::ONE, DQuat::IDENTITY, DVec3::new(x, 0.0, 0.0)).unwrap();
+            scene.push_mesh(row(n), place, vec![0]).unwrap();
+        }
+        scene
+    }
+
+    /// A small mesh has no more than its share of a sample, of which it has at least one triangle.
+    #[test]
+    fn samples_weigh_meshes_by_their_areas() {
+        let scene = scene_of([(20_000, 0.0), (2, 1e5)]);
+        let triangles = Triangles { scene: &scene, instances: &scene.instances, unit: 1e-6 };
+        for step in [1, 77, 5000] {
+            let core = triangles.core(scene.bounds(), step);
+            assert!(is_small(core, scene.bounds(), FAR), "step {step}: {core:?}");
+        }
+    }
+
+    #[test]
+    fn a_viewer_moves_around_what_is_near() {
+        let (min, max) = scene_of([(2000, 0.0), (2, 1e5)]).shown_bounds();
+        assert!((max - min).max_element() < 60.0, "{min} {max}");
+        assert_eq!(Scene::empty(Path::new("scene")).shown_bounds(), (Vec3::NEG_ONE, Vec3::ONE));
+    }
 }

@@ -21,8 +21,9 @@ pub(super) struct Lacks {
     pub camera: bool,
     /// The axis that points up in a scene without a camera, unless the user states one.
     pub up: Up,
-    /// A ground is below the scene if the user chooses a sky.
-    pub ground: bool,
+    /// The file is no scene file but a mesh or glTF file, whose maker has not described a picture. A ground is below
+    /// such a scene if the user chooses a sky, and it gets ambient light beside its lamps.
+    pub description: bool,
     /// The scene has neither lights nor ambient light.
     pub light: bool,
     /// Only a scene without light gets a background.
@@ -71,9 +72,9 @@ pub(super) fn fill_in(path: &Path, scene: &mut Scene, lacks: Lacks, options: &Lo
     let up = look.up.unwrap_or(lacks.up);
     let axes = WorldAxes::with_up(up.vector());
     let lacks_light = lacks.light && look.sky.is_none();
-    let needs_ground = lacks.ground && look.sky.is_some();
+    let needs_ground = lacks.description && look.sky.is_some();
     let needs_bounds = lacks.camera || lacks_light || needs_ground;
-    let near = if needs_bounds { NearPart::of(scene) } else { NearPart::default() };
+    let near = if needs_bounds { NearPart::of(scene, &scene.instances) } else { NearPart::default() };
     let bounds = near.bounds;
     let is_interior = needs_bounds && interior::is_interior(scene, bounds);
     if lacks.camera {
@@ -97,7 +98,7 @@ pub(super) fn fill_in(path: &Path, scene: &mut Scene, lacks: Lacks, options: &Lo
     }
     let stated = (!lacks.integrator).then_some(scene.defaults.integrator);
     let lamplight = if lacks_light { scene.lamplight(is_interior, stated) } else { None };
-    // What only glows lights nothing, and the picture is there sooner and without noise if no light is sought there.
+    // Surfaces that only glow light nothing else. `Whitted` shows them, sooner and without noise.
     let only_glows = lacks_light && lamplight.is_none();
     if lacks.integrator && scene.needs_path() && !only_glows {
         scene.defaults.integrator = Integrator::Path;
@@ -111,10 +112,10 @@ pub(super) fn fill_in(path: &Path, scene: &mut Scene, lacks: Lacks, options: &Lo
     Ok(())
 }
 
-/// Gives a scene what it needs beside its lamps. Those of a mesh file are bright by the units of its program, and need
-/// an exposure, and so do those of a scene file that are too weak to count as lamps unless it says so. Outside, a mesh
-/// file gets the standard ambient light and background in the units of its lamps, but less of them than beside the
-/// standard lights. Without them, shadows would be black, and things could not be told from what is beyond.
+/// Gives a scene what it needs beside its lamps. The exposure is measured for a mesh file, whose lamps have the units
+/// of its program, and for a scene file whose surfaces count as lamps only because it states the integrator `path`.
+/// Outside, a mesh file gets the standard ambient light and background in the units of its lamps, but less of them than
+/// beside the standard lights. Without them, shadows would be black, and things could not be told from what is beyond.
 fn set_lamplight(
     path: &Path,
     scene: &mut Scene,
@@ -122,16 +123,16 @@ fn set_lamplight(
     (lacks, up, has_users_light): (Lacks, Up, bool),
 ) {
     scene.chosen_light = Some(ChosenLight::Surfaces);
-    if lamplight.is_stated {
+    if lamplight.is_stated && !has_users_light {
         tracing::info!(
-            "{}: the surfaces that shine are its only light, since it states `integrator = \"path\"`; `ambient = [0.3, \
-             0.3, 0.3]` adds some",
+            "{}: the surfaces that shine are its only light, since it states `integrator = \"path\"`, though they \
+             light little of what is seen; `ambient = [0.3, 0.3, 0.3]` adds some",
             path.display()
         );
     }
-    scene.defaults.is_metered |= lacks.exposure && (lacks.ground || lamplight.is_stated);
+    scene.defaults.is_metered |= lacks.exposure && (lacks.description || lamplight.is_stated);
     // With the user's light, the exposure is not measured.
-    if lacks.ground && !has_users_light && lamplight.mean > 0.0 {
+    if lacks.description && !has_users_light && lamplight.mean > 0.0 {
         let scale = BESIDE_LAMPS * lamplight.mean;
         let [sky, ground] = AMBIENT.map(|ambient| ambient * scale);
         (scene.ambient, scene.ground) = (sky, Some(Ground { ambient: ground, up }));

@@ -1,5 +1,5 @@
-//! What is drawn while the camera moves, if the picture at rest is one of paths, and the kinds of pictures that the
-//! viewer therefore tells apart.
+//! The picture that is drawn while the camera moves, and the kinds of pictures, each of which has a renderer of its
+//! own.
 
 use crate::frame::{Denoise, Integrator, RenderOptions};
 

@@ -10,7 +10,7 @@ use glam::Vec3;
 use crate::{
     accel::Statistics,
     engine::choices::{ChosenAccel, Processor, Request, Workload},
-    scene::{self, Scene, SceneError, ground::GROUND},
+    scene::{self, Scene, SceneError},
     util::progress::Progress,
     world::{FlatScene, World},
 };
@@ -42,6 +42,8 @@ pub struct LoadedScene {
     pub statistics: Statistics,
     /// Time of building the structure, milliseconds.
     pub build_ms: f64,
+    /// Minimum and maximum corner of what the scene shows, world space: see [`Scene::shown_bounds`].
+    bounds: (Vec3, Vec3),
 }
 
 impl LoadedScene {
@@ -61,6 +63,7 @@ impl LoadedScene {
     pub fn with_tree(path: &Path, scene: Scene, load_options: &LoadOptions, progress: &Progress) -> Self {
         let &LoadOptions { request, processor, workload, .. } = load_options;
         let accel = request.choose_accel(processor, scene.n_triangles(), &workload);
+        let bounds = scene.shown_bounds();
         let flat = FlatScene::new(&scene).expect("a loaded scene fits together");
         // The unflattened scene is freed here, because building the structure needs the memory.
         drop(scene);
@@ -70,7 +73,7 @@ impl LoadedScene {
         let build_ms = start.elapsed().as_secs_f64() * 1e3;
         let statistics = world.statistics();
         let path = Some(path.to_owned());
-        Self { path, world, accel, load_options: load_options.clone(), statistics, build_ms }
+        Self { path, world, accel, load_options: load_options.clone(), statistics, build_ms, bounds }
     }
 
     /// Returns a scene without triangles. It takes the place of a loaded scene while no file is open.
@@ -80,8 +83,8 @@ impl LoadedScene {
         let &LoadOptions { request, processor, workload, .. } = load_options;
         let accel = request.choose_accel(processor, 0, &workload);
         let world = World::with_accel(flat, &accel.options(processor)).expect("a material for each of no triangles");
-        let statistics = world.statistics();
-        Self { path: None, world, accel, load_options: load_options.clone(), statistics, build_ms: 0.0 }
+        let (statistics, bounds) = (world.statistics(), empty.shown_bounds());
+        Self { path: None, world, accel, load_options: load_options.clone(), statistics, build_ms: 0.0, bounds }
     }
 
     /// Returns whether a file is open.
@@ -94,16 +97,8 @@ impl LoadedScene {
         self.world.scene()
     }
 
-    /// Returns the minimum and the maximum corner of the scene, world space. Those of a scene without triangles are
-    /// the corners of a cube around the origin. The ground that a mesh gets under a sky does not count.
+    /// Returns the minimum and the maximum corner of what the scene shows, world space.
     pub fn bounds(&self) -> (Vec3, Vec3) {
-        let scene = self.scene();
-        let ground = scene.material_names.iter().position(|name| name == GROUND);
-        let Some(ground) = ground.filter(|ix| scene.triangle_materials.first() != Some(&(*ix as u32))) else {
-            return if scene.triangles.is_empty() { (Vec3::NEG_ONE, Vec3::ONE) } else { scene.bounds() };
-        };
-        let of_mesh = scene.triangles.iter().zip(&scene.triangle_materials).filter(|(_, ix)| **ix as usize != ground);
-        let corners = of_mesh.flat_map(|(t, _)| [t.v0, t.v1, t.v2]);
-        corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)))
+        self.bounds
     }
 }

@@ -272,13 +272,21 @@ impl Session {
         match gpu.change_to(whole) {
             Ok(()) => {
                 self.drawing = PictureKind::of(whole);
+                // A renderer that is made anew has room for no more than this.
+                self.rooms[self.drawing as usize] = (whole.width, whole.height);
                 let (view, brightest) = self.view();
                 gpu.renderer.set_view(view, brightest);
                 Ok(())
             }
             Err(error) => {
-                // No other picture takes the place of the one at rest any more.
-                self.settings.in_motion = InMotion::Path;
+                let now = gpu.renderer.options();
+                if PictureKind::of(whole) == self.at_rest() && now.integrator == whole.integrator {
+                    // The device refuses another filter of the picture at rest.
+                    self.settings.options.denoise = now.denoise;
+                } else {
+                    // No other picture takes the place of the one at rest any more.
+                    self.settings.in_motion = InMotion::Path;
+                }
                 self.take_back(gpu, error)
             }
         }

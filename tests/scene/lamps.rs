@@ -38,7 +38,7 @@ fn load(toml: Option<&str>, half: f32, lamp: &str) -> (Scene, Vec<String>) {
     (scene.unwrap(), notes)
 }
 
-/// The lamp is small, and would light a hundredth of its area too little to count.
+/// The lamp is just too weak to count by itself.
 #[test]
 fn the_integrator_that_a_scene_file_states_decides_whether_lamps_light_it() {
     let of = |toml: Option<&str>, lamp: &str| {

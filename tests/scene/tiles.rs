@@ -50,6 +50,32 @@ fn each_tile_has_its_own_image() {
     assert_eq!((names, warnings.len()), (vec!["a.1001.png"; 4], 0));
 }
 
+/// The coordinates of faces tell their tiles, and `-s` and `-o` do not move them.
+#[test]
+fn options_do_not_move_tiles() {
+    let (scene, warnings) = load("newmtl m\nmap_Kd -s 2 2 -o 1 0 a.<UDIM>.png\n", &["a.1001.png", "a.1002.png"]);
+    let (image, at) = shown(&scene, 1).unwrap();
+    assert_eq!((&image.name[..], at), ("a.1002.png", Vec2::new(0.0, 1.0)));
+    assert!(warnings.iter().any(|warning| warning.contains("`-s` and `-o` of `map_Kd` are left out")), "{warnings:?}");
+}
+
+#[test]
+fn faces_without_coordinates_count_as_faces_without_tiles() {
+    let obj = "mtllib m.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    let image = png(|_, _| [9; 4]);
+    let mtl = b"newmtl m\nmap_Kd a.<UDIM>.png\n";
+    let (scene, warnings) = loaded(&[("m.obj", obj.as_bytes()), ("m.mtl", mtl), ("a.1001.png", &image)]);
+    assert_eq!(of_face(&scene, 0).maps.base_colour, None);
+    assert!(warnings.iter().any(|warning| warning.contains("1 triangles are in tiles")), "{warnings:?}");
+}
+
+#[test]
+fn a_tile_in_another_case_is_taken_with_a_warning() {
+    let (scene, warnings) = load("newmtl m\nmap_Kd A.<UDIM>.png\n", &["a.1001.png", "a.1002.png"]);
+    assert_eq!(shown(&scene, 1).unwrap().0.name, "a.1002.png");
+    assert!(warnings.iter().any(|warning| warning.contains("a.1001.png is taken")), "{warnings:?}");
+}
+
 /// A map without tiles is shown in all of them.
 #[test]
 fn maps_with_and_without_tiles_go_together() {
@@ -94,6 +120,12 @@ fn images_of_colours_that_are_cut_out_have_holes() {
     assert_eq!(material.alpha, Alpha::Cutout(0.5));
     assert_eq!(material.maps.opacity.unwrap().channel, Channel::Alpha);
     assert!(notes.len() == 1 && notes[0].contains("`m`: the image of `map_Kd` is cut out by its opacity"), "{notes:?}");
+    // A material in tiles is one material.
+    let tiled = png(|x, _| [40, 90, 20, leaf(x)]);
+    let mtl = b"newmtl m\nmap_Kd a.<UDIM>.png\n";
+    let names = ["a.1001.png", "a.1002.png"].map(|name| (name, &tiled[..]));
+    let (_, notes) = loaded(&[&[("m.obj", obj.as_bytes()), ("m.mtl", mtl)], &names[..]].concat());
+    assert!(notes.iter().any(|note| note.contains("material `m`: the image")), "{notes:?}");
     // The opacity of microfacets is that of their base colour.
     let (material, _) = of("Pr 0.4", leaf);
     assert_eq!((material.alpha, material.maps.opacity), (Alpha::Cutout(0.5), None));

@@ -53,7 +53,7 @@ MapValue map_value(vec2 place, float aside) {
     vec4 rows[2];
     for (int i = 0; i < 2; ++i) {
         uint y = uint(clamp(low.y + i, 0, int(height) - 1));
-        uint left = low.x < 0 ? width - 1u : min(uint(low.x), width - 1u);
+        uint left = low.x < 0 ? width - 1u : uint(low.x) < width ? uint(low.x) : 0u;
         uint right = left + 1u < width ? left + 1u : 0u;
         vec4 a = environment_texel(left, y);
         rows[i] = a + (environment_texel(right, y) - a) * weight.x;

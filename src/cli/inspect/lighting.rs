@@ -15,7 +15,7 @@ pub struct Lighting {
     pub ambient: [f32; 3],
     /// Ambient light on surfaces that face down.
     pub ambient_from_below: [f32; 3],
-    /// Radiance of rays that leave the scene.
+    /// Radiance of rays that leave the scene, unless they see an environment or a sky.
     pub background: [f32; 3],
     /// Unit vector towards the viewer of the studio that metals and glass mirror.
     pub studio: Option<[f32; 3]>,
@@ -53,8 +53,9 @@ impl Lighting {
             Some(_) => "none, since surfaces that shine light the scene",
             None => "as the file states",
         };
-        let studio =
-            self.studio.map_or("none".to_owned(), |towards| format!("set up for a viewer at {}", vector(towards)));
+        let studio = self
+            .studio
+            .map_or("none".to_owned(), |towards| format!("set up for a viewer in the direction {}", vector(towards)));
         let exposure = self.exposure.map_or("measured".to_owned(), |exposure| exposure.to_string());
         let rows = [
             ["lights", chosen],

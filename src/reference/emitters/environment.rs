@@ -46,7 +46,11 @@ fn map_value(map: &EnvironmentMap, place: Vec2, aside: f32) -> MapValue {
     let low: IVec2 = low.as_ivec2();
     let row = |i: i32| {
         let y = (low.y + i).clamp(0, height as i32 - 1) as u32;
-        let left = if low.x < 0 { width - 1 } else { (low.x as u32).min(width - 1) };
+        let left = match low.x {
+            ..0 => width - 1,
+            x if (x as u32) < width => x as u32,
+            _ => 0,
+        };
         let right = if left + 1 < width { left + 1 } else { 0 };
         let a = map.texel(left, y);
         a + (map.texel(right, y) - a) * weight.x

@@ -80,7 +80,7 @@ pub(super) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result
     let lacks = Lacks {
         camera: lacks_camera,
         up: Up::Y,
-        ground: true,
+        description: true,
         light: lacks_light,
         background: lacks_light,
         integrator: true,

@@ -86,10 +86,16 @@ impl MapOptions {
         if options.name.is_empty() { Err("names no file".to_owned()) } else { Ok(options) }
     }
 
-    /// Returns the options of the map for a tile, whose image does not repeat.
+    /// Returns whether `-s` or `-o` changes the texture coordinates.
+    pub fn is_moved(&self) -> bool {
+        (self.scale, self.offset) != (Vec2::ONE, Vec2::ZERO)
+    }
+
+    /// Returns the options of the map for a tile, whose image does not repeat. The tiles lie where the coordinates of
+    /// the faces say, so that nothing moves them.
     pub fn for_tile(&self, tile: u32) -> Self {
         let (u, v) = tiles::corner(tile);
-        Self { offset: self.offset - Vec2::new(u, v), clamp: true, ..self.clone() }
+        Self { scale: Vec2::ONE, offset: -Vec2::new(u, v), clamp: true, ..self.clone() }
     }
 
     /// Reads an option's values. Returns what follows them, or nothing if there is no such option.

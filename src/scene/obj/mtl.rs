@@ -97,8 +97,8 @@ pub fn load_libraries(
     Ok((materials(described, images)?, tiles))
 }
 
-/// Adds a copy of a material for each tile of its images. The copies have its name and precede it, so that the name
-/// stands for the material itself, which has no image in tiles.
+/// Adds a copy of a material for each tile of its images. The copies have its name and precede it, since of
+/// materials with one name the last one counts: the name means the material itself, which has no image in tiles.
 fn with_tiles(described: Vec<Described>) -> (Vec<Described>, Tiles) {
     let (mut all, mut tiles) = (Vec::new(), Tiles::default());
     for Described { spec, name, path, more } in described {
@@ -286,6 +286,12 @@ fn read_more(reach: Reach, path: &Path, text: &str, images: &mut Images) -> Vec<
         if let Ok(options) = &options {
             let tiles = files_of_tiles(reach, folder, &options.name);
             if !tiles.is_empty() {
+                if options.is_moved() {
+                    warn(line, rest, format!("`-s` and `-o` of `{keyword}` are left out: its image is in tiles"));
+                }
+                if let Some((_, NamedFile { path, .. })) = tiles.iter().find(|(_, file)| file.is_other_case) {
+                    warn(line, &options.name, format!("`{}`: {} is taken", options.name, shown(path)));
+                }
                 let add = |(tile, file): (u32, NamedFile)| Map {
                     line,
                     term,
@@ -344,9 +350,11 @@ fn materials(described: Vec<Described>, images: &mut Images) -> Result<Vec<Mater
 
 /// Tells the user once of materials that are cut out without a statement that says so.
 fn note_cut_outs(described: &[Described], images: &Images) {
-    let mut cut_out = described.iter().filter(|described| described.cut_out(images).is_some());
-    let Some(first) = cut_out.next() else { return };
-    let others = match cut_out.count() {
+    let cut_out = |described: &&Described| described.cut_out(images).is_some();
+    let Some(first) = described.iter().find(cut_out) else { return };
+    // A material whose image is in tiles is there once for each.
+    let names: HashSet<&str> = described.iter().filter(cut_out).map(|described| &*described.name).collect();
+    let others = match names.len() - 1 {
         0 => String::new(),
         n => format!(" and {n} more"),
     };

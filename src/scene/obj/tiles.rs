@@ -72,6 +72,9 @@ impl Tiles {
         if self.bases.is_empty() {
             return;
         }
+        if mesh.uvs[0].is_empty() {
+            return warn_of_missing(path, mesh.slots.iter().filter(|slot| self.bases.contains(slot)).count());
+        }
         let mut n_without = 0;
         for (slot, uvs) in mesh.slots.iter_mut().zip(&mesh.uvs[0]).filter(|(slot, _)| self.bases.contains(slot)) {
             // The v of a mesh grows downwards.
@@ -84,12 +87,17 @@ impl Tiles {
                 None => n_without += 1,
             }
         }
-        if n_without > 0 {
-            tracing::warn!(
-                "{}: {n_without} triangles are in tiles (UDIM) whose images are missing: they are shown without",
-                path.display()
-            );
-        }
+        warn_of_missing(path, n_without);
+    }
+}
+
+/// Tells the user of triangles that have no image, if there are any.
+fn warn_of_missing(path: &Path, n_without: usize) {
+    if n_without > 0 {
+        tracing::warn!(
+            "{}: {n_without} triangles are in tiles (UDIM) whose images are missing: they are shown without",
+            path.display()
+        );
     }
 }
 

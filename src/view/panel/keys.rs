@@ -16,7 +16,7 @@ pub const KEYS: [(&str, &str); 17] = [
     ("U", "another axis points up: +z, +x, -y, -z, -x, +y"),
     ("1, 2 3 4", "picture; depth, normals, triangles: primary rays only"),
     ("5, 6", "steps, rays: sums over all rays, slow as the picture"),
-    ("M", "of paths, in motion: quick pictures by whitted, paths, or paths without their noise"),
+    ("M", "with path, what is drawn in motion: whitted, paths, or filtered paths"),
     ("P", "print the camera as a scene file has it"),
     ("S, F12", "save what is seen, drawn in full"),
     ("H, F1, ?", "show or hide these keys"),
