@@ -200,8 +200,8 @@ fn set_rays<S: Simd>(
     steps.go_on = go_on.to_bitmask() as LaneMask;
 }
 
-/// Returns directions in the frame of the surface, as `sample_lambert` does. Sines and cosines are computed one by one:
-/// only so are they those of the reference.
+/// Returns directions in the frame of the surface, as `sample_lambert` does. Sines and cosines are computed one by
+/// one, by the function that the reference calls: a vectorized one would round differently.
 #[inline(always)]
 fn lambert_samples<S: Simd>(simd: S, [ux, uy]: &PairsSoa) -> Vec3x16<S> {
     let (mut cosines, mut sines) = ([0.0; LANES], [0.0; LANES]);

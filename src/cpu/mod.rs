@@ -1,6 +1,6 @@
-//! The fast CPU engine: renders frames and casts rays without Vulkan. The traversal is implemented here, and of path
-//! tracing what sixteen paths can do together. All other kernels are those of the [reference](crate::reference), and
-//! all results are the same as its, bit for bit.
+//! The fast CPU engine: renders frames and casts rays without Vulkan. The traversal is implemented here, and so are the
+//! steps of path tracing that sixteen paths can take together. All other kernels are those of the
+//! [reference](crate::reference). All results equal the reference's, bit for bit.
 //!
 //! ```text
 //! render   the frame, batch by batch, in the order of its plan

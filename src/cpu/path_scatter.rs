@@ -1,5 +1,5 @@
-//! Path scatter: the light at the hits of paths, and the way on. It does what the reference's pass does, bit for bit.
-//! The random numbers of sixteen paths are computed together, and so are the steps of paths at
+//! Path scatter: the light at the hits of paths, and the rays with which they go on. It does what the reference's pass
+//! does, bit for bit. The random numbers of sixteen paths are computed together, and so are the steps of paths at
 //! [matt](super::matt_surfaces) surfaces.
 
 use arrayvec::ArrayVec;
@@ -299,7 +299,7 @@ mod tests {
         [Vec::new(), vec![Light::Point { position: Vec3::Z, intensity: radiance }], areas.to_vec()]
     }
 
-    /// All that a bounce changes.
+    /// The buffers that a bounce writes.
     #[derive(Clone, Debug, PartialEq)]
     struct Paths {
         rays: Vec<PathRay>,

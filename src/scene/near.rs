@@ -254,7 +254,7 @@ mod tests {
         scene
     }
 
-    /// A small mesh has no more than its share of a sample, of which it has at least one triangle.
+    /// A small mesh has at least one triangle in a sample, and yet no more than its share of the area.
     #[test]
     fn samples_weigh_meshes_by_their_areas() {
         let scene = scene_of([(20_000, 0.0), (2, 1e5)]);

@@ -49,7 +49,7 @@ fn add_clearcoat(terms: &BsdfTerms, to_light: Vec3, half_vector: Vec3, sum: &mut
 
 /// Adds the Lambertian lobe.
 fn add_lambert(terms: &BsdfTerms, to_light: Vec3, sum: &mut BsdfValue) {
-    // Of metals and glass, it is often black, and its probability is 0.
+    // The Lambertian lobe of metals and glass is often black. Its probability is then 0, and it adds nothing.
     if terms.below == Vec3::ZERO && terms.between == Vec3::ZERO {
         return;
     }

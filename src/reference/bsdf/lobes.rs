@@ -61,8 +61,8 @@ pub(super) fn metal_fresnel(material: &Material, cosine: f32) -> Vec3 {
     conductor_reflectance(cosine, material.conductor_eta, material.conductor_k)
 }
 
-/// The mean of the reflectances of a dielectric and of a metal, weighted as the material is metallic. One without
-/// weight is not computed.
+/// The mean of the reflectances of a dielectric and of a metal, weighted as the material is metallic. A
+/// reflectance whose weight is 0 is not computed.
 pub(super) fn with_metal(material: &Material, dielectric: impl FnOnce() -> Vec3, metal: impl FnOnce() -> Vec3) -> Vec3 {
     if material.metallic == 0.0 {
         return dielectric();

@@ -80,7 +80,7 @@ fn mix(a: Vec3, b: Vec3, weight: f32) -> Vec3 {
 pub(super) fn split_at(terms: &BsdfTerms, cosine: f32) -> InterfaceSplit {
     let material = terms.material;
     let cosine = cosine.clamp(0.0, 1.0);
-    // Nothing passes, so that the general formula would find the same.
+    // No light passes, so the general formula would give the same result.
     if material.metallic == 1.0 || material.transmission == 0.0 {
         let opaque = || dielectric_reflectance(material, cosine);
         let reflected = with_metal(material, opaque, || metal_fresnel(material, cosine));

@@ -69,18 +69,18 @@ pub(super) fn read_obj(
     let first = origin.first();
     // The quick way keeps points as they are written.
     let quick = if first == DVec3::ZERO { quick_obj(&text, progress) } else { None };
-    let (content, points) = match quick {
+    let (content, second) = match quick {
         Some(quick) => {
-            let points = quick.points();
-            (ObjContent::Quick(quick), points)
+            let second = origin.second(quick.points());
+            (ObjContent::Quick(quick), second)
         }
         None => {
             let clean = careful(path, &text, first)?;
-            let points = clean.points();
-            (ObjContent::Careful(clean), points)
+            let second = origin.second(&clean.points());
+            (ObjContent::Careful(clean), second)
         }
     };
-    Ok(match origin.second(&points) {
+    Ok(match second {
         Some(origin) => ObjFile { content: ObjContent::Careful(careful(path, &text, origin)?), text, origin },
         None => ObjFile { content, text, origin: first },
     })

@@ -97,8 +97,8 @@ pub fn load_libraries(
     Ok((materials(described, images)?, tiles))
 }
 
-/// Adds a copy of a material for each tile of its images. The copies have its name and precede it, since of
-/// materials with one name the last one counts: the name means the material itself, which has no image in tiles.
+/// Adds a copy of a material for each tile of its images. The copies have its name and precede it. Since the last of
+/// several materials with one name counts, the name means the material itself, which shows no image in tiles.
 fn with_tiles(described: Vec<Described>) -> (Vec<Described>, Tiles) {
     let (mut all, mut tiles) = (Vec::new(), Tiles::default());
     for Described { spec, name, path, more } in described {

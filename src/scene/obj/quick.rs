@@ -330,8 +330,8 @@ fn joined(mut chunks: Vec<Chunk>) -> Option<QuickObj> {
 
 impl QuickObj {
     /// Returns all points.
-    pub fn points(&self) -> Vec<Vec3> {
-        self.positions.par_chunks_exact(3).map(Vec3::from_slice).collect()
+    pub fn points(&self) -> &[Vec3] {
+        bytemuck::cast_slice(&self.positions)
     }
 
     /// Returns the models of the file, as tobj divides it: faces that follow each other, of one kind and one material.
