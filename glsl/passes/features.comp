@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Features: one invocation per primary ray of the batch writes the first-hit AOVs of its pixel: position, normal,
+// Features: one invocation per pixel of the batch writes the AOVs of its first camera ray's hit: position, normal,
 // albedo, depth and the indices of the triangle and its material.
 // Reads hits and the scene; writes pixel_features, except n_rays and n_steps.
 #include "layout.glsl"
@@ -15,8 +15,9 @@ layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hit
 layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock { Feature pixel_features[]; };
 
 void main() {
-    uint ray_ix = gl_GlobalInvocationID.x;
-    if (ray_ix >= batch.n_pixels) return;
+    uint in_batch = gl_GlobalInvocationID.x;
+    if (in_batch >= batch.n_pixels) return;
+    uint ray_ix = first_ray_of(in_batch);
     PathRay ray = ray_at(ray_ix);
     Hit hit = hits[ray_ix];
     uint pixel_ix = ray.pixel_ix;

@@ -1,7 +1,8 @@
-// The paths of a batch. Each path has a fixed place in the buffers: its pixel in the batch, plus its sample times the
-// number of pixels. Lists of indices say which paths are alive at a bounce. Twin of src/reference/paths.rs.
+// The paths of a batch. Each path has a fixed place in the buffers. The samples of a pixel follow each other, because
+// their rays have much in common: they meet the same parts of the tree and the same materials. Lists of indices say
+// which paths are alive at a bounce. Twin of src/reference/paths.rs.
 //
-// Needs nothing. Provides the push constants `batch`, `list_of`, `pixel_of_path` and `key_of_path`.
+// Needs nothing. Provides the push constants `batch`, `list_of`, `path_of`, `pixel_of_path` and `key_of_path`.
 #ifndef KDRAY_PATHS
 #define KDRAY_PATHS
 
@@ -17,14 +18,19 @@ uint list_of(uint depth) {
     return (depth & 1u) * frame.queue_capacity;
 }
 
+// The path of a pixel of the batch, by its place in the batch, and of a sample of the frame.
+uint path_of(uint in_batch, uint sample_ix) {
+    return (in_batch << frame.samples_log2) + sample_ix;
+}
+
 // The window's pixel of a path.
 uvec2 pixel_of_path(uint path_ix) {
-    return pixel_of(batch.first_pixel + path_ix % batch.n_pixels, frame.width, frame.height);
+    return pixel_of(batch.first_pixel + (path_ix >> frame.samples_log2), frame.width, frame.height);
 }
 
 // What the random numbers of a path depend on. pixel: the window's pixel.
 SampleKey key_of_path(uint path_ix, uvec2 pixel) {
-    return sample_key(picture_pixel_of(pixel), first_sample_of(pixel) + path_ix / batch.n_pixels);
+    return sample_key(picture_pixel_of(pixel), first_sample_of(pixel) + path_ix % (1u << frame.samples_log2));
 }
 
 #endif

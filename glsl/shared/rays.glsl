@@ -16,6 +16,11 @@ uvec2 pixel_of_ray(uint ray_ix) {
     return pixel_of(batch.first_pixel + ray_ix, frame.width, frame.height);
 }
 
+// The index in the queue of a pixel's first camera ray, by the pixel's place in the batch.
+uint first_ray_of(uint in_batch) {
+    return PATHS ? in_batch << frame.samples_log2 : in_batch;
+}
+
 // Any ray of the batch, by its index in the queue.
 PathRay ray_at(uint ray_ix) {
     // Paths store their camera rays, too.

@@ -10,11 +10,11 @@ use super::{
     sampler::{KeysSoa, PairsSoa, random_pairs},
 };
 use crate::{
-    layout::{Batch, PathRay},
+    layout::{Batch, Frame, PathRay},
     reference::{
         inputs::KernelInputs,
         path_camera::path_camera_ray,
-        paths::{key_of_path, pixel_of_path},
+        paths::{key_of_path, path_of, pixel_of_path, sample_of_path},
         sampler::SampleKey,
     },
 };
@@ -33,9 +33,11 @@ pub struct PixelOfBatch {
 
 /// Returns the pixels of a batch, in the order of its paths.
 pub fn pixels_of_batch(inputs: &KernelInputs, batch: &Batch) -> Vec<PixelOfBatch> {
-    let pixel = |path_ix| {
-        let at = pixel_of_path(inputs.frame(), batch, path_ix);
-        PixelOfBatch { at, key: key_of_path(inputs, batch, path_ix, at) }
+    let frame = inputs.frame();
+    let pixel = |in_batch| {
+        let path_ix = path_of(frame, in_batch, 0);
+        let at = pixel_of_path(frame, batch, path_ix);
+        PixelOfBatch { at, key: key_of_path(inputs, path_ix, at) }
     };
     (0..batch.n_pixels).map(pixel).collect()
 }
@@ -43,26 +45,26 @@ pub fn pixels_of_batch(inputs: &KernelInputs, batch: &Batch) -> Vec<PixelOfBatch
 impl PixelOfBatch {
     /// Returns the key of a path of this pixel.
     #[inline(always)]
-    pub fn key_of_path(&self, batch: &Batch, path_ix: u32) -> SampleKey {
-        SampleKey { sample_ix: self.key.sample_ix + path_ix / batch.n_pixels, ..self.key }
+    pub fn key_of_path(&self, frame: &Frame, path_ix: u32) -> SampleKey {
+        SampleKey { sample_ix: self.key.sample_ix + sample_of_path(frame, path_ix), ..self.key }
     }
 }
 
 /// Writes the camera ray of each path.
-pub fn path_begin(inputs: &KernelInputs, batch: &Batch, pixels: &[PixelOfBatch], rays: &mut [PathRay]) {
-    let level = Level::new();
+pub fn path_begin(inputs: &KernelInputs, pixels: &[PixelOfBatch], rays: &mut [PathRay]) {
+    let (level, frame) = (Level::new(), inputs.frame());
+    let pixel_of = |path_ix| &pixels[(path_ix >> frame.samples_log2) as usize];
     rays.par_chunks_mut(PATHS_PER_TASK).enumerate().for_each(|(task, rays)| {
         for (group, rays) in rays.chunks_mut(LANES).enumerate() {
             let first_path = (task * PATHS_PER_TASK + group * LANES) as u32;
             let mut keys = KeysSoa::default();
             for (lane, path_ix) in (first_path..first_path + rays.len() as u32).enumerate() {
-                keys.set(lane, pixels[(path_ix % batch.n_pixels) as usize].key_of_path(batch, path_ix));
+                keys.set(lane, pixel_of(path_ix).key_of_path(frame, path_ix));
             }
             let [in_pixel, in_lens]: [PairsSoa; 2] = dispatch!(level, simd => random_pairs(simd, &keys, 0));
             for (lane, ray) in rays.iter_mut().enumerate() {
                 let [in_pixel, in_lens] = [in_pixel, in_lens].map(|[x, y]| vec2(x[lane], y[lane]));
-                let pixel = pixels[((first_path + lane as u32) % batch.n_pixels) as usize].at;
-                *ray = path_camera_ray(inputs, pixel, in_pixel, in_lens);
+                *ray = path_camera_ray(inputs, pixel_of(first_path + lane as u32).at, in_pixel, in_lens);
             }
         }
     });
@@ -91,14 +93,15 @@ mod tests {
         let world = World::of_flat(scene, &BuildOptions::default()).expect("a world");
         let of_picture = world.frame_constants(&RenderOptions { width: 37, height: 29, ..RenderOptions::default() });
         let (right, up, forward) = (Vec3::X, Vec3::Y, Vec3::NEG_Z);
-        let frame = Frame { right, up, forward, first_sample: 5, aperture: 0.1, focus: 2.0, ..of_picture };
+        let of_samples = Frame { samples_log2: 2, first_sample: 4, ..of_picture };
+        let frame = Frame { right, up, forward, aperture: 0.1, focus: 2.0, ..of_samples };
         let inputs = KernelInputs::new(&world, &frame);
-        // The last group of sixteen paths is not full, and a pixel's samples are in different tasks.
+        // The last group of sixteen paths is not full.
         let batch = Batch { first_pixel: 100, n_pixels: 301, ..Batch::default() };
-        let (mut expected, mut found) = (vec![PathRay::zeroed(); 3 * 301], vec![PathRay::zeroed(); 3 * 301]);
+        let (mut expected, mut found) = (vec![PathRay::zeroed(); 4 * 301], vec![PathRay::zeroed(); 4 * 301]);
         reference::path_begin::path_begin(&inputs, &batch, &mut expected);
-        path_begin(&inputs, &batch, &pixels_of_batch(&inputs, &batch), &mut found);
+        path_begin(&inputs, &pixels_of_batch(&inputs, &batch), &mut found);
         assert!(found == expected);
-        assert!(found[0].direction != found[301].direction, "samples differ");
+        assert!(found[0].direction != found[1].direction, "samples differ");
     }
 }

@@ -108,7 +108,8 @@ impl BounceOfPaths<'_> {
     }
 
     fn key_of(&self, path_ix: u32) -> SampleKey {
-        self.pixels[(path_ix % self.batch.n_pixels) as usize].key_of_path(self.batch, path_ix)
+        let frame = self.inputs.frame();
+        self.pixels[(path_ix >> frame.samples_log2) as usize].key_of_path(frame, path_ix)
     }
 
     /// Returns the area lights.
@@ -357,10 +358,11 @@ mod tests {
         for (lights, depth) in lights().into_iter().flat_map(|lights| [0, 2, 3, 4].map(|depth| (lights.clone(), depth)))
         {
             let world = world(lights, &mut random);
-            let frame = world.frame_constants(&RenderOptions { max_depth: 5, ..RenderOptions::default() });
+            let of_picture = world.frame_constants(&RenderOptions { max_depth: 5, ..RenderOptions::default() });
+            let frame = Frame { samples_log2: 2, ..of_picture };
             let materials = &world.scene().materials;
             let inputs = &KernelInputs::new(&world, &frame).of_paths(materials, world.emitters());
-            let batch = &Batch { n_pixels: 700, depth, ..Batch::default() };
+            let batch = &Batch { n_pixels: N as u32 / 4, depth, ..Batch::default() };
             let mut expected = Paths::at_random(N, &mut random);
             let hits: Vec<_> = (0..N).map(|i| hit_at_random(&mut random, i % 9 == 0)).collect();
             let (pixels, are_matt) = (&pixels_of_batch(inputs, batch)[..], &matt_materials(inputs)[..]);

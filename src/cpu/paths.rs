@@ -50,7 +50,7 @@ impl Paths {
         self.segments.resize(n, Segment::zeroed());
         self.live[0] = (0..n_paths).collect();
         self.pixels = pixels_of_batch(inputs, batch);
-        path_begin(inputs, batch, &self.pixels, &mut queue.rays);
+        path_begin(inputs, &self.pixels, &mut queue.rays);
     }
 
     /// Finds the hits of the paths that are alive, and tests the segments of the bounce before. Returns the numbers of

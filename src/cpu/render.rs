@@ -462,11 +462,10 @@ impl Renderer {
     fn note_features(&mut self) {
         let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
         let (Queue { rays, hits, .. }, pixels) = (&self.queue, &mut self.pixel_features);
-        // Of paths, the first ones are the first samples of the pixels.
-        let n_rays =
-            if self.options.integrator == Integrator::Path { self.batch.n_pixels as usize } else { rays.len() };
-        let (rays, hits) = (&rays[..n_rays], &hits[..n_rays]);
-        self.clock.time(Pass::Features, Some(0), || features::features(&inputs, rays, hits, pixels));
+        let of_paths = self.options.integrator == Integrator::Path;
+        let rays_per_pixel = if of_paths { 1 << self.frame.samples_log2 } else { 1 };
+        let first_hits = rays.iter().zip(hits).step_by(rays_per_pixel);
+        self.clock.time(Pass::Features, Some(0), || features::features(&inputs, first_hits, pixels));
     }
 
     /// Adds the traversal costs of the rays of all bounces to the features.

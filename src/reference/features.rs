@@ -5,8 +5,12 @@ use super::{inputs::KernelInputs, maps::shaded_at};
 use crate::layout::{Feature, Hit, NO_TRIANGLE, PathRay};
 
 /// Writes `pixel_features` of the primary rays' pixels, except the counts `n_rays` and `n_steps`.
-pub fn features(inputs: &KernelInputs, rays: &[PathRay], hits: &[Hit], pixel_features: &mut [Feature]) {
-    for (ray, hit) in rays.iter().zip(hits) {
+pub fn features<'a>(
+    inputs: &KernelInputs,
+    first_hits: impl Iterator<Item = (&'a PathRay, &'a Hit)>,
+    pixel_features: &mut [Feature],
+) {
+    for (ray, hit) in first_hits {
         let feature = &mut pixel_features[ray.pixel_ix as usize];
         let Feature { n_rays, n_steps, .. } = *feature;
         *feature = Feature { n_rays, n_steps, ..feature_of(inputs, ray, hit) };

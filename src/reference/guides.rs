@@ -11,7 +11,7 @@ use super::{
     material::is_unlit,
     noise::squared_luminance,
     path_camera::path_camera_ray,
-    paths::{key_of_path, pixel_of_path},
+    paths::{key_of_path, path_of, pixel_of_path},
     sampler::random_pair,
     surface::Surface,
 };
@@ -23,13 +23,13 @@ pub fn guides(inputs: &KernelInputs, batch: &Batch, hits: &[Hit], states: &[Path
     let n_of_frame = 1 << frame.samples_log2;
     let n_earlier = frame.n_samples - n_of_frame;
     for in_batch in 0..batch.n_pixels {
-        let pixel = pixel_of_path(frame, batch, in_batch);
+        let pixel = pixel_of_path(frame, batch, path_of(frame, in_batch, 0));
         let guide = &mut pixel_guides[pixel_ix_of(frame, pixel) as usize];
         if n_earlier == 0 {
             *guide = Guide::default();
         }
         for sample_ix in guide.n_samples.saturating_sub(n_earlier).min(n_of_frame)..n_of_frame {
-            let path_ix = sample_ix * batch.n_pixels + in_batch;
+            let path_ix = path_of(frame, in_batch, sample_ix);
             let (hit, seen) = (&hits[path_ix as usize], states[path_ix as usize].radiance);
             let surface = first_surface(inputs, batch, pixel, path_ix, hit);
             add_path(guide, surface, seen);
@@ -46,7 +46,7 @@ struct FirstSurface {
 
 /// Returns the surface that a camera ray hits. A lamp in front of the hit ends the path.
 fn first_surface(inputs: &KernelInputs, batch: &Batch, pixel: UVec2, path_ix: u32, hit: &Hit) -> Option<FirstSurface> {
-    let key = key_of_path(inputs, batch, path_ix, pixel);
+    let key = key_of_path(inputs, path_ix, pixel);
     let ray = path_camera_ray(inputs, pixel, random_pair(key, 0), random_pair(key, 1));
     if hit.triangle_ix == NO_TRIANGLE || seen_light(inputs, ray.origin, ray.direction, hit.t).t.is_finite() {
         return None;

@@ -14,7 +14,7 @@ use crate::layout::{Batch, PathRay};
 pub fn path_begin(inputs: &KernelInputs, batch: &Batch, rays: &mut [PathRay]) {
     rays.par_iter_mut().enumerate().for_each(|(path_ix, ray)| {
         let pixel = pixel_of_path(inputs.frame(), batch, path_ix as u32);
-        let key = key_of_path(inputs, batch, path_ix as u32, pixel);
+        let key = key_of_path(inputs, path_ix as u32, pixel);
         *ray = path_camera_ray(inputs, pixel, random_pair(key, 0), random_pair(key, 1));
     });
 }

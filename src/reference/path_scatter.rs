@@ -36,7 +36,7 @@ pub fn path_scatter(
     of_blocks.into_par_iter().zip(of_paths).for_each(|(of_block, (mut rays, mut states, mut segments))| {
         let (live, kinds, n_going_on) = of_block;
         for (&path_ix, kind) in live.iter().zip(&mut *kinds) {
-            let key = key_of_path(inputs, batch, path_ix, pixel_of_path(inputs.frame(), batch, path_ix));
+            let key = key_of_path(inputs, path_ix, pixel_of_path(inputs.frame(), batch, path_ix));
             let (ray, state) = (rays.of_path(path_ix), states.of_path(path_ix));
             let random_pairs = || pairs_of_hit(key, batch.depth);
             let (goes_on, segment) = step_path(inputs, random_pairs, batch.depth, &hits[path_ix as usize], ray, state);

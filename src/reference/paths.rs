@@ -10,14 +10,24 @@ use super::{
 };
 use crate::layout::{Batch, Frame};
 
+/// The path of a pixel of the batch, by its place in the batch, and of a sample of the frame.
+pub fn path_of(frame: &Frame, in_batch: u32, sample_ix: u32) -> u32 {
+    (in_batch << frame.samples_log2) + sample_ix
+}
+
+/// The frame's sample that a path is.
+pub fn sample_of_path(frame: &Frame, path_ix: u32) -> u32 {
+    path_ix % (1 << frame.samples_log2)
+}
+
 /// The window's pixel of a path.
 pub fn pixel_of_path(frame: &Frame, batch: &Batch, path_ix: u32) -> UVec2 {
-    pixel_of(batch.first_pixel + path_ix % batch.n_pixels, frame.width, frame.height)
+    pixel_of(batch.first_pixel + (path_ix >> frame.samples_log2), frame.width, frame.height)
 }
 
 /// What the random numbers of a path depend on. `pixel`: the window's pixel.
-pub fn key_of_path(inputs: &KernelInputs, batch: &Batch, path_ix: u32, pixel: UVec2) -> SampleKey {
+pub fn key_of_path(inputs: &KernelInputs, path_ix: u32, pixel: UVec2) -> SampleKey {
     let frame = inputs.frame();
     let picture_pixel = picture_pixel_of(frame, inputs.noise_tiles, pixel);
-    sample_key(picture_pixel, first_sample_of(frame, inputs.noise_tiles, pixel) + path_ix / batch.n_pixels)
+    sample_key(picture_pixel, first_sample_of(frame, inputs.noise_tiles, pixel) + sample_of_path(frame, path_ix))
 }

@@ -64,7 +64,7 @@ fn agrees_with_its_twin() {
         // Features are cleared except for their counts, which the kernel keeps.
         let before: Vec<_> = (0..2000).map(|i| Feature { n_rays: i, n_steps: 7 * i, ..Feature::default() }).collect();
         let mut expected = before.clone();
-        reference::features::features(&stage.inputs(), &rays, &hits_of(&stage, &rays), &mut expected);
+        reference::features::features(&stage.inputs(), rays.iter().zip(&hits_of(&stage, &rays)), &mut expected);
         let found = noted(&stage, &rays, &before);
         assert_eq!(difference(&expected, &found), None);
         let with_ray: HashSet<_> = rays.iter().map(|ray| ray.pixel_ix as usize).collect();
