@@ -18,7 +18,7 @@ layout(std430, set = 0, binding = BIND_RAYS) readonly buffer RaysBlock { PathRay
 layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hits[]; };
 layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
 layout(std430, set = 0, binding = BIND_CHILD_KINDS) writeonly buffer ChildKindsBlock { uint child_kinds[]; };
-layout(std430, set = 0, binding = BIND_SCAN_BLOCKS) writeonly buffer ScanBlocksBlock { uint scan_blocks[]; };
+layout(std430, set = 0, binding = BIND_SCAN_BLOCKS) writeonly buffer ScanBlocksBlock { uvec2 scan_blocks[]; };
 layout(std430, set = 0, binding = BIND_PATH_STATES) buffer PathStatesBlock { vec4 path_states[]; };
 layout(std430, set = 0, binding = BIND_SEGMENTS) writeonly buffer SegmentsBlock { uvec4 stored_segments[]; };
 
@@ -28,8 +28,8 @@ void store_segment(uint path_ix, Segment segment) {
     stored_segments[3u * path_ix + 2u] = words_of(segment.light, floatBitsToUint(segment.t_max));
 }
 
-// Takes a path one step further. Returns whether it goes on.
-bool step_of(uint path_ix) {
+// Takes a path one step further. Returns whether it goes on and has a segment, for `child_kinds`.
+uint step_of(uint path_ix) {
     uvec2 pixel = pixel_of_path(path_ix);
     PathRay ray = rays[path_ix];
     vec4 words = path_states[path_ix];
@@ -40,17 +40,17 @@ bool step_of(uint path_ix) {
     // A path without a segment has none already: path_trace.comp has cleared the last one.
     if (segment.state != SEGMENT_NONE) store_segment(path_ix, segment);
     if (goes_on) store_ray(path_ix, ray);
-    return goes_on;
+    return (goes_on ? PATH_GOES_ON : 0u) | (segment.state != SEGMENT_NONE ? PATH_HAS_SEGMENT : 0u);
 }
 
 void main() {
     uint place = gl_GlobalInvocationID.x;
-    bool goes_on = false;
+    uint kind = 0u;
     if (place < bounces[batch.bounce_ix].n_rays) {
-        goes_on = step_of(live_paths[list_of(batch.depth) + place]);
-        child_kinds[place] = goes_on ? 1u : 0u;
+        kind = step_of(live_paths[list_of(batch.depth) + place]);
+        child_kinds[place] = kind;
     }
     uint n_of_group;
-    workgroup_exclusive_add(goes_on ? 1u : 0u, n_of_group);
-    if (gl_LocalInvocationIndex == 0u) scan_blocks[gl_WorkGroupID.x] = n_of_group;
+    workgroup_exclusive_add(kind, n_of_group);
+    if (gl_LocalInvocationIndex == 0u) scan_blocks[gl_WorkGroupID.x] = halves_of(n_of_group);
 }

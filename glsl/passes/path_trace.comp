@@ -62,13 +62,13 @@ bool traced(uint path_ix, bool is_segment) {
 void main() {
     uint place = ray_of_lane(gl_GlobalInvocationID.x, bounces[batch.bounce_ix].trace_lanes_log2);
     uint n_rays = bounces[batch.bounce_ix].n_rays;
-    uint n_segments = batch.depth > 0u ? bounces[batch.bounce_ix - 1u].n_rays : 0u;
+    uint n_segments = batch.depth > 0u ? bounces[batch.bounce_ix - 1u].n_segments : 0u;
     bool is_segment = place >= n_rays;
     bool counts = false;
     // The index of a lane that does not work is beyond both, also after the subtraction.
     uint in_list = is_segment ? place - n_rays : place;
     if (in_list < (is_segment ? n_segments : n_rays)) {
-        uint path_ix = live_paths[list_of(is_segment ? batch.depth + 1u : batch.depth) + in_list];
+        uint path_ix = live_paths[(is_segment ? list_of_segments() : list_of(batch.depth)) + in_list];
         uint mark = is_segment ? segments[path_ix].state : hits[path_ix].triangle_ix;
         bool is_there = !is_segment || mark != SEGMENT_NONE;
         if (is_there && runs_in_round(batch.round, mark)) counts = traced(path_ix, is_segment);

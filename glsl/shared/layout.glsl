@@ -28,6 +28,8 @@
 // Counts that one invocation of `compact_spine.comp` loads and adds up in each turn of its loop. Each is the count of
 // a block of `SCAN_GROUP_SIZE` rays.
 #define SPINE_ITEMS 8u
+// The most invocations of that workgroup. It has as many as the device allows.
+#define SPINE_MOST_INVOCATIONS 1024u
 
 // Triangle index of a ray that hits nothing, and of a pixel that no triangle covers.
 #define NO_TRIANGLE 0xffffffffu
@@ -211,6 +213,11 @@
 #define CHILD_REFLECTED 1u
 // Bit of `child_kinds`: a transmitted ray continues from the hit.
 #define CHILD_TRANSMITTED 2u
+// What `child_kinds` has for a path that goes on. This and the next constant are counts in the two halves of a word, so
+// that one prefix sum over a workgroup counts both.
+#define PATH_GOES_ON 1u
+// What `child_kinds` has, in addition, for a path with a segment to a light.
+#define PATH_HAS_SEGMENT 0x10000u
 
 // `light_visibility` of a ray's hit and a light: no shadow ray was traced, since the hit would not show the light.
 #define LIGHT_UNTESTED 0u
@@ -768,10 +775,11 @@ struct Frame {
 //   one of this bounce. A segment has `2^shadow_lanes_log2` lanes.
 // - `scan_groups`: over the bounce's rays.
 // - `any_overflow`: in the first row of `bounces` only, 1 if any row of the frame has an overflow.
+// - `shade_groups`: over all rays of the batch up to the last one of this bounce.
+// - `n_segments`: in frames of paths, the number of segments from the bounce's hits to lights.
 //
 // In frames of paths, the rays of a bounce are those of the paths that are alive, `first_ray` is 0, and
 // `trace_groups` also count the segments of the bounce before.
-// - `shade_groups`: over all rays of the batch up to the last one of this bounce.
 struct Bounce {
     uint first_ray;
     uint n_rays;
@@ -792,7 +800,7 @@ struct Bounce {
     uint shade_groups_x;
     uint shade_groups_y;
     uint shade_groups_z;
-    uint reserved0;
+    uint n_segments;
 };
 
 // Copies of a bounce's `Counters`, whose sum is the count. This many workgroups can add to them at the same time.
@@ -971,6 +979,8 @@ struct AccelConstants {
 
 // Whether a kernel builds the lower level of a grid.
 #define CONSTANT_LOWER_LEVEL 10u
+// Invocations of the only workgroup of compact_spine.comp, from `SCAN_GROUP_SIZE` to `SPINE_MOST_INVOCATIONS`.
+#define CONSTANT_SCAN_SIZE 15u
 // Which counts a prefix sum in a grid's build adds up: `GRID_SCANS_CELLS` and its like. The first three values equal
 // those of `GRID_COUNTS_CELLS` and its like.
 #define CONSTANT_SCANS 11u
@@ -1237,13 +1247,15 @@ struct GridSort {
 #define BIND_LIGHTS 4u
 // One `PathRay` for each ray, bounce after bounce. The camera's rays are not stored.
 #define BIND_RAYS 8u
-// A word for each ray: bits of `CHILD_REFLECTED` and its like.
+// A word for each ray: bits of `CHILD_REFLECTED` and its like. In frames of paths, it is `PATH_GOES_ON` and
+// `PATH_HAS_SEGMENT`.
 #define BIND_CHILD_KINDS 9u
 // A word for each ray: the index of its first child in the queue. A ray without children has the index that a child
 // of it would have.
 #define BIND_FIRST_CHILDREN 10u
 // A word for each block of `SCAN_GROUP_SIZE` rays: the number of the block's children. After the scan, it is the
-// number of the children of all blocks before.
+// number of the children of all blocks before. In frames of paths, each block has two words: the number of paths that
+// go on, and the number of segments.
 #define BIND_SCAN_BLOCKS 11u
 // One `Bounce` for each batch and bounce.
 #define BIND_BOUNCES 12u
@@ -1281,14 +1293,15 @@ struct GridSort {
 #define BIND_STALLS 32u
 
 // Bindings that only frames of paths have. `rays`, `hits`, `path_states`, `segments` and `path_snapshots` have an
-// element for each path of a batch: the first samples of all pixels, then the second ones, and so on.
+// element for each path of a batch: all samples of the first pixel, then those of the second one, and so on.
 
 // One `PathState` for each path.
 #define BIND_PATH_STATES 33u
 // One `Segment` for each path.
 #define BIND_SEGMENTS 34u
-// Two lists of `Frame.queue_capacity` words: the indices of the paths that are alive, in their order. Bounces of even
-// depth have the first list, those of odd depth the second.
+// Three lists of `Frame.queue_capacity` words, each of indices of paths in their order. The first two lists have the
+// paths that are alive: the first one at bounces of even depth, the second one at those of odd depth. The third list
+// has the paths whose segments are to be traced.
 #define BIND_LIVE_PATHS 35u
 // One `Guide` for each pixel.
 #define BIND_PIXEL_GUIDES 36u

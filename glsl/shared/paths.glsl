@@ -2,7 +2,8 @@
 // their rays have much in common: they meet the same parts of the tree and the same materials. Lists of indices say
 // which paths are alive at a bounce. Twin of src/reference/paths.rs.
 //
-// Needs nothing. Provides the push constants `batch`, `list_of`, `path_of`, `pixel_of_path` and `key_of_path`.
+// Needs nothing. Provides the push constants `batch`, `list_of`, `list_of_segments`, `path_of`, `pixel_of_path` and
+// `key_of_path`.
 #ifndef KDRAY_PATHS
 #define KDRAY_PATHS
 
@@ -16,6 +17,11 @@ layout(push_constant) uniform BatchBlock { Batch batch; };
 // Where the list of the paths that are alive at a bounce begins in `live_paths`.
 uint list_of(uint depth) {
     return (depth & 1u) * frame.queue_capacity;
+}
+
+// Where the list of the paths with a segment begins in `live_paths`.
+uint list_of_segments() {
+    return 2u * frame.queue_capacity;
 }
 
 // The path of a pixel of the batch, by its place in the batch, and of a sample of the frame.

@@ -15,7 +15,8 @@ pub struct PathQueue {
     /// One for each path, as in the next buffer.
     pub path_states: Buffer<PathState>,
     pub segments: Buffer<Segment>,
-    /// Two lists, each with room for all paths: those that are alive at this bounce, and at the next.
+    /// Three lists, each with room for all paths: those that are alive at this bounce, those that are alive at the
+    /// next, and those that have a segment.
     pub live_paths: Buffer<u32>,
     /// The radiance of each path when the last layer of light was complete. Empty if the picture has no such layers.
     pub path_snapshots: Buffer<[f32; 4]>,
@@ -24,10 +25,10 @@ pub struct PathQueue {
 }
 
 impl PathQueue {
-    /// Bytes that a path takes, with its ray and hit, whether it goes on, and its places in both lists. Layers of light
+    /// Bytes that a path takes, with its ray and hit, whether it goes on, and its places in the lists. Layers of light
     /// take 16 more.
     pub const BYTES_PER_PATH: usize =
-        size_of::<PathRay>() + size_of::<Hit>() + size_of::<PathState>() + size_of::<Segment>() + 3 * size_of::<u32>();
+        size_of::<PathRay>() + size_of::<Hit>() + size_of::<PathState>() + size_of::<Segment>() + 4 * size_of::<u32>();
 
     /// Makes the buffers for `capacity` paths. `has_layers`: whether the picture has layers of light.
     ///
@@ -39,7 +40,7 @@ impl PathQueue {
         Ok(Self {
             path_states: Buffer::new(context, "path_states", capacity, storage)?,
             segments: Buffer::new(context, "segments", capacity, storage)?,
-            live_paths: Buffer::new(context, "live_paths", 2 * capacity, storage)?,
+            live_paths: Buffer::new(context, "live_paths", 3 * capacity, storage)?,
             path_snapshots: Buffer::new(context, "path_snapshots", if has_layers { capacity } else { 0 }, storage)?,
             noise_tiles: Buffer::new(context, "noise_tiles", NoiseTiles::MOST, BufferUse::Uniform)?,
         })
@@ -63,7 +64,8 @@ pub struct Queue {
     /// `n_lights * queue_capacity` elements, lights outermost.
     pub light_visibility: Buffer<u32>,
     /// The number of children of each block of `SCAN_GROUP_SIZE` rays. After the prefix sum, it is the number of
-    /// children of all blocks before. There are `queue_capacity / SCAN_GROUP_SIZE` elements, rounded up.
+    /// children of all blocks before. There are `queue_capacity / SCAN_GROUP_SIZE` elements, rounded up, and for
+    /// paths twice as many.
     pub scan_blocks: Buffer<u32>,
 }
 
@@ -102,7 +104,7 @@ impl Queue {
             first_children: Buffer::new(context, "first_children", 0, storage)?,
             ray_radiance: Buffer::new(context, "ray_radiance", 0, storage)?,
             light_visibility: Buffer::new(context, "light_visibility", 0, storage)?,
-            scan_blocks: Buffer::new(context, "scan_blocks", n_blocks, storage)?,
+            scan_blocks: Buffer::new(context, "scan_blocks", 2 * n_blocks, storage)?,
         })
     }
 

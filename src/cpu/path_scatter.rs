@@ -24,6 +24,7 @@ use crate::{
         inputs::KernelInputs,
         live_paths::{Part, parts},
         maps::colour_at,
+        path_compact::{counts_of_block, kind_of_path},
         path_scatter::PathBuffers,
         path_vertex::{PAIRS_OF_HIT, first_pair_of, step_past_lights, step_path},
         sampler::SampleKey,
@@ -60,7 +61,7 @@ pub fn path_scatter(
     bounce: &BounceOfPaths,
     live: &[u32],
     paths: PathBuffers,
-    (child_kinds, scan_blocks): (&mut [u32], &mut [u32]),
+    (child_kinds, scan_blocks): (&mut [u32], &mut [[u32; 2]]),
 ) {
     let of_blocks = (live.par_chunks(BLOCK_SIZE), child_kinds.par_chunks_mut(BLOCK_SIZE), scan_blocks.par_iter_mut());
     let of_paths = (
@@ -69,14 +70,14 @@ pub fn path_scatter(
         parts(paths.segments, live, BLOCK_SIZE),
     );
     of_blocks.into_par_iter().zip(of_paths).for_each(|(of_block, (rays, states, segments))| {
-        let (live, kinds, n_going_on) = of_block;
+        let (live, kinds, counts) = of_block;
         bounce.step_block(live, kinds, &mut PathsOfBlock { rays, states, segments });
-        *n_going_on = kinds.iter().sum();
+        *counts = counts_of_block(kinds);
     });
 }
 
 impl BounceOfPaths<'_> {
-    /// Takes the paths of a block one step further. Writes to `kinds` which of them go on.
+    /// Takes the paths of a block one step further. Writes to `kinds` which of them go on and have a segment.
     fn step_block(&self, live: &[u32], kinds: &mut [u32], paths: &mut PathsOfBlock) {
         let mut at_matt = ArrayVec::<_, BLOCK_SIZE>::new();
         let (mut at_others, mut missed) = (at_matt.clone(), at_matt.clone());
@@ -136,7 +137,7 @@ impl BounceOfPaths<'_> {
         })
     }
 
-    /// Takes a path one step further. Returns 1 if it goes on, otherwise 0.
+    /// Takes a path one step further. Returns its kind: whether it goes on and has a segment.
     fn step(&self, path_ix: u32, before_light: bool, pairs: [Vec2; PAIRS_OF_HIT], paths: &mut PathsOfBlock) -> u32 {
         let (ray, state) = (paths.rays.of_path(path_ix), paths.states.of_path(path_ix));
         let (inputs, depth, hit) = (self.inputs, self.batch.depth, &self.hits[path_ix as usize]);
@@ -148,7 +149,7 @@ impl BounceOfPaths<'_> {
         if segment.state != SEGMENT_NONE {
             *paths.segments.of_path(path_ix) = segment;
         }
-        goes_on.into()
+        kind_of_path(goes_on, segment.state != SEGMENT_NONE)
     }
 
     /// Returns the random numbers of a group of paths.
@@ -216,9 +217,9 @@ impl BounceOfPaths<'_> {
                 continue;
             }
             let triangle_ix = self.hits[path_ix as usize].triangle_ix;
-            let goes_on = steps.go_on >> lane & 1 == 1;
-            kinds[place] = goes_on.into();
-            if steps.have_segment >> lane & 1 == 1 {
+            let (goes_on, has_segment) = (steps.go_on >> lane & 1 == 1, steps.have_segment >> lane & 1 == 1);
+            kinds[place] = kind_of_path(goes_on, has_segment);
+            if has_segment {
                 *paths.segments.of_path(path_ix) = steps.segment(lane, triangle_ix);
             }
             if goes_on {
@@ -307,7 +308,7 @@ mod tests {
         states: Vec<PathState>,
         segments: Vec<Segment>,
         kinds: Vec<u32>,
-        blocks: Vec<u32>,
+        blocks: Vec<[u32; 2]>,
     }
 
     impl Paths {
@@ -324,11 +325,11 @@ mod tests {
                 states: (0..n).map(|_| PathState { radiance: random.point(), density: random.point().x }).collect(),
                 segments: vec![Segment::zeroed(); n],
                 kinds: vec![9; n],
-                blocks: vec![9; n.div_ceil(BLOCK_SIZE)],
+                blocks: vec![[9; 2]; n.div_ceil(BLOCK_SIZE)],
             }
         }
 
-        fn buffers(&mut self) -> (PathBuffers<'_>, (&mut [u32], &mut [u32])) {
+        fn buffers(&mut self) -> (PathBuffers<'_>, (&mut [u32], &mut [[u32; 2]])) {
             let Self { rays, states, segments, kinds, blocks } = self;
             (PathBuffers { rays, states, segments }, (kinds, blocks))
         }
@@ -337,7 +338,7 @@ mod tests {
         fn bits(&self) -> Vec<u32> {
             let words = [bytemuck::cast_slice(&self.rays), bytemuck::cast_slice(&self.states)];
             let all = words.concat().into_iter().chain(bytemuck::cast_slice::<_, u32>(&self.segments).iter().copied());
-            let all = all.chain(self.kinds.clone()).chain(self.blocks.clone());
+            let all = all.chain(self.kinds.clone()).chain(self.blocks.concat());
             all.map(|word: u32| if word & 0x7fff_ffff > 0x7f80_0000 { f32::NAN.to_bits() } else { word }).collect()
         }
     }
@@ -379,7 +380,7 @@ mod tests {
                 n_matt += hits.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE && bounce.is_matt(hit)).count();
                 path_scatter(&bounce, &live, paths, results);
                 assert!(found.bits() == expected.bits(), "depth {depth}");
-                n_going_on += found.blocks.iter().sum::<u32>();
+                n_going_on += found.blocks.iter().map(|[n_going_on, _]| n_going_on).sum::<u32>();
                 n_segments += found.segments.iter().filter(|segment| segment.state != SEGMENT_NONE).count();
             }
         }

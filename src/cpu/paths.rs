@@ -35,6 +35,11 @@ pub struct Paths {
     snapshots: Vec<[f32; 4]>,
     /// The indices of the paths that are alive, for bounces of even depth and for those of odd depth.
     live: [Vec<u32>; 2],
+    /// The indices of the paths with a segment to a light.
+    with_segment: Vec<u32>,
+    /// For each block of `SCAN_GROUP_SIZE` paths of a bounce, the numbers of those that go on and of those with a
+    /// segment, and after the prefix sum the numbers in all blocks before.
+    scan_blocks: Vec<[u32; 2]>,
 }
 
 impl Paths {
@@ -49,6 +54,7 @@ impl Paths {
         self.segments.clear();
         self.segments.resize(n, Segment::zeroed());
         self.live[0] = (0..n_paths).collect();
+        self.with_segment.clear();
         self.pixels = pixels_of_batch(inputs, batch);
         path_begin(inputs, &self.pixels, &mut queue.rays);
     }
@@ -56,28 +62,26 @@ impl Paths {
     /// Finds the hits of the paths that are alive, and tests the segments of the bounce before. Returns the numbers of
     /// hits and of segments.
     pub fn trace(&mut self, inputs: &KernelInputs, traversal: Traversal, depth: u32, queue: &mut Queue) -> (u32, u32) {
-        let Self { states, segments, live, .. } = self;
-        let [live, before] = [depth, depth + 1].map(|depth| &live[depth as usize % 2]);
+        let Self { states, segments, live, with_segment, .. } = self;
+        let live = &live[depth as usize % 2];
         let n_hits = closest_hits_by::<FastTracer>(inputs, traversal, live, &queue.rays, &mut queue.hits);
-        if depth == 0 {
-            return (n_hits, 0);
-        }
-        (n_hits, segments_by::<FastTracer>(inputs, traversal, before, segments, states))
+        segments_by::<FastTracer>(inputs, traversal, with_segment, segments, states);
+        (n_hits, with_segment.len() as u32)
     }
 
     /// Adds the light at the hits, and replaces the rays by those with which the paths go on.
     pub fn scatter(&mut self, inputs: &KernelInputs, batch: &Batch, queue: &mut Queue) {
         let live = &self.live[batch.depth as usize % 2];
         queue.child_kinds.resize(live.len(), 0);
-        queue.scan_blocks.resize(live.len().div_ceil(SCAN_GROUP_SIZE as usize), 0);
-        let Queue { rays, hits, child_kinds, scan_blocks, .. } = queue;
+        self.scan_blocks.resize(live.len().div_ceil(SCAN_GROUP_SIZE as usize), [0; 2]);
+        let Queue { rays, hits, child_kinds, .. } = queue;
         let paths = PathBuffers { rays, states: &mut self.states, segments: &mut self.segments };
         if batch.depth == 0 {
             self.are_matt = matt_materials(inputs);
         }
         let (pixels, are_matt) = (&self.pixels, &self.are_matt);
         let bounce = BounceOfPaths { inputs, batch, pixels, are_matt, hits, level: Level::new() };
-        path_scatter(&bounce, live, paths, (child_kinds, scan_blocks));
+        path_scatter(&bounce, live, paths, (child_kinds, &mut self.scan_blocks));
     }
 
     /// Adds up the layer of light that is complete after the batch's bounce.
@@ -86,18 +90,19 @@ impl Paths {
         path_layers(frame, batch, &self.states, &mut self.snapshots, pixel_layers);
     }
 
-    /// Computes the prefix sums of the numbers of paths that go on, and the row of the next bounce.
-    pub fn spine(&self, frame: &Frame, depth: u32, queue: &mut Queue) {
+    /// Computes the prefix sums of the numbers of paths that go on and of segments, and the row of the next bounce.
+    pub fn spine(&mut self, frame: &Frame, depth: u32, queue: &mut Queue) {
         let mut next = Bounce::of_paths(0, frame);
-        path_compact::spine(&mut queue.scan_blocks, frame, &queue.bounces[depth as usize], &mut next);
+        path_compact::spine(&mut self.scan_blocks, frame, &mut queue.bounces[depth as usize], &mut next);
         queue.bounces.push(next);
     }
 
-    /// Lists the paths that go on.
+    /// Lists the paths that go on, and those with a segment.
     pub fn compact(&mut self, depth: u32, queue: &Queue) {
         let [even, odd] = &mut self.live;
         let (live, next) = if depth.is_multiple_of(2) { (even, odd) } else { (odd, even) };
         next.resize(queue.bounces[depth as usize + 1].n_rays as usize, 0);
-        path_compact::path_compact(live, &queue.child_kinds, &queue.scan_blocks, next);
+        self.with_segment.resize(queue.bounces[depth as usize].n_segments as usize, 0);
+        path_compact::path_compact(live, &queue.child_kinds, &self.scan_blocks, next, &mut self.with_segment);
     }
 }

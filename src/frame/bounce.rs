@@ -35,9 +35,10 @@ impl Bounce {
     }
 
     /// Sets the number of paths that are alive at the bounce, the lanes of each ray and segment, and the sizes of the
-    /// dispatches along x. `n_before`: the number of paths that were alive at the bounce before.
-    pub fn set_paths(&mut self, n_paths: u32, n_before: u32, constants: &Frame) {
-        let n_traced = n_paths + n_before;
+    /// dispatches along x. `n_segments`: the number of segments of the bounce before, which are traced with the rays of
+    /// this bounce.
+    pub fn set_paths(&mut self, n_paths: u32, n_segments: u32, constants: &Frame) {
+        let n_traced = n_paths + n_segments;
         self.n_rays = n_paths;
         self.n_wanted = n_paths;
         self.trace_lanes_log2 = lanes_log2(n_traced, constants.n_lanes);

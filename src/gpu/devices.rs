@@ -66,6 +66,8 @@ pub struct Limits {
     pub target_size: u32,
     /// Greatest number of workgroups along x in a dispatch.
     pub n_groups: u32,
+    /// Greatest number of invocations along x in a workgroup.
+    pub group_size: u32,
 }
 
 impl Limits {
@@ -86,6 +88,7 @@ impl Limits {
                 .min(limits.max_framebuffer_height)
                 .min(limits.max_image_dimension2_d),
             n_groups: limits.max_compute_work_group_count[0],
+            group_size: limits.max_compute_work_group_invocations.min(limits.max_compute_work_group_size[0]),
         }
     }
 

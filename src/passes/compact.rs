@@ -6,17 +6,17 @@
 
 use std::sync::Arc;
 
-use super::spirv;
+use super::{spine::Spine, spirv};
 use crate::{
     buffers::Resources,
-    gpu::{BindingLayout, Commands, ComputeDesc, ComputePipeline, Constants, Context, Dispatch, GpuError},
+    gpu::{BindingLayout, Commands, ComputeDesc, ComputePipeline, Constants, Context, GpuError},
     layout::Batch,
 };
 
 /// The three pipelines of the pass.
 pub struct Compact {
     reduce: ComputePipeline,
-    spine: ComputePipeline,
+    spine: Spine,
     scatter: ComputePipeline,
 }
 
@@ -28,7 +28,7 @@ impl Compact {
         };
         Ok(Self {
             reduce: kernel("compact_reduce", spirv!("compact_reduce.comp"))?,
-            spine: kernel("compact_spine", spirv!("compact_spine.comp"))?,
+            spine: Spine::new(context, bindings)?,
             scatter: kernel("compact_scatter", spirv!("compact_scatter.comp"))?,
         })
     }
@@ -39,9 +39,9 @@ impl Compact {
         commands.dispatch(&self.reduce, Some(batch.depth), batch, resources.scan_dispatch(batch));
     }
 
-    /// Needs `scan_blocks`. Leaves their exclusive prefix sums there, and the next bounce's row of `bounces`.
+    /// Does what [`Spine::record`] does.
     pub fn spine(&self, commands: &Commands, batch: &Batch) {
-        commands.dispatch(&self.spine, Some(batch.depth), batch, Dispatch::Threads([1, 1, 1], [1, 1, 1]));
+        self.spine.record(commands, batch);
     }
 
     /// Needs `rays` and `hits` of the bounce, `child_kinds`, `scan_blocks` and the next bounce's row of `bounces`.

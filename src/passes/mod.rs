@@ -54,6 +54,7 @@ mod record;
 mod resolve;
 mod shade;
 mod shadow;
+mod spine;
 mod tonemap;
 mod trace;
 mod visibility;

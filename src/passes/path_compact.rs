@@ -3,16 +3,16 @@
 
 use std::sync::Arc;
 
-use super::spirv;
+use super::{spine::Spine, spirv};
 use crate::{
     buffers::Resources,
-    gpu::{BindingLayout, Commands, ComputeDesc, ComputePipeline, Constants, Context, Dispatch, GpuError},
+    gpu::{BindingLayout, Commands, ComputeDesc, ComputePipeline, Constants, Context, GpuError},
     layout::Batch,
 };
 
 /// The pipelines of the pass and of the prefix sum.
 pub struct PathCompact {
-    spine: ComputePipeline,
+    spine: Spine,
     list: ComputePipeline,
 }
 
@@ -22,15 +22,12 @@ impl PathCompact {
             let desc = ComputeDesc { name, shader, constants: &Constants::new(), full_subgroups: true };
             ComputePipeline::new(context, bindings, &desc)
         };
-        Ok(Self {
-            spine: kernel("compact_spine", spirv!("compact_spine.comp"))?,
-            list: kernel("path_compact", spirv!("path_compact.comp"))?,
-        })
+        Ok(Self { spine: Spine::new(context, bindings)?, list: kernel("path_compact", spirv!("path_compact.comp"))? })
     }
 
-    /// Needs `scan_blocks`. Leaves their exclusive prefix sums there, and the next bounce's row of `bounces`.
+    /// Does what [`Spine::record`] does.
     pub fn spine(&self, commands: &Commands, batch: &Batch) {
-        commands.dispatch(&self.spine, Some(batch.depth), batch, Dispatch::Threads([1, 1, 1], [1, 1, 1]));
+        self.spine.record(commands, batch);
     }
 
     /// Needs `child_kinds`, `scan_blocks` and the list of this bounce in `live_paths`. Leaves that of the next bounce.

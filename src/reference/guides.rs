@@ -31,7 +31,7 @@ pub fn guides(inputs: &KernelInputs, batch: &Batch, hits: &[Hit], states: &[Path
         for sample_ix in guide.n_samples.saturating_sub(n_earlier).min(n_of_frame)..n_of_frame {
             let path_ix = path_of(frame, in_batch, sample_ix);
             let (hit, seen) = (&hits[path_ix as usize], states[path_ix as usize].radiance);
-            let surface = first_surface(inputs, batch, pixel, path_ix, hit);
+            let surface = first_surface(inputs, pixel, path_ix, hit);
             add_path(guide, surface, seen);
         }
     }
@@ -45,7 +45,7 @@ struct FirstSurface {
 }
 
 /// Returns the surface that a camera ray hits. A lamp in front of the hit ends the path.
-fn first_surface(inputs: &KernelInputs, batch: &Batch, pixel: UVec2, path_ix: u32, hit: &Hit) -> Option<FirstSurface> {
+fn first_surface(inputs: &KernelInputs, pixel: UVec2, path_ix: u32, hit: &Hit) -> Option<FirstSurface> {
     let key = key_of_path(inputs, path_ix, pixel);
     let ray = path_camera_ray(inputs, pixel, random_pair(key, 0), random_pair(key, 1));
     if hit.triangle_ix == NO_TRIANGLE || seen_light(inputs, ray.origin, ray.direction, hit.t).t.is_finite() {

@@ -1,18 +1,46 @@
-//! Path compact: the list of the paths that go on. Twin of `path_compact.comp`, and of `compact_spine.comp` for paths.
+//! Path compact: the lists of the paths that go on, and of those with a segment to a light. Twin of `path_compact.comp`,
+//! and of `compact_spine.comp` for paths.
 
-use super::compact::exclusive_prefix_sum;
-use crate::layout::{Bounce, Frame, SCAN_GROUP_SIZE};
+use crate::layout::{Bounce, Frame, PATH_GOES_ON, PATH_HAS_SEGMENT, SCAN_GROUP_SIZE};
 
-/// Turns the blocks' sums into their exclusive prefix sums, and sizes the next bounce.
-pub fn spine(scan_blocks: &mut [u32], constants: &Frame, this: &Bounce, next: &mut Bounce) {
-    next.set_paths(exclusive_prefix_sum(scan_blocks), this.n_rays, constants);
+/// Returns what `child_kinds` has for a path.
+pub fn kind_of_path(goes_on: bool, has_segment: bool) -> u32 {
+    u32::from(goes_on) * PATH_GOES_ON + u32::from(has_segment) * PATH_HAS_SEGMENT
 }
 
-/// Writes those of the paths `live` that go on, as `child_kinds` says, to `next`.
-pub fn path_compact(live: &[u32], child_kinds: &[u32], scan_blocks: &[u32], next: &mut [u32]) {
+/// Counts the paths of a block that go on, and those with a segment.
+pub fn counts_of_block(child_kinds: &[u32]) -> [u32; 2] {
+    let both: u32 = child_kinds.iter().sum();
+    [both % PATH_HAS_SEGMENT, both / PATH_HAS_SEGMENT]
+}
+
+/// Turns the blocks' counts into their exclusive prefix sums. Stores the number of segments in the bounce's row, and
+/// sizes the next bounce.
+pub fn spine(scan_blocks: &mut [[u32; 2]], constants: &Frame, this: &mut Bounce, next: &mut Bounce) {
+    let mut carry = [0, 0];
+    for counts in scan_blocks {
+        let before = std::mem::replace(counts, carry);
+        carry = [carry[0] + before[0], carry[1] + before[1]];
+    }
+    this.n_segments = carry[1];
+    next.set_paths(carry[0], carry[1], constants);
+}
+
+/// Writes to `next` those of the paths `live` that go on, as `child_kinds` says, and to `with_segment` those that have
+/// a segment.
+pub fn path_compact(
+    live: &[u32],
+    child_kinds: &[u32],
+    scan_blocks: &[[u32; 2]],
+    next: &mut [u32],
+    with_segment: &mut [u32],
+) {
     let block_size = SCAN_GROUP_SIZE as usize;
-    for ((live, kinds), &begin) in live.chunks(block_size).zip(child_kinds.chunks(block_size)).zip(scan_blocks) {
-        let going_on = live.iter().zip(kinds).filter(|(_, kind)| **kind != 0);
-        going_on.zip(&mut next[begin as usize..]).for_each(|((path_ix, _), place)| *place = *path_ix);
+    for (list, which, bit) in [(next, 0, PATH_GOES_ON), (with_segment, 1, PATH_HAS_SEGMENT)] {
+        let blocks = live.chunks(block_size).zip(child_kinds.chunks(block_size)).zip(scan_blocks);
+        for ((live, kinds), before) in blocks {
+            let listed = live.iter().zip(kinds).filter(|(_, kind)| **kind & bit != 0);
+            listed.zip(&mut list[before[which] as usize..]).for_each(|((path_ix, _), place)| *place = *path_ix);
+        }
     }
 }

@@ -2,7 +2,11 @@
 
 use glam::Vec3;
 
-use super::{camera::pixel_ix_of, paths::{path_of, pixel_of_path}, sample_sums::sum_of_samples};
+use super::{
+    camera::pixel_ix_of,
+    paths::{path_of, pixel_of_path},
+    sample_sums::sum_of_samples,
+};
 use crate::layout::{Batch, Frame, LIGHT_LAYERS, PathState};
 
 /// Writes the pixels of the batch in the layer that is complete after the batch's bounce: the sum of what the radiance

@@ -1,7 +1,12 @@
 //! Path resolve: the sums of the radiance of each pixel's paths, and of their squared luminance. Twin of
 //! `path_resolve.comp`.
 
-use super::{camera::pixel_ix_of, noise::squared_luminance, paths::{path_of, pixel_of_path}, sample_sums::sum_of_samples};
+use super::{
+    camera::pixel_ix_of,
+    noise::squared_luminance,
+    paths::{path_of, pixel_of_path},
+    sample_sums::sum_of_samples,
+};
 use crate::layout::{Batch, Frame, PathState};
 
 /// Writes the pixels of the batch: the sum of the frame's samples, and in the fourth component that of their squared

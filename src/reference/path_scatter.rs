@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::{
     inputs::KernelInputs,
     live_paths::parts,
+    path_compact::{counts_of_block, kind_of_path},
     path_vertex::{pairs_of_hit, step_path},
     paths::{key_of_path, pixel_of_path},
 };
@@ -17,14 +18,15 @@ pub struct PathBuffers<'a> {
     pub segments: &'a mut [Segment],
 }
 
-/// Takes the paths `live` one step further. Writes whether the path at each place of the list goes on (`child_kinds`),
-/// and how many of each block of `SCAN_GROUP_SIZE` places do (`scan_blocks`). `live` is in ascending order.
+/// Takes the paths `live` one step further. Writes whether the path at each place of the list goes on and has a segment
+/// (`child_kinds`), and how many of each block of `SCAN_GROUP_SIZE` places do (`scan_blocks`). `live` is in ascending
+/// order.
 pub fn path_scatter(
     inputs: &KernelInputs,
     batch: &Batch,
     (live, hits): (&[u32], &[Hit]),
     paths: PathBuffers,
-    (child_kinds, scan_blocks): (&mut [u32], &mut [u32]),
+    (child_kinds, scan_blocks): (&mut [u32], &mut [[u32; 2]]),
 ) {
     let block_size = SCAN_GROUP_SIZE as usize;
     let of_blocks = (live.par_chunks(block_size), child_kinds.par_chunks_mut(block_size), scan_blocks.par_iter_mut());
@@ -34,7 +36,7 @@ pub fn path_scatter(
         parts(paths.segments, live, block_size),
     );
     of_blocks.into_par_iter().zip(of_paths).for_each(|(of_block, (mut rays, mut states, mut segments))| {
-        let (live, kinds, n_going_on) = of_block;
+        let (live, kinds, counts) = of_block;
         for (&path_ix, kind) in live.iter().zip(&mut *kinds) {
             let key = key_of_path(inputs, path_ix, pixel_of_path(inputs.frame(), batch, path_ix));
             let (ray, state) = (rays.of_path(path_ix), states.of_path(path_ix));
@@ -44,8 +46,8 @@ pub fn path_scatter(
             if segment.state != SEGMENT_NONE {
                 *segments.of_path(path_ix) = segment;
             }
-            *kind = goes_on.into();
+            *kind = kind_of_path(goes_on, segment.state != SEGMENT_NONE);
         }
-        *n_going_on = kinds.iter().sum();
+        *counts = counts_of_block(kinds);
     });
 }

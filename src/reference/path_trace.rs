@@ -49,49 +49,42 @@ pub fn closest_hits_by<T: Tracer>(
     chunks.map_init(|| T::new(inputs, traversal), |tracer, (live, hits)| trace(tracer, live, hits)).sum()
 }
 
-/// Tests the segments of the paths `live`, which were alive at the bounce before and are in ascending order. Light that
-/// arrives is added to the paths' states, and the segments are removed. Returns how many there were.
+/// Tests the segments of the paths `with_segment`, which are in ascending order. Light that arrives is added to the
+/// paths' states, and the segments are removed.
 pub fn segments(
     inputs: &KernelInputs,
     traversal: Traversal,
-    live: &[u32],
+    with_segment: &[u32],
     segments: &mut [Segment],
     states: &mut [PathState],
-) -> u32 {
-    segments_by::<Traverser>(inputs, traversal, live, segments, states)
+) {
+    segments_by::<Traverser>(inputs, traversal, with_segment, segments, states);
 }
 
 /// Does what [`segments`] does, by the tracer `T`.
 pub fn segments_by<T: Tracer>(
     inputs: &KernelInputs,
     traversal: Traversal,
-    live: &[u32],
+    with_segment: &[u32],
     segments: &mut [Segment],
     states: &mut [PathState],
-) -> u32 {
+) {
     let inputs = &inputs.through_veils_at_random();
-    let test = |tracer: &mut T, live: &[u32], mut segments: Part<Segment>, mut states: Part<PathState>| {
-        let mut waiting = Vec::with_capacity(live.len());
-        for &path_ix in live {
-            let segment = segments.of_path(path_ix);
-            if segment.state != SEGMENT_NONE {
-                waiting.push((path_ix, SearchRay::from(&ray_of(segment))));
-            }
-        }
-        let n_segments = waiting.len() as u32;
-        tracer.trace_all::<true, _>(inputs, waiting.into_iter(), |path_ix, hit| {
+    let test = |tracer: &mut T, list: &[u32], mut segments: Part<Segment>, mut states: Part<PathState>| {
+        let search_ray = |&path_ix: &u32| (path_ix, SearchRay::from(&ray_of(segments.of_path(path_ix))));
+        let search_rays: Vec<_> = list.iter().map(search_ray).collect();
+        tracer.trace_all::<true, _>(inputs, search_rays.into_iter(), |path_ix, hit| {
             let segment = segments.of_path(path_ix);
             segment.state = SEGMENT_NONE;
             if hit.triangle_ix == NO_TRIANGLE {
                 states.of_path(path_ix).radiance += segment.light;
             }
         });
-        n_segments
     };
-    let of_paths = (parts(segments, live, RAYS_PER_TASK), parts(states, live, RAYS_PER_TASK));
-    let chunks = live.par_chunks(RAYS_PER_TASK).zip(of_paths);
-    let n_segments = |tracer: &mut T, (live, (segments, states))| test(tracer, live, segments, states);
-    chunks.map_init(|| T::new(inputs, traversal), n_segments).sum()
+    let of_paths = (parts(segments, with_segment, RAYS_PER_TASK), parts(states, with_segment, RAYS_PER_TASK));
+    let chunks = with_segment.par_chunks(RAYS_PER_TASK).zip(of_paths);
+    let test_chunk = |tracer: &mut T, (list, (segments, states))| test(tracer, list, segments, states);
+    chunks.for_each_init(|| T::new(inputs, traversal), test_chunk);
 }
 
 fn ray_of(segment: &Segment) -> PathRay {

@@ -287,7 +287,14 @@ mod tests {
     use crate::frame::Denoise;
 
     fn limits(storage_range: u64) -> Limits {
-        Limits { storage_range, n_texels: 0, buffer_bytes: u64::MAX, target_size: 1 << 14, n_groups: 65_535 }
+        Limits {
+            storage_range,
+            n_texels: 0,
+            buffer_bytes: u64::MAX,
+            target_size: 1 << 14,
+            n_groups: 65_535,
+            group_size: 1024,
+        }
     }
 
     /// Each pixel of the picture is in one band, whose window fits the device.

@@ -176,6 +176,7 @@ mod tests {
         buffer_bytes: u64::MAX,
         target_size: 16_384,
         n_groups: 65_535,
+        group_size: 1024,
     };
 
     fn info(memory_bytes: u64, kind: &str) -> DeviceInfo {

@@ -97,9 +97,9 @@ fn means_are_those_of_the_samples() {
     let mut found = vec![Guide::default(); 1200];
     reference::guides::guides(&stage.inputs(), &batch, &hits, &states, &mut found);
     for in_batch in (0..1200).step_by(37) {
-        let pixel_ix = rays[in_batch].pixel_ix as usize;
+        let pixel_ix = rays[16 * in_batch].pixel_ix as usize;
         let of_pixel: Vec<(&Hit, Vec3)> = (0..16)
-            .map(|sample_ix| in_batch + 1200 * sample_ix)
+            .map(|sample_ix| 16 * in_batch + sample_ix)
             .map(|path_ix| (&hits[path_ix], rays[path_ix].origin + hits[path_ix].t * rays[path_ix].direction))
             .filter(|(hit, _)| hit.triangle_ix != NO_TRIANGLE)
             .collect();

@@ -9,7 +9,10 @@ use kdray::{
         AREA_DISK, AREA_RECTANGLE, AREA_SPHERE, AreaLight, Batch, MATERIAL_CONDUCTOR, MATERIAL_MICROFACET,
         MATERIAL_SOLID, Material, PathRay, PathState, SCAN_GROUP_SIZE, SEGMENT_NONE, Segment,
     },
-    reference::path_scatter::{PathBuffers, path_scatter},
+    reference::{
+        path_compact::counts_of_block,
+        path_scatter::{PathBuffers, path_scatter},
+    },
     scene::Environment,
     world::FlatScene,
 };
@@ -52,10 +55,10 @@ fn check(stage: &PathStage, depth: u32, n: u32) -> (usize, u32) {
         .map(|ix| PathState { radiance: random.in_box(Vec3::ZERO, Vec3::ONE), density: (ix % 2) as f32 })
         .collect();
     let mut list = live.clone();
-    list.resize(2400, u32::MAX);
+    list.resize(3600, u32::MAX);
     list.copy_within(..1200, 1200);
-    let mut rows = vec![0; depth as usize];
-    rows.push(n);
+    let mut rows = vec![(0, 0); depth as usize];
+    rows.push((n, 0));
     stage.set_n_paths(&rows);
     stage.resources.queue.rays.upload(&rays).expect("rays");
     stage.resources.queue.hits.upload(&hits).expect("hits");
@@ -68,7 +71,7 @@ fn check(stage: &PathStage, depth: u32, n: u32) -> (usize, u32) {
 
     let (mut rays, mut states, mut segments) = (rays, states, vec![NO_SEGMENT; 1200]);
     let mut kinds = vec![UNTOUCHED_WORD; 1200];
-    let mut blocks = vec![0; n.div_ceil(SCAN_GROUP_SIZE) as usize];
+    let mut blocks = vec![[0; 2]; n.div_ceil(SCAN_GROUP_SIZE) as usize];
     let buffers = PathBuffers { rays: &mut rays, states: &mut states, segments: &mut segments };
     let counts = (&mut kinds[..n as usize], &mut blocks[..]);
     path_scatter(&stage.inputs(), &batch, (&live, &hits), buffers, counts);
@@ -77,9 +80,8 @@ fn check(stage: &PathStage, depth: u32, n: u32) -> (usize, u32) {
     let queue = &stage.resources.queue;
     let found = queue.child_kinds.download().expect("child_kinds");
     compare::exact_but_for(n_outliers, &kinds, &found).unwrap();
-    let of_block = |kinds: &[u32]| kinds.iter().sum::<u32>();
-    let sums: Vec<_> = found[..n as usize].chunks(SCAN_GROUP_SIZE as usize).map(of_block).collect();
-    compare::exact(&sums, &queue.scan_blocks.download_first(blocks.len()).expect("scan_blocks")).unwrap();
+    let sums: Vec<_> = found[..n as usize].chunks(SCAN_GROUP_SIZE as usize).flat_map(counts_of_block).collect();
+    compare::exact(&sums, &queue.scan_blocks.download_first(sums.len()).expect("scan_blocks")).unwrap();
     compare::rays(1e-3, n_outliers, &rays, &queue.rays.download().expect("rays")).unwrap();
     let found: Vec<_> = paths.segments.download().expect("segments").iter().map(as_ray).collect();
     let expected: Vec<_> = segments.iter().map(as_ray).collect();
@@ -89,7 +91,7 @@ fn check(stage: &PathStage, depth: u32, n: u32) -> (usize, u32) {
     let found = paths.path_states.download().expect("path_states");
     compare::pixels(1e-3, n_outliers, &pixels(&states), &pixels(&found)).unwrap();
     let n_lit = segments.iter().filter(|segment| segment.state != SEGMENT_NONE).count();
-    (n_lit, of_block(&kinds[..n as usize]))
+    (n_lit, blocks.iter().map(|[n_going_on, _]| n_going_on).sum())
 }
 
 #[test]

@@ -28,29 +28,30 @@ fn agrees_with_its_twin() {
         t_max: random.between(0.1, 3.0),
     };
     for n in RAY_COUNTS.map(|n| n.min(1200)) {
-        // Every path of the bounce before has a segment or none; some of them are alive.
-        let before: Vec<u32> = (0..n).collect();
-        let live: Vec<u32> = before.iter().copied().filter(|_| random.unit() < 0.6).collect();
+        // Every path of the bounce before has a segment or none, and is alive or not.
+        let live: Vec<u32> = (0..n).filter(|_| random.unit() < 0.6).collect();
         let segments: Vec<_> = (0..1200).map(|ix| segment(&mut random, ix)).collect();
+        let with_segment: Vec<u32> = (0..n).filter(|&ix| segments[ix as usize].state != SEGMENT_NONE).collect();
         let states: Vec<_> =
             (0..1200).map(|_| PathState { radiance: random.in_box(Vec3::ZERO, Vec3::ONE), density: 0.5 }).collect();
         let mut lists = live.clone();
-        lists.resize(1200, u32::MAX);
-        lists.extend(&before);
         lists.resize(2400, u32::MAX);
-        stage.set_n_paths(&[0, n, live.len() as u32]);
+        lists.extend(&with_segment);
+        lists.resize(3600, u32::MAX);
+        stage.set_n_paths(&[(0, 0), (n, with_segment.len() as u32), (live.len() as u32, 0)]);
         stage.resources.queue.rays.upload(&rays).expect("rays");
         stage.resources.queue.hits.upload(&[UNTOUCHED_HIT; 1200]).expect("hits");
         paths.path_states.upload(&states).expect("path_states");
         paths.segments.upload(&segments).expect("segments");
         paths.live_paths.upload(&lists).expect("live_paths");
-        // Bounce 2 has the first list, bounce 1 the second.
+        // Bounce 2 has the first list.
         stage.trace(&Batch { n_pixels: 1200, bounce_ix: 2, depth: 2, ..FIRST });
 
         let (inputs, traversal) = (stage.inputs(), stage.options.traversal);
         let (mut hits, mut states, mut segments) = (vec![UNTOUCHED_HIT; 1200], states, segments);
         let n_hits = path_trace::closest_hits(&inputs, traversal, &live, &rays, &mut hits);
-        let n_segments = path_trace::segments(&inputs, traversal, &before, &mut segments, &mut states);
+        path_trace::segments(&inputs, traversal, &with_segment, &mut segments, &mut states);
+        let n_segments = with_segment.len() as u32;
         let n_outliers = if stage.context.is_software() { 0 } else { n as usize / 500 };
         compare::hits(n_outliers, &hits, &stage.resources.queue.hits.download().expect("hits")).unwrap();
         let found = paths.path_states.download().expect("path_states");
