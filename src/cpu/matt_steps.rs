@@ -10,6 +10,7 @@ use super::{
     lanes::{LANES, LaneMask},
     matt_surfaces::{MattHits, MattSurfaces},
     sampler::PairsSoa,
+    turns::sin_cos_of_turns,
     vec3x16::{Vec3sSoa, Vec3x16, get, greater, lesser, set},
 };
 use crate::{
@@ -200,17 +201,11 @@ fn set_rays<S: Simd>(
     steps.go_on = go_on.to_bitmask() as LaneMask;
 }
 
-/// Returns directions in the frame of the surface, as `sample_lambert` does. Sines and cosines are computed one by
-/// one, by the function that the reference calls: a vectorized one would round differently.
+/// Returns directions in the frame of the surface, as `sample_lambert` does.
 #[inline(always)]
 fn lambert_samples<S: Simd>(simd: S, [ux, uy]: &PairsSoa) -> Vec3x16<S> {
-    let (mut cosines, mut sines) = ([0.0; LANES], [0.0; LANES]);
-    for (uy, (cosine, sine)) in uy.iter().zip(cosines.iter_mut().zip(&mut sines)) {
-        let azimuth = 2.0 * PI * uy;
-        (*cosine, *sine) = (azimuth.cos(), azimuth.sin());
-    }
-    let ux = f32x16::load_array_ref(simd, ux);
-    let (cosines, sines) = (f32x16::load_array(simd, cosines), f32x16::load_array(simd, sines));
+    let (ux, uy) = (f32x16::load_array_ref(simd, ux), f32x16::load_array_ref(simd, uy));
+    let (sines, cosines) = sin_cos_of_turns(uy);
     let radius = ux.sqrt();
     let z = greater(1.0 - ux, f32x16::splat(simd, 0.0)).sqrt();
     Vec3x16([radius * cosines, radius * sines, z])

@@ -8,23 +8,25 @@
 //!   paths    the passes of a batch of paths
 //!     path_begin, path_scatter   the rays of paths, and their steps at hits
 //!       sampler                  the random numbers of sixteen paths
+//!       environment_picks        the picks of sixteen directions of the environment
 //!       matt_surfaces, matt_steps, area_lights   the steps of sixteen paths at matt surfaces
-//!       vec3x16                  sixteen vectors
+//!       vec3x16, turns           sixteen vectors; sines and cosines of sixteen angles
 //!   timing   wall-clock times of passes
 //! meter    the exposure of a scene whose light has physical units
 //! trace    the reference's passes that trace rays, with the tracer of this folder
 //!   tracer   traces rays one after the other, or as packets:
-//!     octant_bins        collect rays of one octant until they fill a packet
+//!     direction_bins     collect rays of similar directions until they fill a packet
 //!     soa                rays and hits as structures of arrays
 //!     packet, packet_triangle, packet_traverser   trace sixteen rays through the tree together
 //! ```
 
 mod area_lights;
-pub mod lanes;
+pub mod direction_bins;
+mod environment_picks;
+mod lanes;
 mod matt_steps;
 mod matt_surfaces;
 mod meter;
-pub mod octant_bins;
 pub mod packet;
 pub mod packet_traverser;
 pub mod packet_triangle;
@@ -38,6 +40,7 @@ pub mod soa;
 mod timing;
 mod trace;
 pub mod tracer;
+mod turns;
 mod vec3x16;
 
 pub use self::{

@@ -40,7 +40,7 @@ struct CenteredIntervals<S: Simd> {
     half: f32x16<S>,
 }
 
-/// Sixteen rays of one octant as columns, and the best hit of each so far.
+/// Sixteen rays whose directions have the same signs, as columns, and the best hit of each so far.
 pub struct Packet<S: Simd> {
     origin: [f32x16<S>; 3],
     direction: [f32x16<S>; 3],

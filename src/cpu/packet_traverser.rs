@@ -197,7 +197,7 @@ impl PacketTraverser {
         }
     }
 
-    /// Returns the hits of the first `n_rays` rays, which must be of one octant. All further lanes of the result are
+    /// Returns the hits of the first `n_rays` rays, whose directions must have the same signs. All further lanes of the result are
     /// meaningless.
     pub fn traverse<const ANY_HIT: bool>(
         &mut self,

@@ -4,11 +4,12 @@
 
 use arrayvec::ArrayVec;
 use fearless_simd::{Level, dispatch, f32x16, prelude::*};
-use glam::{Vec2, vec2, vec3};
+use glam::{vec2, vec3};
 use rayon::prelude::*;
 
 use super::{
     area_lights::meets_light,
+    environment_picks::environment_picks,
     lanes::{LANES, LaneMask},
     matt_steps::{BounceConstants, Picks, matt_steps},
     matt_surfaces::{MattHits, matt_surfaces},
@@ -20,21 +21,39 @@ use super::{
 use crate::{
     layout::{AreaLight, Batch, Hit, NO_TRIANGLE, PathRay, PathState, SCAN_GROUP_SIZE, SEGMENT_NONE, Segment},
     reference::{
-        emitters::pick_emitter,
+        emitters::{LightPick, pick_emitter},
         inputs::KernelInputs,
         live_paths::{Part, parts},
         maps::colour_at,
         path_compact::{counts_of_block, kind_of_path},
         path_scatter::PathBuffers,
-        path_vertex::{PAIRS_OF_HIT, first_pair_of, step_past_lights, step_path},
+        path_vertex::{HitChoices, PAIRS_OF_HIT, first_pair_of, step_past_lights, step_path},
         sampler::SampleKey,
         search_ray::SearchRay,
     },
+    world::Emitters,
 };
 
 const BLOCK_SIZE: usize = SCAN_GROUP_SIZE as usize;
 /// The number of paths from which on it is faster to take their steps together.
 const LEAST_GROUP: usize = 4;
+
+/// What is decided at random at the hits of a group of paths.
+#[derive(Default)]
+struct GroupChoices {
+    pairs: [PairsSoa; PAIRS_OF_HIT],
+    /// The picks of the environment, if it has a map.
+    of_environment: Option<[LightPick; LANES]>,
+}
+
+impl GroupChoices {
+    fn of_lane(&self, lane: usize) -> HitChoices {
+        HitChoices {
+            pairs: self.pairs.each_ref().map(|[x, y]| vec2(x[lane], y[lane])),
+            of_environment: self.of_environment.as_ref().map(|picks| picks[lane]),
+        }
+    }
+}
 
 /// What all steps of a bounce need.
 pub struct BounceOfPaths<'a> {
@@ -94,12 +113,12 @@ impl BounceOfPaths<'_> {
         }
         for group in at_matt.chunks(LANES) {
             if group.len() < LEAST_GROUP {
-                self.step_group(group, &self.pairs_of(group), kinds, paths)
+                self.step_group(group, &self.choices_of(group), kinds, paths)
             } else {
                 self.step_matt(group, kinds, paths)
             }
         }
-        at_others.chunks(LANES).for_each(|group| self.step_group(group, &self.pairs_of(group), kinds, paths));
+        at_others.chunks(LANES).for_each(|group| self.step_group(group, &self.choices_of(group), kinds, paths));
         // Paths that leave the scene need no random numbers.
         missed.chunks(LANES).for_each(|group| self.step_group(group, &Default::default(), kinds, paths));
     }
@@ -138,12 +157,12 @@ impl BounceOfPaths<'_> {
     }
 
     /// Takes a path one step further. Returns its kind: whether it goes on and has a segment.
-    fn step(&self, path_ix: u32, before_light: bool, pairs: [Vec2; PAIRS_OF_HIT], paths: &mut PathsOfBlock) -> u32 {
+    fn step(&self, path_ix: u32, before_light: bool, choices: HitChoices, paths: &mut PathsOfBlock) -> u32 {
         let (ray, state) = (paths.rays.of_path(path_ix), paths.states.of_path(path_ix));
         let (inputs, depth, hit) = (self.inputs, self.batch.depth, &self.hits[path_ix as usize]);
         let (goes_on, segment) = match before_light {
-            true => step_path(inputs, || pairs, depth, hit, ray, state),
-            false => step_past_lights(inputs, || pairs, depth, hit, ray, state),
+            true => step_path(inputs, || choices, depth, hit, ray, state),
+            false => step_past_lights(inputs, || choices, depth, hit, ray, state),
         };
         // A path without a segment has none already.
         if segment.state != SEGMENT_NONE {
@@ -152,26 +171,29 @@ impl BounceOfPaths<'_> {
         kind_of_path(goes_on, segment.state != SEGMENT_NONE)
     }
 
-    /// Returns the random numbers of a group of paths.
-    fn pairs_of(&self, group: &[(usize, u32)]) -> [PairsSoa; PAIRS_OF_HIT] {
+    /// Returns what is decided at random at the hits of a group of paths. The last ray of a path only meets light, so
+    /// that there is nothing to pick at its hit.
+    fn choices_of(&self, group: &[(usize, u32)]) -> GroupChoices {
         let mut keys = KeysSoa::default();
         for (lane, &(_, path_ix)) in group.iter().enumerate() {
             keys.set(lane, self.key_of(path_ix));
         }
-        dispatch!(self.level, simd => random_pairs(simd, &keys, first_pair_of(self.batch.depth)))
+        let depth = self.batch.depth;
+        let pairs: [PairsSoa; PAIRS_OF_HIT] =
+            dispatch!(self.level, simd => random_pairs(simd, &keys, first_pair_of(depth)));
+        let emitters = self.inputs.emitters.filter(|_| depth + 1 < self.inputs.frame().max_depth);
+        let of_map = |emitters: &Emitters| {
+            let u = [&pairs[0][1], &pairs[1][0]];
+            emitters.environment.as_ref().map(|map| environment_picks(self.level, emitters, map, u))
+        };
+        GroupChoices { of_environment: emitters.and_then(of_map), pairs }
     }
 
     /// Takes a group of paths one step further, one after the other.
-    fn step_group(
-        &self,
-        group: &[(usize, u32)],
-        pairs: &[PairsSoa; PAIRS_OF_HIT],
-        kinds: &mut [u32],
-        paths: &mut PathsOfBlock,
-    ) {
+    fn step_group(&self, group: &[(usize, u32)], choices: &GroupChoices, kinds: &mut [u32], paths: &mut PathsOfBlock) {
         let before_lights = self.before_lights(group, paths);
         for (lane, &(place, path_ix)) in group.iter().enumerate() {
-            kinds[place] = self.step(path_ix, before_lights >> lane & 1 == 1, pairs_of_lane(pairs, lane), paths);
+            kinds[place] = self.step(path_ix, before_lights >> lane & 1 == 1, choices.of_lane(lane), paths);
         }
     }
 
@@ -199,21 +221,22 @@ impl BounceOfPaths<'_> {
             hits.set(lane, paths.rays.of_path(path_ix), hit, &inputs.triangles[hit.triangle_ix as usize]);
         }
         let surfaces = dispatch!(self.level, simd => matt_surfaces(simd, &hits));
-        let pairs = self.pairs_of(group);
+        let choices = self.choices_of(group);
         let mut picks = Picks::default();
         for (lane, &(_, path_ix)) in group.iter().enumerate() {
             let (ray, hit) = (paths.rays.of_path(path_ix), &self.hits[path_ix as usize]);
             hits.set_colour(lane, colour_at(inputs, ray, hit, surfaces.geometric(lane)));
-            let [to_light, choices, ..] = pairs_of_lane(&pairs, lane);
-            let u = vec3(to_light.x, to_light.y, choices.x);
-            picks.set(lane, &pick_emitter(inputs, surfaces.point_world(lane), u));
+            let HitChoices { pairs: [to_light, choice, ..], of_environment } = choices.of_lane(lane);
+            let u = vec3(to_light.x, to_light.y, choice.x);
+            picks.set(lane, &pick_emitter(inputs, surfaces.point_world(lane), u, of_environment.as_ref()));
         }
         let bounce = BounceConstants { depth, clamp: frame.clamp, shapes: self.shapes() };
-        let steps = dispatch!(self.level, simd => matt_steps(simd, &bounce, (&hits, &surfaces), (&picks, &pairs)));
+        let steps =
+            dispatch!(self.level, simd => matt_steps(simd, &bounce, (&hits, &surfaces), (&picks, &choices.pairs)));
         let before_lights = self.before_lights(group, paths);
         for (lane, &(place, path_ix)) in group.iter().enumerate() {
             if before_lights >> lane & 1 == 1 {
-                kinds[place] = self.step(path_ix, true, pairs_of_lane(&pairs, lane), paths);
+                kinds[place] = self.step(path_ix, true, choices.of_lane(lane), paths);
                 continue;
             }
             let triangle_ix = self.hits[path_ix as usize].triangle_ix;
@@ -231,10 +254,6 @@ impl BounceOfPaths<'_> {
     }
 }
 
-fn pairs_of_lane(pairs: &[PairsSoa; PAIRS_OF_HIT], lane: usize) -> [Vec2; PAIRS_OF_HIT] {
-    pairs.each_ref().map(|[x, y]| vec2(x[lane], y[lane]))
-}
-
 #[cfg(test)]
 mod tests {
     use std::path::Path;
@@ -249,7 +268,7 @@ mod tests {
         frame::RenderOptions,
         layout::{FLAT_NORMAL, Frame, MATERIAL_MICROFACET, MATERIAL_UNLIT, Material, Triangle},
         reference::{self, chi_square::Uniform},
-        scene::{Light, Scene},
+        scene::{Environment, Light, Scene},
         world::{FlatScene, World},
     };
 
@@ -271,8 +290,9 @@ mod tests {
     }
 
     /// A world of triangles of all materials, of which some have normals and some no area.
-    fn world(lights: Vec<Light>, random: &mut Uniform) -> World {
-        let mut scene = FlatScene::new(&Scene { lights, ..Scene::empty(Path::new("scene")) }).expect("a scene");
+    fn world(lights: Vec<Light>, environment: Option<Environment>, random: &mut Uniform) -> World {
+        let scene = Scene { lights, environment, ..Scene::empty(Path::new("scene")) };
+        let mut scene = FlatScene::new(&scene).expect("a scene");
         let mut corner = || 4.0 * random.point() - 2.0;
         let triangle = |i: usize| {
             let v0 = corner();
@@ -287,6 +307,11 @@ mod tests {
         let material_of = |i| if i % 3 < 2 { i % materials().0 } else { i % scene.materials.len() };
         scene.triangle_materials = (0..300).map(|i| material_of(i) as u32).collect();
         World::of_flat(scene, &BuildOptions::default()).expect("a world")
+    }
+
+    fn sky(random: &mut Uniform) -> Environment {
+        let colours = (0..32).map(|_| 2.0 * random.point()).collect();
+        Environment::new([8, 4], colours, (30.0, 1.0)).expect("an environment").0
     }
 
     /// The lights of three scenes: none, one without a size, and area lights.
@@ -356,9 +381,10 @@ mod tests {
         const N: usize = 3000;
         let mut random = Uniform(1);
         let (mut n_matt, mut n_going_on, mut n_segments) = (0, 0, 0);
-        for (lights, depth) in lights().into_iter().flat_map(|lights| [0, 2, 3, 4].map(|depth| (lights.clone(), depth)))
-        {
-            let world = world(lights, &mut random);
+        let scenes = lights().into_iter().flat_map(|lights| [0, 2, 3, 4].map(|depth| (lights.clone(), depth)));
+        for (i, (lights, depth)) in scenes.enumerate() {
+            let environment = (i % 2 == 1).then(|| sky(&mut random));
+            let world = world(lights, environment, &mut random);
             let of_picture = world.frame_constants(&RenderOptions { max_depth: 5, ..RenderOptions::default() });
             let frame = Frame { samples_log2: 2, ..of_picture };
             let materials = &world.scene().materials;
@@ -389,7 +415,7 @@ mod tests {
 
     #[test]
     fn only_lambertian_materials_are_matt() {
-        let (world, frame) = (world(Vec::new(), &mut Uniform(1)), Frame::default());
+        let (world, frame) = (world(Vec::new(), None, &mut Uniform(1)), Frame::default());
         let are_matt = matt_materials(&KernelInputs::new(&world, &frame));
         assert!(are_matt.iter().enumerate().all(|(i, &is_matt)| is_matt == (i < materials().0)), "{are_matt:?}");
     }

@@ -1,10 +1,10 @@
-//! The tracer of the CPU engine. With [`Traversal::Stack`], rays of one octant (directions of the same signs) go
-//! through a kd-tree as packets. With any other algorithm, or through a grid, rays are traced one after the other.
+//! The tracer of the CPU engine. With [`Traversal::Stack`], rays of similar directions go through a kd-tree as
+//! packets. With any other algorithm, or through a grid, rays are traced one after the other.
 
 use fearless_simd::Level;
 
 use super::{
-    octant_bins::{Bin, OctantBins},
+    direction_bins::{Bin, DirectionBins},
     packet_traverser::PacketTraverser,
 };
 use crate::{
@@ -70,7 +70,7 @@ impl Tracer for FastTracer {
             Self::Packets(packets) => packets,
             Self::Single(traverser) => return traverser.trace_all::<ANY_HIT, Key>(inputs, search_rays, found),
         };
-        let mut bins = OctantBins::default();
+        let mut bins = DirectionBins::default();
         let mut traverse = |Bin { rays, keys }: &mut Bin<Key>| {
             let hits = packets.traverse::<ANY_HIT>(inputs, rays, keys.len());
             keys.drain(..).enumerate().for_each(|(lane, key)| found(key, hits.get(lane)));

@@ -90,6 +90,7 @@ pub mod trace;
 pub mod traversal_ray;
 pub mod traverser;
 pub mod triangle;
+pub mod turns;
 pub mod visibility;
 
 /// Rays that one thread handles at a time. A task of this size is worth its scheduling, and small enough to balance

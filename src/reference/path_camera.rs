@@ -2,7 +2,7 @@
 
 use glam::{UVec2, Vec2, Vec3, vec2};
 
-use super::{camera::pixel_ix_of, inputs::KernelInputs, noise_tiles::picture_pixel_of};
+use super::{camera::pixel_ix_of, inputs::KernelInputs, noise_tiles::picture_pixel_of, turns::sin_cos_of_turns};
 use crate::layout::{FILTER_BOX, FILTER_TENT, Frame, NO_TRIANGLE, PathRay};
 
 /// The offset on one axis with the share `u` of a tent of radius 1 to its left.
@@ -12,8 +12,8 @@ fn tent(u: f32) -> f32 {
 
 /// The direction of an angle that is the share `turn` of a full turn.
 fn on_circle(turn: f32) -> Vec2 {
-    let angle = std::f32::consts::TAU * (turn - (turn + 0.5).floor());
-    vec2(angle.cos(), angle.sin())
+    let (sine, cosine) = sin_cos_of_turns(turn);
+    vec2(cosine, sine)
 }
 
 /// The offset of a sample from the centre of its pixel, pixels. Its density is the pixel's filter.

@@ -1,7 +1,12 @@
 //! Path compact: the lists of the paths that go on, and of those with a segment to a light. Twin of `path_compact.comp`,
 //! and of `compact_spine.comp` for paths.
 
+use rayon::prelude::*;
+
 use crate::layout::{Bounce, Frame, PATH_GOES_ON, PATH_HAS_SEGMENT, SCAN_GROUP_SIZE};
+
+/// The fewest blocks that one thread takes at a time.
+const BLOCKS_PER_TASK: usize = 16;
 
 /// Returns what `child_kinds` has for a path.
 pub fn kind_of_path(goes_on: bool, has_segment: bool) -> u32 {
@@ -36,11 +41,25 @@ pub fn path_compact(
     with_segment: &mut [u32],
 ) {
     let block_size = SCAN_GROUP_SIZE as usize;
-    for (list, which, bit) in [(next, 0, PATH_GOES_ON), (with_segment, 1, PATH_HAS_SEGMENT)] {
-        let blocks = live.chunks(block_size).zip(child_kinds.chunks(block_size)).zip(scan_blocks);
-        for ((live, kinds), before) in blocks {
+    let blocks = (live.par_chunks(block_size), child_kinds.par_chunks(block_size));
+    let places = (places_of_blocks(scan_blocks, 0, next), places_of_blocks(scan_blocks, 1, with_segment));
+    blocks.into_par_iter().zip(places).with_min_len(BLOCKS_PER_TASK).for_each(|((live, kinds), places)| {
+        for (places, bit) in [(places.0, PATH_GOES_ON), (places.1, PATH_HAS_SEGMENT)] {
             let listed = live.iter().zip(kinds).filter(|(_, kind)| **kind & bit != 0);
-            listed.zip(&mut list[before[which] as usize..]).for_each(|((path_ix, _), place)| *place = *path_ix);
+            listed.zip(places).for_each(|((path_ix, _), place)| *place = *path_ix);
         }
-    }
+    });
+}
+
+/// Cuts a list into the places of each block. The last block gets the rest of the list. `which`: the count of the blocks
+/// that belongs to the list.
+fn places_of_blocks<'a>(scan_blocks: &[[u32; 2]], which: usize, mut list: &'a mut [u32]) -> Vec<&'a mut [u32]> {
+    let place_of = |block: usize| {
+        let begin = scan_blocks[block][which];
+        let n_places = scan_blocks.get(block + 1).map_or(list.len(), |next| (next[which] - begin) as usize);
+        let (places, rest) = std::mem::take(&mut list).split_at_mut(n_places);
+        list = rest;
+        places
+    };
+    (0..scan_blocks.len()).map(place_of).collect()
 }

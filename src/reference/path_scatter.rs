@@ -6,7 +6,7 @@ use super::{
     inputs::KernelInputs,
     live_paths::parts,
     path_compact::{counts_of_block, kind_of_path},
-    path_vertex::{pairs_of_hit, step_path},
+    path_vertex::{HitChoices, pairs_of_hit, step_path},
     paths::{key_of_path, pixel_of_path},
 };
 use crate::layout::{Batch, Hit, PathRay, PathState, SCAN_GROUP_SIZE, SEGMENT_NONE, Segment};
@@ -40,8 +40,8 @@ pub fn path_scatter(
         for (&path_ix, kind) in live.iter().zip(&mut *kinds) {
             let key = key_of_path(inputs, path_ix, pixel_of_path(inputs.frame(), batch, path_ix));
             let (ray, state) = (rays.of_path(path_ix), states.of_path(path_ix));
-            let random_pairs = || pairs_of_hit(key, batch.depth);
-            let (goes_on, segment) = step_path(inputs, random_pairs, batch.depth, &hits[path_ix as usize], ray, state);
+            let choices = || HitChoices { pairs: pairs_of_hit(key, batch.depth), of_environment: None };
+            let (goes_on, segment) = step_path(inputs, choices, batch.depth, &hits[path_ix as usize], ray, state);
             // A path without a segment has none already.
             if segment.state != SEGMENT_NONE {
                 *segments.of_path(path_ix) = segment;

@@ -4,7 +4,10 @@ use glam::{Vec2, Vec3, vec3};
 
 use super::{
     bsdf::{BsdfTerms, bsdf_terms, is_smooth, sample_bsdf, value_at},
-    emitters::{ambient_radiance, emission_at, emission_density, pick_light, seen_environment, seen_light},
+    emitters::{
+        LightPick, ambient_radiance, emission_at, emission_density, pick_emitter, seen_environment, seen_light,
+        unhidden,
+    },
     inputs::KernelInputs,
     maps::shaded_at,
     material::{emitted, is_unlit, unabsorbed},
@@ -25,6 +28,14 @@ pub const PAIRS_OF_HIT: usize = 4;
 /// The place of the first pair of random numbers of a hit.
 pub fn first_pair_of(depth: u32) -> u32 {
     PAIRS_OF_CAMERA + PAIRS_OF_HIT as u32 * depth
+}
+
+/// What is decided at random at a hit.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct HitChoices {
+    pub pairs: [Vec2; PAIRS_OF_HIT],
+    /// The pick of the environment that these random numbers give, if it is known already.
+    pub of_environment: Option<LightPick>,
 }
 
 /// The random numbers of a hit.
@@ -84,12 +95,15 @@ struct Vertex<'a> {
 }
 
 /// The segment to a light that is picked at a hit.
-fn segment_to_light(inputs: &KernelInputs, u: Vec3, vertex: &Vertex) -> Segment {
+fn segment_to_light(inputs: &KernelInputs, choices: &HitChoices, vertex: &Vertex) -> Segment {
     let &Vertex { depth, surface, terms, triangle_ix, throughput } = vertex;
     if is_smooth(terms.material) {
         return NO_SEGMENT;
     }
-    let pick = pick_light(inputs, surface.point_world, u);
+    let [to_light, choice, ..] = choices.pairs;
+    let u = vec3(to_light.x, to_light.y, choice.x);
+    let pick = pick_emitter(inputs, surface.point_world, u, choices.of_environment.as_ref());
+    let pick = unhidden(inputs, surface.point_world, pick);
     if pick.light == Vec3::ZERO {
         return NO_SEGMENT;
     }
@@ -134,11 +148,11 @@ fn survives(depth: u32, u: f32, throughput: &mut Vec3) -> bool {
 }
 
 /// Adds the light that the path's ray meets to its state, samples a light at the hit, and replaces the ray by the one
-/// with which the path goes on. Returns whether it does, and the segment to the light. `random_pairs` returns what
-/// [`pairs_of_hit`] does.
+/// with which the path goes on. Returns whether it does, and the segment to the light. `choices` is called if something
+/// is decided at random.
 pub fn step_path(
     inputs: &KernelInputs,
-    random_pairs: impl FnOnce() -> [Vec2; PAIRS_OF_HIT],
+    choices: impl FnOnce() -> HitChoices,
     depth: u32,
     hit: &Hit,
     ray: &mut PathRay,
@@ -151,13 +165,13 @@ pub fn step_path(
         state.radiance += added_light(inputs, ray.throughput * light, depth);
         return (false, NO_SEGMENT);
     }
-    step_past_lights(inputs, random_pairs, depth, hit, ray, state)
+    step_past_lights(inputs, choices, depth, hit, ray, state)
 }
 
 /// Does what [`step_path`] does, for a ray that meets no rectangle, disk or sphere which shines.
 pub fn step_past_lights(
     inputs: &KernelInputs,
-    random_pairs: impl FnOnce() -> [Vec2; PAIRS_OF_HIT],
+    choices: impl FnOnce() -> HitChoices,
     depth: u32,
     hit: &Hit,
     ray: &mut PathRay,
@@ -180,12 +194,13 @@ pub fn step_past_lights(
         return (false, NO_SEGMENT);
     }
     let terms = bsdf_terms(&mut material, &surface, -ray.direction);
-    let [to_light, choices, to_next, lobe] = random_pairs();
+    let choices = choices();
+    let [_, choice, to_next, lobe] = choices.pairs;
     let vertex = Vertex { depth, surface: &surface, terms: &terms, triangle_ix: hit.triangle_ix, throughput };
-    let segment = segment_to_light(inputs, vec3(to_light.x, to_light.y, choices.x), &vertex);
+    let segment = segment_to_light(inputs, &choices, &vertex);
     let next = sample_bsdf(&terms, &surface, vec3(to_next.x, to_next.y, lobe.x));
     throughput *= next.weight;
-    if !throughput.cmpgt(Vec3::ZERO).any() || !survives(depth, choices.y, &mut throughput) {
+    if !throughput.cmpgt(Vec3::ZERO).any() || !survives(depth, choice.y, &mut throughput) {
         return (false, segment);
     }
     *ray = surface.ray_from(next.direction, hit.triangle_ix, ray, throughput);

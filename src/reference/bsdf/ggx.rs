@@ -5,6 +5,8 @@ use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3, Vec3Swizzles};
 
+use crate::reference::turns::sin_cos_of_turns;
+
 /// Density of normals, per steradian and area of the surface. `half_vector.z` is at least 0.
 pub fn ggx_distribution(half_vector: Vec3, width: f32) -> f32 {
     let squared = width * width;
@@ -33,7 +35,7 @@ pub fn ggx_visibility(cos_viewer: f32, cos_light: f32, width: f32) -> f32 {
 pub fn sample_ggx(to_viewer: Vec3, width: f32, u: Vec2) -> Vec3 {
     let stretched = (width * to_viewer.xy()).extend(to_viewer.z).normalize();
     let z = (1.0 - u.y) * (1.0 + stretched.z) - stretched.z;
-    let (sine, azimuth) = ((1.0 - z * z).clamp(0.0, 1.0).sqrt(), 2.0 * PI * u.x);
-    let normal = Vec3::new(sine * azimuth.cos(), sine * azimuth.sin(), z) + stretched;
+    let (radius, (sine, cosine)) = ((1.0 - z * z).clamp(0.0, 1.0).sqrt(), sin_cos_of_turns(u.x));
+    let normal = Vec3::new(radius * cosine, radius * sine, z) + stretched;
     (width * normal.xy()).extend(normal.z.max(0.0)).normalize()
 }

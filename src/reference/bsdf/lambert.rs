@@ -5,10 +5,12 @@ use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3};
 
+use crate::reference::turns::sin_cos_of_turns;
+
 /// Returns a direction with a density in proportion to its cosine.
 pub fn sample_lambert(u: Vec2) -> Vec3 {
-    let (radius, azimuth) = (u.x.sqrt(), 2.0 * PI * u.y);
-    Vec3::new(radius * azimuth.cos(), radius * azimuth.sin(), (1.0 - u.x).max(0.0).sqrt())
+    let (radius, (sine, cosine)) = (u.x.sqrt(), sin_cos_of_turns(u.y));
+    Vec3::new(radius * cosine, radius * sine, (1.0 - u.x).max(0.0).sqrt())
 }
 
 pub fn lambert_density(to_light: Vec3) -> f32 {

@@ -5,6 +5,8 @@ use std::f32::consts::PI;
 
 use glam::{FloatExt, Vec2, Vec3, Vec3Swizzles};
 
+use crate::reference::turns::sin_cos_of_turns;
+
 /// Density of the fibres' normals. `width`: of the distribution.
 fn sheen_distribution(half_vector: Vec3, width: f32) -> f32 {
     let sine = half_vector.xy().dot(half_vector.xy()).clamp(0.0, 1.0).sqrt();
@@ -43,8 +45,8 @@ pub fn evaluate_sheen(to_viewer: Vec3, to_light: Vec3, roughness: f32) -> f32 {
 
 /// Returns a direction of the hemisphere, all alike.
 pub fn sample_sheen(u: Vec2) -> Vec3 {
-    let (sine, azimuth) = ((1.0 - u.x * u.x).max(0.0).sqrt(), 2.0 * PI * u.y);
-    Vec3::new(sine * azimuth.cos(), sine * azimuth.sin(), u.x)
+    let (radius, (sine, cosine)) = ((1.0 - u.x * u.x).max(0.0).sqrt(), sin_cos_of_turns(u.y));
+    Vec3::new(radius * cosine, radius * sine, u.x)
 }
 
 pub fn sheen_density(to_light: Vec3) -> f32 {

@@ -2,7 +2,7 @@
 //! source.
 
 /// The largest float below 1.
-pub(super) const ALMOST_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
+pub const ALMOST_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
 
 /// The entry that is picked, and what is left of the random number: uniform in [0, 1), independent of the entry.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,14 +1,12 @@
 //! Disks that shine to one side. Twin of `emitters/disk.glsl`, which names the source.
 
-use std::f32::consts::FRAC_PI_4;
-
 use glam::{Vec2, Vec3};
 
 use super::{
     pick::{LightPick, pick_of_point, towards},
     rectangle::{flat_density, hit_plane},
 };
-use crate::layout::AreaLight;
+use crate::{layout::AreaLight, reference::turns::sin_cos_of_turns};
 
 /// Distance at which a ray meets the disk's front, in lengths of its direction; infinity if it does not.
 pub(super) fn hit_disk(light: &AreaLight, origin: Vec3, direction: Vec3) -> f32 {
@@ -24,9 +22,10 @@ fn disk_point(u: Vec2) -> Vec2 {
         return at;
     }
     if at.x.abs() > at.y.abs() {
-        at.x * Vec2::from_angle(FRAC_PI_4 * (at.y / at.x))
+        let (sine, cosine) = sin_cos_of_turns(0.125 * (at.y / at.x));
+        at.x * Vec2::new(cosine, sine)
     } else {
-        let (sine, cosine) = (FRAC_PI_4 * (at.x / at.y)).sin_cos();
+        let (sine, cosine) = sin_cos_of_turns(0.125 * (at.x / at.y));
         at.y * Vec2::new(sine, cosine)
     }
 }

@@ -1,7 +1,7 @@
 //! What rays that leave the scene see: a map, or the background, and the suns. Twin of `emitters/environment.glsl`,
 //! which describes the map.
 
-use std::f32::consts::{FRAC_PI_2, PI, TAU};
+use std::f32::consts::{PI, TAU};
 
 use glam::{IVec2, Vec2, Vec3};
 
@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     layout::AreaLight,
-    reference::inputs::KernelInputs,
+    reference::{inputs::KernelInputs, turns::sin_cos_of_turns},
     world::{Emitters, EnvironmentMap},
 };
 
@@ -107,8 +107,7 @@ fn below_tent(u: f32) -> f32 {
     if u < 0.5 { (2.0 * u).sqrt() - 1.0 } else { 1.0 - (2.0 * (1.0 - u)).sqrt() }
 }
 
-/// A direction of the map, and the map's value there.
-fn pick_map_direction(map: &EnvironmentMap, u: Vec2) -> (Vec3, MapValue) {
+fn pick_in_map(emitters: &Emitters, map: &EnvironmentMap, u: Vec2) -> LightPick {
     let [n_columns, n_rows] = map.size;
     let row = pick_alias(n_rows, |ix| map.rows[ix as usize].parts(), u.x, 0.0);
     let first_column = row.ix * n_columns;
@@ -120,22 +119,22 @@ fn pick_map_direction(map: &EnvironmentMap, u: Vec2) -> (Vec3, MapValue) {
     // The polar angle is taken from the nearer pole, where sines are exact.
     let is_upper = down + 0.5 < 0.5 * n_rows as f32;
     let from_pole = if is_upper { down + 0.5 } else { n_rows as f32 - 0.5 - down };
-    let half_sine = (FRAC_PI_2 / n_rows as f32 * from_pole).sin();
+    let (half_sine, _) = sin_cos_of_turns(0.25 / n_rows as f32 * from_pole);
     let versine = 2.0 * half_sine * half_sine;
     let aside = (versine * (2.0 - versine)).max(0.0).sqrt();
     let turns = (right + 0.5) / n_columns as f32 - 0.5 - map.turn;
-    let azimuth = TAU * turns;
+    let (sine, cosine) = sin_cos_of_turns(turns);
     let up = if is_upper { 1.0 - versine } else { versine - 1.0 };
-    let direction = Vec3::new(aside * azimuth.sin(), up, -aside * azimuth.cos());
-    (direction, map_value(map, Vec2::new(right, down), aside))
+    let direction = Vec3::new(aside * sine, up, -aside * cosine);
+    pick_at_place(emitters, map, direction, Vec2::new(right, down), aside)
 }
 
 /// A direction that is uniform on the sphere.
 fn pick_any_direction(u: Vec2) -> Vec3 {
     let up = 1.0 - 2.0 * u.x;
-    let sine = 2.0 * (u.x * (1.0 - u.x)).max(0.0).sqrt();
-    let azimuth = TAU * u.y;
-    Vec3::new(sine * azimuth.sin(), up, -sine * azimuth.cos())
+    let aside = 2.0 * (u.x * (1.0 - u.x)).max(0.0).sqrt();
+    let (sine, cosine) = sin_cos_of_turns(u.y);
+    Vec3::new(aside * sine, up, -aside * cosine)
 }
 
 /// The pick of a direction beyond the scene.
@@ -144,11 +143,17 @@ fn pick_beyond(emitters: &Emitters, direction: Vec3, seen: SeenEnvironment) -> L
     pick_of_point(way, seen.radiance + ambient_from(emitters, direction), seen.density)
 }
 
-pub(super) fn pick_environment(emitters: &Emitters, u: Vec2) -> LightPick {
-    let (direction, value) = match &emitters.environment {
-        Some(map) => pick_map_direction(map, u),
-        None => (pick_any_direction(u), MapValue { radiance: emitters.background, density: UNIFORM }),
-    };
+/// The pick of a direction whose place in the map is known. `aside`: the sine of the place's polar angle.
+pub fn pick_at_place(emitters: &Emitters, map: &EnvironmentMap, direction: Vec3, place: Vec2, aside: f32) -> LightPick {
+    pick_beyond(emitters, direction, with_suns(emitters, map_value(map, place, aside), direction))
+}
+
+/// Picks a direction of the environment. `u`: in [0, 1).
+pub fn pick_environment(emitters: &Emitters, u: Vec2) -> LightPick {
+    if let Some(map) = &emitters.environment {
+        return pick_in_map(emitters, map, u);
+    }
+    let (direction, value) = (pick_any_direction(u), MapValue { radiance: emitters.background, density: UNIFORM });
     pick_beyond(emitters, direction, with_suns(emitters, value, direction))
 }
 

@@ -21,14 +21,14 @@ use glam::{Vec2, Vec3};
 use self::{
     alias::pick_alias,
     area_light::pick_area_light,
-    environment::{pick_environment, pick_sun},
+    environment::pick_sun,
     punctual::pick_punctual,
     tree::{pick_in_tree, tree_probability},
     triangle::{area_density, pick_triangle},
 };
 pub use self::{
     area_light::{SeenLight, seen_light},
-    environment::{ambient_radiance, seen_environment},
+    environment::{ambient_radiance, pick_environment, seen_environment},
     pick::LightPick,
     triangle::emission_at,
 };
@@ -41,13 +41,23 @@ pub const LIGHT_HIDES_UP_TO: f32 = 0.9999;
 /// Picks a direction from which light may come to a point. `u` is in [0, 1), and `u.x` selects the emitter. What hides
 /// the light is not asked, except for rectangles, disks and spheres, which only [`seen_light`] knows.
 pub fn pick_light(inputs: &KernelInputs, point_world: Vec3, u: Vec3) -> LightPick {
-    let pick = pick_emitter(inputs, point_world, u);
+    unhidden(inputs, point_world, pick_emitter(inputs, point_world, u, None))
+}
+
+/// Returns a pick, or none if a rectangle, disk or sphere that shines is before it.
+pub fn unhidden(inputs: &KernelInputs, point_world: Vec3, pick: LightPick) -> LightPick {
     let before = seen_light(inputs, point_world, pick.direction, LIGHT_HIDES_UP_TO * pick.distance);
     if before.t.is_infinite() { pick } else { LightPick::NONE }
 }
 
-/// Picks as [`pick_light`] does. What hides the light is not asked at all.
-pub fn pick_emitter(inputs: &KernelInputs, point_world: Vec3, u: Vec3) -> LightPick {
+/// Picks as [`pick_light`] does. What hides the light is not asked at all. `of_environment`: what [`pick_environment`]
+/// returns for `u.yz`, if it is known already.
+pub fn pick_emitter(
+    inputs: &KernelInputs,
+    point_world: Vec3,
+    u: Vec3,
+    of_environment: Option<&LightPick>,
+) -> LightPick {
     let Some(emitters) = inputs.emitters.filter(|emitters| !emitters.entries.is_empty()) else {
         return LightPick::NONE;
     };
@@ -67,7 +77,7 @@ pub fn pick_emitter(inputs: &KernelInputs, point_world: Vec3, u: Vec3) -> LightP
         EMITTER_AREA => pick_area_light(emitters.shapes()[ix], point_world, rest, emitter.probability),
         EMITTER_SUN => pick_sun(emitters, &emitters.suns()[ix], rest),
         EMITTER_TRIANGLE => pick_triangle(inputs, emitter.ix, point_world, rest, emitter.probability),
-        _ => pick_environment(emitters, rest),
+        _ => of_environment.copied().unwrap_or_else(|| pick_environment(emitters, rest)),
     }
 }
 

@@ -1,8 +1,8 @@
 //! What [`pick_light`](super::pick_light) returns, whichever kind of emitter was picked. Twin of `emitters/pick.glsl`.
 
-use std::f32::consts::TAU;
-
 use glam::Vec3;
+
+use crate::reference::turns::sin_cos_of_turns;
 
 /// A number beyond which a density or a weight counts as infinite.
 pub(super) const MOST_LIGHT: f32 = 1.0e30;
@@ -53,8 +53,7 @@ pub(super) fn pick_of_point(way: Towards, radiance: Vec3, density: f32) -> Light
 }
 
 /// A vector that is `cosine` along the first of three orthonormal axes, and `sine` aside of it at an azimuth in turns.
-/// The sines of this twin are exact enough as they are.
 pub(super) fn around([axis, aside_u, aside_v]: [Vec3; 3], [cosine, sine, turns]: [f32; 3]) -> Vec3 {
-    let azimuth = TAU * turns;
-    cosine * axis + sine * (azimuth.cos() * aside_u + azimuth.sin() * aside_v)
+    let (along_v, along_u) = sin_cos_of_turns(turns);
+    cosine * axis + sine * (along_u * aside_u + along_v * aside_v)
 }
