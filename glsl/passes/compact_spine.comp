@@ -2,8 +2,9 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 // Compact, 2 of 3: the only workgroup turns the sums of the blocks of SCAN_GROUP_SIZE rays into exclusive prefix sums
-// and sizes the next bounce. A block of paths has two sums: of paths that go on, and of segments. If the queue has no room for the next bounce's rays, that bounce is empty and its
-// `overflow` is set, as is `any_overflow` of the first row of bounces.
+// and sizes the next bounce. A block of paths has two sums: of paths that go on, and of segments. If the queue has no
+// room for the next bounce's rays, that bounce is empty and its `overflow` is set, as is `any_overflow` of the first
+// row of bounces.
 // Reads and writes scan_blocks and bounces.
 #include "layout.glsl"
 #include "integrator.glsl"

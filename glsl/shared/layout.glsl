@@ -28,7 +28,8 @@
 // Counts that one invocation of `compact_spine.comp` loads and adds up in each turn of its loop. Each is the count of
 // a block of `SCAN_GROUP_SIZE` rays.
 #define SPINE_ITEMS 8u
-// The most invocations of that workgroup. It has as many as the device allows.
+// The most invocations of that workgroup. On a GPU it has as many as the device allows, on a software driver
+// `SCAN_GROUP_SIZE`.
 #define SPINE_MOST_INVOCATIONS 1024u
 
 // Triangle index of a ray that hits nothing, and of a pixel that no triangle covers.

@@ -1,5 +1,5 @@
-// Prefix sums over a workgroup of SCAN_SIZE invocations, for every subgroup size from 4 to 128. The kernel that includes
-// this file must have that workgroup size, full subgroups and GL_KHR_shader_subgroup_arithmetic.
+// Prefix sums over a workgroup of SCAN_SIZE invocations, for every subgroup size from 4 to 128. The kernel that
+// includes this file must have that workgroup size, full subgroups and GL_KHR_shader_subgroup_arithmetic.
 #ifndef KDRAY_SCAN
 #define KDRAY_SCAN
 

@@ -23,7 +23,7 @@
 mod area_lights;
 pub mod direction_bins;
 mod environment_picks;
-mod lanes;
+pub mod lanes;
 mod matt_steps;
 mod matt_surfaces;
 mod meter;

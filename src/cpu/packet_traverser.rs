@@ -197,8 +197,8 @@ impl PacketTraverser {
         }
     }
 
-    /// Returns the hits of the first `n_rays` rays, whose directions must have the same signs. All further lanes of the result are
-    /// meaningless.
+    /// Returns the hits of the first `n_rays` rays, whose directions must have the same signs. All further lanes of the
+    /// result are meaningless.
     pub fn traverse<const ANY_HIT: bool>(
         &mut self,
         inputs: &KernelInputs<impl ReadCounter>,

@@ -1,5 +1,5 @@
-//! Path compact: the lists of the paths that go on, and of those with a segment to a light. Twin of `path_compact.comp`,
-//! and of `compact_spine.comp` for paths.
+//! Path compact: the lists of the paths that go on, and of those with a segment to a light. Twin of
+//! `path_compact.comp`, and of `compact_spine.comp` for paths.
 
 use rayon::prelude::*;
 
@@ -51,8 +51,8 @@ pub fn path_compact(
     });
 }
 
-/// Cuts a list into the places of each block. The last block gets the rest of the list. `which`: the count of the blocks
-/// that belongs to the list.
+/// Cuts a list into the places of each block. The last block gets the rest of the list. `which`: the count of the
+/// blocks that belongs to the list.
 fn places_of_blocks<'a>(scan_blocks: &[[u32; 2]], which: usize, mut list: &'a mut [u32]) -> Vec<&'a mut [u32]> {
     let place_of = |block: usize| {
         let begin = scan_blocks[block][which];
