@@ -15,7 +15,7 @@ use kdray::{
         search_ray::SearchRay,
         traversal_ray::{TraversalRay, signs_of},
         traverser::{Tracer, Traverser},
-        triangle::Shear,
+        triangle::{Shear, longest_axis},
     },
 };
 use support::{
@@ -156,7 +156,7 @@ fn sixteen_rays_of_one_class_of_directions_are_a_packet() {
         for (lane, ray_ix) in bin.keys.drain(..).enumerate() {
             let search_ray = bin.rays.get(lane);
             assert_eq!(search_ray.origin.x, ray_ix as f32, "the ray's own");
-            let class_of = |direction: Vec3| (signs_of(direction), direction.abs().max_position());
+            let class_of = |direction: Vec3| (signs_of(direction), longest_axis(direction.to_array()));
             assert_eq!(class_of(search_ray.direction), class_of(bin.rays.get(0).direction));
             seen.push(ray_ix);
         }

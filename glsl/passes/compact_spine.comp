@@ -27,7 +27,8 @@ uint groups_for(uint n_invocations, uint group_size) {
     return (n_invocations + group_size - 1u) / group_size;
 }
 
-// Sizes the next bounce of paths, n_paths of which go on. Its dispatch also traces the segments of this bounce.
+// Sizes the next bounce of paths. n_paths: the paths that go on. n_segments: the segments of this bounce, which the
+// next dispatch traces, too.
 void size_next_bounce_of_paths(uint n_paths, uint n_segments) {
     uint next_ix = batch.bounce_ix + 1u;
     uint n_traced = n_paths + n_segments;
@@ -99,7 +100,8 @@ void main() {
             of_chunk += subgroupAdd(counts[i]);
             counts[i] = before;
         }
-        // The last invocation stands for its chunk in the sum over the chunks before.
+        // Only the last invocation of a subgroup contributes, with the sum of its chunk. So each invocation gets the
+        // sum of all chunks before its own.
         bool is_last = gl_SubgroupInvocationID == gl_SubgroupSize - 1u;
         uvec2 total;
         uvec2 before_chunk = carry + exclusive_add_counts(is_last ? of_chunk : uvec2(0u), total);

@@ -28,8 +28,8 @@
 // Counts that one invocation of `compact_spine.comp` loads and adds up in each turn of its loop. Each is the count of
 // a block of `SCAN_GROUP_SIZE` rays.
 #define SPINE_ITEMS 8u
-// The most invocations of that workgroup. On a GPU it has as many as the device allows, on a software driver
-// `SCAN_GROUP_SIZE`.
+// Upper bound of the invocations of its only workgroup. On a GPU, the workgroup has the largest power of two that the
+// device allows, up to this bound. On a software driver, it has `SCAN_GROUP_SIZE`.
 #define SPINE_MOST_INVOCATIONS 1024u
 
 // Triangle index of a ray that hits nothing, and of a pixel that no triangle covers.
@@ -648,8 +648,10 @@ struct Segment {
 #define FILTER_TENT 1u
 // A Gaussian of standard deviation 0.5 px, up to 1.5 px from the centre.
 #define FILTER_GAUSSIAN 2u
-// Base-2 logarithm of the most samples that a frame of paths draws.
-#define MOST_SAMPLES_LOG2 4u
+// Base-2 logarithm of the number of samples in a block. Parts of a picture's samples begin and end at multiples of it.
+#define SAMPLE_BLOCK_LOG2 4u
+// Base-2 logarithm of the most samples of each pixel that a frame of paths draws.
+#define MOST_SAMPLES_LOG2 8u
 // Side of a noise tile, which gets samples until its noise is low (pixels). A multiple of `TILE_SIZE`.
 #define NOISE_TILE_SIZE 16u
 // The most noise tiles that are drawn together. Their words fill the smallest uniform buffer that a device may have.
@@ -764,8 +766,8 @@ struct Frame {
 
 // The rays of one bounce of one batch, 80 bytes. The host writes the row of a batch's first bounce, and in all rows
 // the y and z of the `groups`. Compaction of each bounce's rays (`compact_spine.comp`) writes the rest of the next
-// bounce's row. The rays of a batch are in one queue, bounce after bounce. Each `groups` is a
-// `VkDispatchIndirectCommand`.
+// bounce's row, and `n_segments` of the bounce's own. The rays of a batch are in one queue, bounce after bounce. Each
+// `groups` is a `VkDispatchIndirectCommand`.
 //
 // - `first_ray`, `n_rays`: the bounce's rays in the queue.
 // - `n_wanted`: child rays of the bounce before, including those for which the queue has no room.
@@ -777,7 +779,8 @@ struct Frame {
 // - `scan_groups`: over the bounce's rays.
 // - `any_overflow`: in the first row of `bounces` only, 1 if any row of the frame has an overflow.
 // - `shade_groups`: over all rays of the batch up to the last one of this bounce.
-// - `n_segments`: in frames of paths, the number of segments from the bounce's hits to lights.
+// - `n_segments`: in frames of paths, the number of segments from the bounce's hits to lights. The next bounce's
+//   dispatch of path_trace.comp reads it.
 //
 // In frames of paths, the rays of a bounce are those of the paths that are alive, `first_ray` is 0, and
 // `trace_groups` also count the segments of the bounce before.
@@ -977,11 +980,12 @@ struct AccelConstants {
 #define LOBE_TRANSMISSION 8u
 #define LOBE_CLEARCOAT 16u
 #define LOBE_SHEEN 32u
+// Invocations of a workgroup that computes a prefix sum: `SCAN_GROUP_SIZE`, except in compact_spine.comp, where it is
+// at most `SPINE_MOST_INVOCATIONS`.
+#define CONSTANT_SCAN_SIZE 15u
 
 // Whether a kernel builds the lower level of a grid.
 #define CONSTANT_LOWER_LEVEL 10u
-// Invocations of the only workgroup of compact_spine.comp, from `SCAN_GROUP_SIZE` to `SPINE_MOST_INVOCATIONS`.
-#define CONSTANT_SCAN_SIZE 15u
 // Which counts a prefix sum in a grid's build adds up: `GRID_SCANS_CELLS` and its like. The first three values equal
 // those of `GRID_COUNTS_CELLS` and its like.
 #define CONSTANT_SCANS 11u
@@ -1246,7 +1250,7 @@ struct GridSort {
 #define BIND_MATERIALS 3u
 // `Frame.n_lights` of `Light`.
 #define BIND_LIGHTS 4u
-// One `PathRay` for each ray, bounce after bounce. The camera's rays are not stored.
+// One `PathRay` for each ray, bounce after bounce. The camera's rays are not stored, except in frames of paths.
 #define BIND_RAYS 8u
 // A word for each ray: bits of `CHILD_REFLECTED` and its like. In frames of paths, it is `PATH_GOES_ON` and
 // `PATH_HAS_SEGMENT`.

@@ -2,8 +2,8 @@
 // their rays have much in common: they meet the same parts of the tree and the same materials. Lists of indices say
 // which paths are alive at a bounce. Twin of src/reference/paths.rs.
 //
-// Needs nothing. Provides the push constants `batch`, `list_of`, `list_of_segments`, `path_of`, `pixel_of_path` and
-// `key_of_path`.
+// Needs nothing. Provides the push constants `batch`, `list_of`, `list_of_segments`, `path_of`, `sample_of_path`,
+// `pixel_of_path` and `key_of_path`.
 #ifndef KDRAY_PATHS
 #define KDRAY_PATHS
 
@@ -29,6 +29,11 @@ uint path_of(uint in_batch, uint sample_ix) {
     return (in_batch << frame.samples_log2) + sample_ix;
 }
 
+// The index of a path's sample among those of the frame.
+uint sample_of_path(uint path_ix) {
+    return path_ix % (1u << frame.samples_log2);
+}
+
 // The window's pixel of a path.
 uvec2 pixel_of_path(uint path_ix) {
     return pixel_of(batch.first_pixel + (path_ix >> frame.samples_log2), frame.width, frame.height);
@@ -36,7 +41,7 @@ uvec2 pixel_of_path(uint path_ix) {
 
 // What the random numbers of a path depend on. pixel: the window's pixel.
 SampleKey key_of_path(uint path_ix, uvec2 pixel) {
-    return sample_key(picture_pixel_of(pixel), first_sample_of(pixel) + path_ix % (1u << frame.samples_log2));
+    return sample_key(picture_pixel_of(pixel), first_sample_of(pixel) + sample_of_path(path_ix));
 }
 
 #endif

@@ -5,7 +5,7 @@
 
 #include "layout.glsl"
 
-// Invocations of the workgroup.
+// Invocations of the workgroup. Kernels whose workgroups have SCAN_GROUP_SIZE invocations keep the default.
 layout(constant_id = CONSTANT_SCAN_SIZE) const uint SCAN_SIZE = SCAN_GROUP_SIZE;
 
 // One total per subgroup. A subgroup has at least 4 invocations.

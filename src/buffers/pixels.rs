@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::{
     frame::{Denoise, Integrator, Primary, RenderOptions},
     gpu::{Buffer, BufferUse, Context, GpuError, Target, TargetKind},
-    layout::{Feature, Frame, Guide, LIGHT_LAYERS, MOST_SAMPLES_LOG2},
+    layout::{Feature, Frame, Guide, LIGHT_LAYERS, SAMPLE_BLOCK_LOG2},
 };
 
 /// Sums of samples for which each pixel of a frame of paths has room at least. They are enough for 4096 samples.
@@ -89,9 +89,9 @@ impl Pixels {
     /// filter and without layers: the mean, the sums, and the colour for display. The memory of the paths themselves
     /// does not grow with the picture.
     pub fn bytes_per_pixel_of_paths(n_samples: u32) -> u64 {
-        let frames = n_samples >> MOST_SAMPLES_LOG2;
-        // The sums before the last frame, one for each bit of their number, and that of the last frame.
-        let n_sums = u64::from(frames.saturating_sub(1).checked_ilog2().map_or(0, |log2| log2 + 1) + 1);
+        let blocks = n_samples >> SAMPLE_BLOCK_LOG2;
+        // If a frame is a block: the sums before the last one, one for each bit of their number, and that of the last.
+        let n_sums = u64::from(blocks.saturating_sub(1).checked_ilog2().map_or(0, |log2| log2 + 1) + 1);
         (1 + n_sums) * size_of::<[f32; 4]>() as u64 + size_of::<u32>() as u64
     }
 

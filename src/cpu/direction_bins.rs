@@ -1,11 +1,12 @@
 //! Bins that collect rays of one class of directions until they fill a packet. A class holds the rays whose directions
 //! have the same signs and the same longest axis. Rays of the same signs visit the two children of any node in the same
-//! order, which packets need. Rays of the same longest axis share a triangle's test, which is made once for each axis.
+//! order, which packets need. A packet tests a triangle once for each longest axis among its rays, so that rays of one
+//! axis need one test.
 
 use arrayvec::ArrayVec;
 
 use super::{lanes::LANES, soa::RaysSoa};
-use crate::reference::{search_ray::SearchRay, traversal_ray::signs_of};
+use crate::reference::{search_ray::SearchRay, traversal_ray::signs_of, triangle::longest_axis};
 
 /// Number of classes: eight combinations of signs, and three axes.
 const N_CLASSES: usize = 8 * 3;
@@ -38,7 +39,7 @@ impl<Key> DirectionBins<Key> {
     #[inline(always)]
     pub fn push(&mut self, key: Key, search_ray: &SearchRay) -> Option<&mut Bin<Key>> {
         let direction = search_ray.direction;
-        let class = 8 * direction.abs().max_position() + signs_of(direction) as usize;
+        let class = 8 * longest_axis(direction.to_array()) + signs_of(direction) as usize;
         let bin = &mut self.bins[class];
         bin.rays.set(bin.keys.len(), search_ray);
         bin.keys.push(key);

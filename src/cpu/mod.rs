@@ -15,7 +15,7 @@
 //! meter    the exposure of a scene whose light has physical units
 //! trace    the reference's passes that trace rays, with the tracer of this folder
 //!   tracer   traces rays one after the other, or as packets:
-//!     direction_bins     collect rays of similar directions until they fill a packet
+//!     direction_bins     collect rays of one class of directions until they fill a packet
 //!     soa                rays and hits as structures of arrays
 //!     packet, packet_triangle, packet_traverser   trace sixteen rays through the tree together
 //! ```

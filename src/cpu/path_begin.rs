@@ -14,7 +14,7 @@ use crate::{
     reference::{
         inputs::KernelInputs,
         path_camera::path_camera_ray,
-        paths::{key_of_path, path_of, pixel_of_path, sample_of_path},
+        paths::{key_of_path, path_of, pixel_of_path, place_of_path, sample_of_path},
         sampler::SampleKey,
     },
 };
@@ -53,7 +53,7 @@ impl PixelOfBatch {
 /// Writes the camera ray of each path.
 pub fn path_begin(inputs: &KernelInputs, pixels: &[PixelOfBatch], rays: &mut [PathRay]) {
     let (level, frame) = (Level::new(), inputs.frame());
-    let pixel_of = |path_ix| &pixels[(path_ix >> frame.samples_log2) as usize];
+    let pixel_of = |path_ix| &pixels[place_of_path(frame, path_ix) as usize];
     rays.par_chunks_mut(PATHS_PER_TASK).enumerate().for_each(|(task, rays)| {
         for (group, rays) in rays.chunks_mut(LANES).enumerate() {
             let first_path = (task * PATHS_PER_TASK + group * LANES) as u32;

@@ -28,6 +28,7 @@ use crate::{
         path_compact::{counts_of_block, kind_of_path},
         path_scatter::PathBuffers,
         path_vertex::{HitChoices, PAIRS_OF_HIT, first_pair_of, step_past_lights, step_path},
+        paths::place_of_path,
         sampler::SampleKey,
         search_ray::SearchRay,
     },
@@ -129,7 +130,7 @@ impl BounceOfPaths<'_> {
 
     fn key_of(&self, path_ix: u32) -> SampleKey {
         let frame = self.inputs.frame();
-        self.pixels[(path_ix >> frame.samples_log2) as usize].key_of_path(frame, path_ix)
+        self.pixels[place_of_path(frame, path_ix) as usize].key_of_path(frame, path_ix)
     }
 
     /// Returns the area lights.

@@ -186,7 +186,7 @@ impl Renderer {
         self.n_samples
     }
 
-    /// Sets the index of the picture's first sample, a multiple of `2^MOST_SAMPLES_LOG2`. Only frames of paths know it.
+    /// Sets the index of the picture's first sample, a multiple of `2^SAMPLE_BLOCK_LOG2`. Only frames of paths know it.
     /// The next sample is the first of a new picture.
     pub fn set_first_sample(&mut self, first_sample: u32) {
         self.options.paths.first_sample = first_sample;

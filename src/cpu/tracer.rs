@@ -1,5 +1,5 @@
-//! The tracer of the CPU engine. With [`Traversal::Stack`], rays of similar directions go through a kd-tree as
-//! packets. With any other algorithm, or through a grid, rays are traced one after the other.
+//! The tracer of the CPU engine. With [`Traversal::Stack`], rays of one class of directions ([`DirectionBins`])
+//! go through a kd-tree as packets. With any other algorithm, or through a grid, rays are traced one after the other.
 
 use fearless_simd::Level;
 

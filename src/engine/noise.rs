@@ -18,7 +18,7 @@ use crate::{
         Crop, Drawn, DrawnTiles, LightLayers, NoiseTiles, Picture, Profile, RenderOptions, SampleRange, TileSamples,
     },
     gpu::GpuError,
-    layout::{Feature, LIGHT_LAYERS, MOST_SAMPLES_LOG2},
+    layout::{Feature, LIGHT_LAYERS, SAMPLE_BLOCK_LOG2},
 };
 
 /// Number of pixels of a tile.
@@ -40,12 +40,12 @@ impl NoiseGoal {
     /// The most samples of a pixel if nothing else is said.
     pub const MOST: u32 = 4096;
     /// The fewest samples of a pixel.
-    pub const FEWEST: u32 = 2 << MOST_SAMPLES_LOG2;
+    pub const FEWEST: u32 = 2 << SAMPLE_BLOCK_LOG2;
 
     /// Returns the blocks of samples that a tile gets one after the other: each but the first has as many samples as
     /// all before it.
     fn blocks(&self) -> impl Iterator<Item = SampleRange> + use<> {
-        let first = SampleRange { first: 0, end: 1 << MOST_SAMPLES_LOG2 };
+        let first = SampleRange { first: 0, end: 1 << SAMPLE_BLOCK_LOG2 };
         let doubled = |block: &SampleRange| Some(SampleRange { first: block.end, end: 2 * block.end });
         let most = self.most_samples;
         std::iter::successors(Some(first), doubled).take_while(move |block| block.end <= most)
@@ -76,7 +76,7 @@ const ENOUGH_TILES: usize = 512;
 /// Returns into how many blocks the samples of each tile are divided, which are drawn together: a power of two.
 fn n_parts(n_tiles: usize, n_devices: usize, samples: SampleRange) -> u32 {
     let wanted = (n_devices * ENOUGH_TILES / n_tiles).max(1).ilog2();
-    let most = (samples.len() >> MOST_SAMPLES_LOG2).min(NoiseTiles::MOST_BLOCKS);
+    let most = (samples.len() >> SAMPLE_BLOCK_LOG2).min(NoiseTiles::MOST_BLOCKS);
     most.min(1 << wanted)
 }
 

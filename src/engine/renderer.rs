@@ -15,6 +15,7 @@ use crate::{
         TileSamples, Watcher,
     },
     gpu::{Context, DeviceInfo, GivenImage, GpuError, TimelinePoint},
+    layout::SAMPLE_BLOCK_LOG2,
     render::BandedRenderer,
     scene::Camera,
     world::World,
@@ -232,7 +233,7 @@ impl<W: Watcher> BandProgress<'_, W> {
 
 fn draw_on_cpu(renderer: &mut cpu::Renderer, goal: Goal, watcher: &mut impl Watcher) -> Drawn {
     let integrator = renderer.options().integrator;
-    let (mut pacer, mut drawn) = (Pacer::new(goal, integrator), Drawn::default());
+    let (mut pacer, mut drawn) = (Pacer::new(goal, integrator, SAMPLE_BLOCK_LOG2), Drawn::default());
     while let Some(log2) = pacer.next(renderer.n_samples()) {
         if integrator == Integrator::Path {
             renderer.set_samples_per_frame(log2);

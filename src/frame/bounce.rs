@@ -1,6 +1,6 @@
-//! Rows of the buffer `bounces`, one for each bounce of each batch. A row has the bounce's range of rays and the
-//! sizes of the dispatches over them. Twin of `compact_spine.comp`, which computes the rows of secondary rays on the
-//! device.
+//! Rows of the buffer `bounces`, one for each bounce of each batch. A row has the bounce's range of rays and the sizes
+//! of the dispatches over them; of paths, it also has the number of segments. Twin of `compact_spine.comp`, which
+//! computes the rows of secondary rays on the device.
 
 use std::ops::Range;
 

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use super::{Integrator, SampleRange, sampling::samples_log2};
-use crate::layout::MOST_SAMPLES_LOG2;
+use crate::layout::SAMPLE_BLOCK_LOG2;
 
 /// How many samples of each pixel a picture gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,15 +18,18 @@ pub enum Goal {
 pub struct Pacer {
     goal: Goal,
     integrator: Integrator,
+    /// Base-2 logarithm of the most samples of a frame of paths, if the goal is a number of samples.
+    most_log2: u32,
     begun_at: Instant,
     /// Number of samples before the last frame, and the time at which it began.
     last: Option<(u32, Duration)>,
 }
 
 impl Pacer {
-    /// Begins a picture.
-    pub fn new(goal: Goal, integrator: Integrator) -> Self {
-        Self { goal, integrator, begun_at: Instant::now(), last: None }
+    /// Begins a picture. `most_log2`: base-2 logarithm of the most samples that a frame of paths draws if the goal is a
+    /// number of samples.
+    pub fn new(goal: Goal, integrator: Integrator, most_log2: u32) -> Self {
+        Self { goal, integrator, most_log2, begun_at: Instant::now(), last: None }
     }
 
     /// Returns the base-2 logarithm of the number of samples that the next frame draws, or none if the picture is
@@ -39,10 +42,10 @@ impl Pacer {
     fn next_at(&mut self, n_drawn: u32, now: Duration) -> Option<u32> {
         let log2 = match (self.goal, self.integrator) {
             (Goal::Samples(n_samples), _) if n_drawn >= n_samples.max(1) => return None,
-            (Goal::Samples(n_samples), Integrator::Path) => samples_log2(n_drawn, n_samples),
+            (Goal::Samples(n_samples), Integrator::Path) => samples_log2(n_drawn, n_samples, self.most_log2),
             (Goal::Time(_), _) if n_drawn >= SampleRange::MOST => return None,
-            // The first frame is one sample, since its time is unknown.
-            (Goal::Time(_), Integrator::Path) if n_drawn > 0 => n_drawn.trailing_zeros().min(MOST_SAMPLES_LOG2),
+            // The first frame is one sample, since its time is unknown. Later frames are short, to end near the time.
+            (Goal::Time(_), Integrator::Path) if n_drawn > 0 => n_drawn.trailing_zeros().min(SAMPLE_BLOCK_LOG2),
             _ => 0,
         };
         if let (Goal::Time(time), Some((n_before, began))) = (self.goal, self.last) {
@@ -63,7 +66,7 @@ mod tests {
 
     /// Returns the numbers of samples of a picture's frames if a sample takes `sample_ms`.
     fn frames(goal: Goal, integrator: Integrator, sample_ms: u64) -> Vec<u32> {
-        let (mut pacer, mut n_drawn, mut frames) = (Pacer::new(goal, integrator), 0, Vec::new());
+        let (mut pacer, mut n_drawn, mut frames) = (Pacer::new(goal, integrator, SAMPLE_BLOCK_LOG2), 0, Vec::new());
         while let Some(log2) = pacer.next_at(n_drawn, Duration::from_millis(u64::from(n_drawn) * sample_ms)) {
             frames.push(1 << log2);
             n_drawn += 1 << log2;

@@ -81,7 +81,7 @@ pub enum Pass {
     PathTrace,
     /// Adds the light that paths meet, samples lights at their hits, and the directions in which they go on.
     PathScatter,
-    /// Lists the paths that go on, without gaps.
+    /// Lists the paths that go on, and those with a segment to a light, without gaps.
     PathCompact,
     /// Adds up one layer of the light of each pixel's paths: emission, direct or indirect light.
     PathLayers,

@@ -9,11 +9,13 @@ pub enum Resource {
     Rays,
     /// The closest hit of each ray.
     Hits,
-    /// The kinds of each ray's children, the rays that go on from its hit: reflected, refracted, both or none.
+    /// The kinds of each ray's children, the rays that go on from its hit: reflected, refracted, both or none. In
+    /// frames of paths: whether each path goes on, and whether it has a segment.
     ChildKinds,
     /// Index in `Rays` at which each ray's children begin, or would begin if it had any.
     FirstChildren,
-    /// The number of children of each block of rays, then the exclusive prefix sums of these numbers.
+    /// The number of children of each block of rays, then the exclusive prefix sums of these numbers. In frames of
+    /// paths, two numbers for each block: of paths that go on, and of segments.
     ScanBlocks,
     /// The number of rays of each bounce, and the sizes of its dispatches.
     Bounces,
@@ -50,7 +52,7 @@ pub enum Resource {
     PathStates,
     /// The segment of each path from its last hit to a sampled light.
     Segments,
-    /// The indices of the paths that are alive, for this bounce and the next.
+    /// The indices of the paths that are alive, for this bounce and the next, and of those with a segment.
     LivePaths,
     /// The radiance of each path when the last layer of light was complete.
     PathSnapshots,

@@ -8,7 +8,7 @@ use std::{fmt, str::FromStr};
 
 use rayon::prelude::*;
 
-use crate::layout::MOST_SAMPLES_LOG2;
+use crate::layout::SAMPLE_BLOCK_LOG2;
 
 /// Samples of each pixel: those from `first` on, up to but without `end`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -50,9 +50,9 @@ impl SampleRange {
     }
 
     /// Whether the range can be drawn as a part of a picture of `n_samples` samples: it begins and ends at a multiple
-    /// of the samples that a frame of paths draws, or ends with the picture's last sample.
+    /// of the samples in a block, or ends with the picture's last sample.
     pub fn is_part_of(&self, n_samples: u32) -> bool {
-        let size = 1 << MOST_SAMPLES_LOG2;
+        let size = 1 << SAMPLE_BLOCK_LOG2;
         self.first.is_multiple_of(size)
             && self.end <= n_samples
             && (self.end.is_multiple_of(size) || self.end == n_samples)

@@ -6,8 +6,6 @@
 
 use glam::{DVec2, dvec2};
 
-use crate::layout::MOST_SAMPLES_LOG2;
-
 /// 2^32 / g and 2^32 / g^2, where g^3 = g + 1: the step of the R2 sequence (M. Roberts, The Unreasonable
 /// Effectiveness of Quasirandom Sequences, 2018) in units of 2^-32.
 const R2_STEP: [u32; 2] = [3_242_174_889, 2_447_445_414];
@@ -19,12 +17,11 @@ pub fn sample_offset(sample_ix: u32) -> DVec2 {
     dvec2(x, y)
 }
 
-/// Returns the base-2 logarithm of the number of samples that the next frame of paths draws, at most
-/// `MOST_SAMPLES_LOG2`, if `n_before` of `n_samples` samples are drawn. So all frames draw as many as they can, except
-/// for the last few.
-pub fn samples_log2(n_before: u32, n_samples: u32) -> u32 {
+/// Returns the base-2 logarithm of the number of samples that the next frame of paths draws, at most `most_log2`, if
+/// `n_before` of `n_samples` samples are drawn. So all frames draw as many as they can, except for the last few.
+pub fn samples_log2(n_before: u32, n_samples: u32, most_log2: u32) -> u32 {
     let n_left = n_samples.saturating_sub(n_before).max(1);
-    n_left.ilog2().min(n_before.trailing_zeros()).min(MOST_SAMPLES_LOG2)
+    n_left.ilog2().min(n_before.trailing_zeros()).min(most_log2)
 }
 
 /// Returns an element of the sequence, above 0 and below 1; 1/2 for index 0. The sequence repeats after 2^32

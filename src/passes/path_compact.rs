@@ -1,5 +1,5 @@
-//! Path compact: lists the paths that go on, without gaps and in order, by a prefix sum. The kernels path_scatter and
-//! compact_spine have made the sum.
+//! Path compact: lists the paths that go on and those with a segment, without gaps and in order, by a prefix sum. The
+//! kernels path_scatter and compact_spine have made the sum.
 
 use std::sync::Arc;
 

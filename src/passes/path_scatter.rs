@@ -22,7 +22,7 @@ impl PathScatter {
     }
 
     /// Needs `hits` and `live_paths` of the bounce. Updates `rays` and `path_states`. Leaves `segments`, `child_kinds`
-    /// and the number of each block's paths that go on in `scan_blocks`.
+    /// and in `scan_blocks` the numbers of each block's paths that go on and that have a segment.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         commands.dispatch(&self.kernel, Some(batch.depth), batch, resources.scan_dispatch(batch));
     }

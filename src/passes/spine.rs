@@ -21,15 +21,16 @@ impl Spine {
         Ok(Self { kernel: ComputePipeline::new(context, bindings, &desc)? })
     }
 
-    /// Needs `scan_blocks`. Leaves their exclusive prefix sums there, and the next bounce's row of `bounces`.
+    /// Needs `scan_blocks`. Leaves their exclusive prefix sums there, and the next bounce's row of `bounces`. The row
+    /// of this bounce gets its number of segments.
     pub fn record(&self, commands: &Commands, batch: &Batch) {
         commands.dispatch(&self.kernel, Some(batch.depth), batch, Dispatch::Threads([1, 1, 1], [1, 1, 1]));
     }
 }
 
-/// Returns the number of invocations of the workgroup. A software driver runs them one after the other, and the fewest
-/// wait the least at barriers.
+/// Returns the number of invocations of the workgroup. A software driver runs them one after the other, so that a
+/// barrier costs more with more invocations.
 fn group_size(context: &Context) -> u32 {
     let most = context.limits().group_size.min(SPINE_MOST_INVOCATIONS);
-    if context.is_software() { SCAN_GROUP_SIZE } else { 1 << most.ilog2() }
+    if context.predicates_branches() { SCAN_GROUP_SIZE } else { 1 << most.ilog2() }
 }

@@ -19,7 +19,8 @@ pub struct PathBuffers<'a> {
 }
 
 /// Takes the paths `live` one step further. Writes whether the path at each place of the list goes on and has a segment
-/// (`child_kinds`), and how many of each block of `SCAN_GROUP_SIZE` places do (`scan_blocks`). `live` is in ascending
+/// (`child_kinds`), and how many of each block of `SCAN_GROUP_SIZE` places do the one and the other
+/// (`scan_blocks`). `live` is in ascending
 /// order.
 pub fn path_scatter(
     inputs: &KernelInputs,

@@ -5,8 +5,7 @@ use glam::{Vec2, Vec3, vec3};
 use super::{
     bsdf::{BsdfTerms, bsdf_terms, is_smooth, sample_bsdf, value_at},
     emitters::{
-        LightPick, ambient_radiance, emission_at, emission_density, pick_emitter, seen_environment, seen_light,
-        unhidden,
+        LightPick, ambient_radiance, emission_at, emission_density, pick_light_with, seen_environment, seen_light,
     },
     inputs::KernelInputs,
     maps::shaded_at,
@@ -100,10 +99,9 @@ fn segment_to_light(inputs: &KernelInputs, choices: &HitChoices, vertex: &Vertex
     if is_smooth(terms.material) {
         return NO_SEGMENT;
     }
-    let [to_light, choice, ..] = choices.pairs;
-    let u = vec3(to_light.x, to_light.y, choice.x);
-    let pick = pick_emitter(inputs, surface.point_world, u, choices.of_environment.as_ref());
-    let pick = unhidden(inputs, surface.point_world, pick);
+    let [to_light, which, ..] = choices.pairs;
+    let u = vec3(to_light.x, to_light.y, which.x);
+    let pick = pick_light_with(inputs, surface.point_world, u, choices.of_environment.as_ref());
     if pick.light == Vec3::ZERO {
         return NO_SEGMENT;
     }
@@ -195,12 +193,12 @@ pub fn step_past_lights(
     }
     let terms = bsdf_terms(&mut material, &surface, -ray.direction);
     let choices = choices();
-    let [_, choice, to_next, lobe] = choices.pairs;
+    let [_, survival, to_next, lobe] = choices.pairs;
     let vertex = Vertex { depth, surface: &surface, terms: &terms, triangle_ix: hit.triangle_ix, throughput };
     let segment = segment_to_light(inputs, &choices, &vertex);
     let next = sample_bsdf(&terms, &surface, vec3(to_next.x, to_next.y, lobe.x));
     throughput *= next.weight;
-    if !throughput.cmpgt(Vec3::ZERO).any() || !survives(depth, choice.y, &mut throughput) {
+    if !throughput.cmpgt(Vec3::ZERO).any() || !survives(depth, survival.y, &mut throughput) {
         return (false, segment);
     }
     *ray = surface.ray_from(next.direction, hit.triangle_ix, ray, throughput);

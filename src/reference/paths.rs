@@ -15,14 +15,19 @@ pub fn path_of(frame: &Frame, in_batch: u32, sample_ix: u32) -> u32 {
     (in_batch << frame.samples_log2) + sample_ix
 }
 
-/// The frame's sample that a path is.
+/// The index of a path's sample among those of the frame.
 pub fn sample_of_path(frame: &Frame, path_ix: u32) -> u32 {
     path_ix % (1 << frame.samples_log2)
 }
 
+/// The place in the batch of a path's pixel.
+pub fn place_of_path(frame: &Frame, path_ix: u32) -> u32 {
+    path_ix >> frame.samples_log2
+}
+
 /// The window's pixel of a path.
 pub fn pixel_of_path(frame: &Frame, batch: &Batch, path_ix: u32) -> UVec2 {
-    pixel_of(batch.first_pixel + (path_ix >> frame.samples_log2), frame.width, frame.height)
+    pixel_of(batch.first_pixel + place_of_path(frame, path_ix), frame.width, frame.height)
 }
 
 /// What the random numbers of a path depend on. `pixel`: the window's pixel.

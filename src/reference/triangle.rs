@@ -83,7 +83,7 @@ pub(crate) fn axis_last<T: Copy>([x, y, z]: [T; 3], axis: usize) -> [T; 3] {
 
 /// Returns the axis of the component of largest magnitude, the first one of equals. Comparisons with a NaN fail, so
 /// with a NaN it can be a later axis.
-fn longest_axis(v: [f32; 3]) -> usize {
+pub fn longest_axis(v: [f32; 3]) -> usize {
     let [x, y, z] = v.map(f32::abs);
     if x >= y && x >= z {
         0

@@ -88,7 +88,7 @@ impl BandedRenderer {
         Ok(())
     }
 
-    /// Sets the index of the next picture's first sample, a multiple of `2^MOST_SAMPLES_LOG2`. Only frames of paths
+    /// Sets the index of the next picture's first sample, a multiple of `2^SAMPLE_BLOCK_LOG2`. Only frames of paths
     /// know it.
     ///
     /// # Errors
@@ -189,7 +189,7 @@ impl BandedRenderer {
     pub(super) fn draw_band(&mut self, goal: Goal, watcher: &mut impl Watcher) -> Result<Drawn, GpuError> {
         self.renderer.reset_samples();
         let integrator = self.renderer.options().integrator;
-        let mut pacer = Pacer::new(goal, integrator);
+        let mut pacer = Pacer::new(goal, integrator, self.renderer.most_samples_log2());
         let mut drawn = Drawn::default();
         while let Some(log2) = pacer.next(self.renderer.n_samples()) {
             let profile = self.draw_frame(log2, watcher)?;

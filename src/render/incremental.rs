@@ -244,6 +244,12 @@ impl Renderer {
         self.resources.make_room_for_sums(&self.context, self.n_samples.count_ones() - n_joined + 1)
     }
 
+    /// Returns the base-2 logarithm of the most samples that a frame of paths should draw.
+    pub fn most_samples_log2(&self) -> u32 {
+        let constants = self.resources.constants();
+        self.budget.most_samples_log2(self.context.info(), u64::from(constants.width) * u64::from(constants.height))
+    }
+
     /// Sets the number of samples that the next frame of paths draws: `2^log2`, at most `2^MOST_SAMPLES_LOG2`. The
     /// number of samples so far must be a multiple of it. The picture does not depend on it. Other frames draw one.
     ///

@@ -4,9 +4,10 @@
 use std::{mem, sync::Arc};
 
 use crate::{
+    buffers::PathQueue,
     frame::{FrameKind, Integrator, Plan, RenderOptions},
     gpu::{Buffer, BufferUse, Context, DeviceInfo, GpuError, Limits, Timer},
-    layout::{Batch, Bounce, Frame, MOST_SAMPLES_LOG2, PathRay, RAY_GROUP_SIZE, ROUND_BEGIN},
+    layout::{Batch, Bounce, Frame, MOST_SAMPLES_LOG2, PathRay, RAY_GROUP_SIZE, ROUND_BEGIN, SAMPLE_BLOCK_LOG2},
 };
 
 /// Upper limit of the queue's capacity, in rays, unless the caller sets the capacity. This number of rays keeps any
@@ -18,7 +19,7 @@ const MOST_PATHS: u64 = 1 << 24;
 /// The number of paths of a batch on a device without much memory, or on a CPU, which has no use for more.
 const FEW_PATHS: u64 = 1 << 21;
 /// What a path takes in the queue's buffers, bytes.
-const PATH_BYTES: u64 = 140;
+const PATH_BYTES: u64 = PathQueue::BYTES_PER_PATH as u64;
 /// The part of a device's memory that paths may take is 1 / this.
 const MEMORY_PER_PATHS: u64 = 8;
 
@@ -114,6 +115,17 @@ pub struct QueueSizing {
 }
 
 impl QueueSizing {
+    /// Returns the base-2 logarithm of the most samples of each pixel that a frame of paths should draw. A small
+    /// picture gets more of them than a large one, so that each dispatch keeps the device busy. Pictures have the same
+    /// bits whatever it is.
+    pub fn most_samples_log2(&self, info: &DeviceInfo, n_pixels: u64) -> u32 {
+        if info.is_software() || self.fixed_capacity.is_some() {
+            return SAMPLE_BLOCK_LOG2;
+        }
+        let with_room = most_paths(info) / n_pixels.max(1);
+        with_room.max(1).ilog2().clamp(SAMPLE_BLOCK_LOG2, MOST_SAMPLES_LOG2)
+    }
+
     /// Returns the capacity that the queue should have: the caller's, if it is set. Otherwise the rays that the whole
     /// picture is expected to make, but no more than [`MOST_RAYS`] and no more than the device's limits allow.
     pub fn queue_capacity(&self, limits: &Limits, info: &DeviceInfo, constants: &Frame) -> u32 {
@@ -124,7 +136,7 @@ impl QueueSizing {
         if self.of_paths {
             let most = limits.storage_range / size_of::<PathRay>() as u64;
             let most_in_groups = u64::from(limits.n_groups) * u64::from(RAY_GROUP_SIZE) / 2;
-            let wanted = n_pixels << MOST_SAMPLES_LOG2;
+            let wanted = n_pixels << self.most_samples_log2(info, n_pixels);
             return wanted.min(most_paths(info)).min(most).min(most_in_groups).max(1 << MOST_SAMPLES_LOG2) as u32;
         }
         // The largest buffer of the queue is `rays` or `light_visibility`.
@@ -198,6 +210,17 @@ mod tests {
         assert_eq!(capacity(1 << 33, "discrete GPU"), ((1_u64 << 30) / PATH_BYTES) as u32);
         assert_eq!(capacity(1 << 28, "integrated GPU"), 1 << 21);
         assert_eq!(capacity(1 << 40, "CPU"), 1 << 21);
+    }
+
+    #[test]
+    fn small_pictures_get_more_samples_a_frame() {
+        let sizing = QueueSizing { fixed_capacity: None, branches: false, of_paths: true };
+        let samples =
+            |memory_bytes, kind: &str, n_pixels| 1 << sizing.most_samples_log2(&info(memory_bytes, kind), n_pixels);
+        let of_gpu = [1, 1 << 16, 1 << 18, 1 << 20, 1 << 24].map(|n_pixels| samples(1 << 40, "discrete GPU", n_pixels));
+        assert_eq!(of_gpu, [256, 256, 64, 16, 16]);
+        assert_eq!(samples(1 << 28, "integrated GPU", 1 << 16), 32);
+        assert_eq!(samples(1 << 40, "CPU", 1), 16);
     }
 
     #[test]

@@ -6,6 +6,7 @@ use kdray::{
     cpu::{self, Batching},
     frame::{Crop, Denoise, Goal, Integrator, Picture, RenderOptions, sampling::samples_log2},
     gpu::DeviceOverrides,
+    layout::MOST_SAMPLES_LOG2,
     render::{BandedRenderer, Renderer},
     world::FlatScene,
 };
@@ -22,7 +23,7 @@ fn on_device(scene: &FlatScene, options: &RenderOptions, n_samples: u32) -> Pict
     let context = device();
     let mut renderer = Renderer::new(context.clone(), &world_of(scene), options).expect("a renderer");
     while renderer.n_samples() < n_samples {
-        renderer.set_samples_per_frame(samples_log2(renderer.n_samples(), n_samples));
+        renderer.set_samples_per_frame(samples_log2(renderer.n_samples(), n_samples, MOST_SAMPLES_LOG2));
         renderer.draw_sample().expect("samples");
     }
     assert_silent(&context);
@@ -32,7 +33,7 @@ fn on_device(scene: &FlatScene, options: &RenderOptions, n_samples: u32) -> Pict
 fn on_cpu(scene: &FlatScene, options: &RenderOptions, n_samples: u32) -> Picture {
     let mut renderer = cpu::Renderer::new(&world_of(scene), options, Batching::default());
     while renderer.n_samples() < n_samples {
-        renderer.set_samples_per_frame(samples_log2(renderer.n_samples(), n_samples));
+        renderer.set_samples_per_frame(samples_log2(renderer.n_samples(), n_samples, MOST_SAMPLES_LOG2));
         renderer.draw_sample();
     }
     renderer.picture()

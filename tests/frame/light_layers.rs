@@ -8,7 +8,7 @@ use kdray::{
         Crop, Denoise, Goal, Integrator, LightLayers, PathOptions, Picture, RenderOptions, sampling::samples_log2,
     },
     gpu::DeviceOverrides,
-    layout::Material,
+    layout::{MOST_SAMPLES_LOG2, Material},
     render::{BandedRenderer, Renderer},
     world::FlatScene,
 };
@@ -25,7 +25,7 @@ type Layered = (Picture, LightLayers);
 
 fn finish(renderer: &mut Renderer, n_samples: u32) -> Layered {
     while renderer.n_samples() < n_samples {
-        renderer.set_samples_per_frame(samples_log2(renderer.n_samples(), n_samples));
+        renderer.set_samples_per_frame(samples_log2(renderer.n_samples(), n_samples, MOST_SAMPLES_LOG2));
         renderer.draw_sample().expect("samples");
     }
     (renderer.picture().expect("a picture"), renderer.light_layers().expect("layers"))
@@ -46,7 +46,7 @@ fn on_cpu(scene: &FlatScene, options: &RenderOptions, n_samples: u32) -> Layered
 fn on_cpu_in_batches(scene: &FlatScene, options: &RenderOptions, n_samples: u32, batching: Batching) -> Layered {
     let mut renderer = cpu::Renderer::new(&world_of(scene), options, batching);
     while renderer.n_samples() < n_samples {
-        renderer.set_samples_per_frame(samples_log2(renderer.n_samples(), n_samples));
+        renderer.set_samples_per_frame(samples_log2(renderer.n_samples(), n_samples, MOST_SAMPLES_LOG2));
         renderer.draw_sample();
     }
     (renderer.picture(), renderer.light_layers())

@@ -9,7 +9,7 @@ use kdray::{
         sampling::samples_log2,
     },
     gpu::DeviceOverrides,
-    layout::{MATERIAL_MICROFACET, Material},
+    layout::{MATERIAL_MICROFACET, MOST_SAMPLES_LOG2, Material},
     render::{BandedRenderer, Renderer},
     scene::{self, Alpha, Maps, Projection, Texture},
     world::FlatScene,
@@ -26,7 +26,7 @@ fn options(width: u32, height: u32, max_depth: u32) -> RenderOptions {
 /// Draws samples on the device, as many in a frame as the renderer can.
 fn draw(renderer: &mut Renderer, n_samples: u32) -> Picture {
     while renderer.n_samples() < n_samples {
-        renderer.set_samples_per_frame(samples_log2(renderer.n_samples(), n_samples));
+        renderer.set_samples_per_frame(samples_log2(renderer.n_samples(), n_samples, MOST_SAMPLES_LOG2));
         renderer.draw_sample().expect("samples");
     }
     renderer.picture().expect("a picture")
@@ -47,7 +47,7 @@ fn on_cpu(scene: &FlatScene, options: &RenderOptions, n_samples: u32) -> Picture
 fn on_cpu_in_batches(scene: &FlatScene, options: &RenderOptions, n_samples: u32, batching: Batching) -> Picture {
     let mut renderer = cpu::Renderer::new(&world_of(scene), options, batching);
     while renderer.n_samples() < n_samples {
-        renderer.set_samples_per_frame(samples_log2(renderer.n_samples(), n_samples));
+        renderer.set_samples_per_frame(samples_log2(renderer.n_samples(), n_samples, MOST_SAMPLES_LOG2));
         renderer.draw_sample();
     }
     renderer.picture()
@@ -155,9 +155,12 @@ fn the_number_of_samples_in_a_frame_changes_no_bit() {
         renderer.picture().expect("a picture")
     };
     let one_by_one = render(&[0; 53]);
-    for frames in
-        [&[4, 4, 4, 2, 0][..], &[1; 26].iter().chain(&[0]).copied().collect::<Vec<_>>(), &[0, 0, 1, 2, 3, 4, 4, 2, 0]]
-    {
+    for frames in [
+        &[4, 4, 4, 2, 0][..],
+        &[5, 4, 2, 0],
+        &[1; 26].iter().chain(&[0]).copied().collect::<Vec<_>>(),
+        &[0, 0, 1, 2, 3, 4, 4, 2, 0],
+    ] {
         assert!(identical(&one_by_one, &render(frames)), "{frames:?}");
     }
     assert!(!identical(&one_by_one, &on_device(&scene, &options, 52)));

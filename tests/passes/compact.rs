@@ -14,19 +14,24 @@ use kdray::{
 use super::stage::{FIRST, Stage, UNTOUCHED_RAY, UNTOUCHED_WORD, options};
 use crate::support::{compare, meshes, random::Random, scenes};
 
-/// Number of rays whose counts fit in one round of the spine, the prefix sum over workgroups.
+/// Number of rays whose counts fit in one round of the spine, the prefix sum over workgroups, if it has the fewest
+/// invocations.
 const ROUND: u32 = SCAN_GROUP_SIZE * SCAN_GROUP_SIZE * SPINE_ITEMS;
 
-/// Numbers of rays around the size of a workgroup, the number that one invocation of the spine sums, and a round.
-const COUNTS: [u32; 11] = [
+/// Numbers of rays around the size of a workgroup, those whose counts a subgroup of 8 or 32 invocations loads at a time
+/// and in a chunk, and a round.
+const COUNTS: [u32; 14] = [
     0,
     1,
     SCAN_GROUP_SIZE - 1,
     SCAN_GROUP_SIZE,
     SCAN_GROUP_SIZE + 1,
-    SPINE_ITEMS * SCAN_GROUP_SIZE,
-    SPINE_ITEMS * SCAN_GROUP_SIZE + 1,
+    8 * SCAN_GROUP_SIZE,
+    8 * SCAN_GROUP_SIZE + 1,
     5000,
+    8 * SPINE_ITEMS * SCAN_GROUP_SIZE,
+    8 * SPINE_ITEMS * SCAN_GROUP_SIZE + 1,
+    32 * SPINE_ITEMS * SCAN_GROUP_SIZE + 1,
     ROUND - 1,
     ROUND,
     ROUND + 1,

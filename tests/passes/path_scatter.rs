@@ -48,29 +48,29 @@ fn as_ray(segment: &Segment) -> PathRay {
 /// them. Returns how many have a segment to a light, and how many go on.
 fn check(stage: &PathStage, depth: u32, n: u32) -> (usize, u32) {
     let (rays, hits) = stage.rays_and_hits();
-    let paths = stage.paths();
+    let (paths, n_all) = (stage.paths(), rays.len());
     let mut random = Random(5);
     let live: Vec<u32> = (0..n).collect();
-    let states: Vec<_> = (0..1200)
+    let states: Vec<_> = (0..n_all)
         .map(|ix| PathState { radiance: random.in_box(Vec3::ZERO, Vec3::ONE), density: (ix % 2) as f32 })
         .collect();
     let mut list = live.clone();
-    list.resize(3600, u32::MAX);
-    list.copy_within(..1200, 1200);
+    list.resize(3 * n_all, u32::MAX);
+    list.copy_within(..n_all, n_all);
     let mut rows = vec![(0, 0); depth as usize];
     rows.push((n, 0));
     stage.set_n_paths(&rows);
     stage.resources.queue.rays.upload(&rays).expect("rays");
     stage.resources.queue.hits.upload(&hits).expect("hits");
-    stage.resources.queue.child_kinds.upload(&[UNTOUCHED_WORD; 1200]).expect("child_kinds");
+    stage.resources.queue.child_kinds.upload(&vec![UNTOUCHED_WORD; n_all]).expect("child_kinds");
     paths.path_states.upload(&states).expect("path_states");
-    paths.segments.upload(&[NO_SEGMENT; 1200]).expect("segments");
+    paths.segments.upload(&vec![NO_SEGMENT; n_all]).expect("segments");
     paths.live_paths.upload(&list).expect("live_paths");
     let batch = Batch { n_pixels: 1200, bounce_ix: depth, depth, ..FIRST };
     stage.run(|commands| stage.passes.path_scatter.record(commands, &stage.resources, &batch));
 
-    let (mut rays, mut states, mut segments) = (rays, states, vec![NO_SEGMENT; 1200]);
-    let mut kinds = vec![UNTOUCHED_WORD; 1200];
+    let (mut rays, mut states, mut segments) = (rays, states, vec![NO_SEGMENT; n_all]);
+    let mut kinds = vec![UNTOUCHED_WORD; n_all];
     let mut blocks = vec![[0; 2]; n.div_ceil(SCAN_GROUP_SIZE) as usize];
     let buffers = PathBuffers { rays: &mut rays, states: &mut states, segments: &mut segments };
     let counts = (&mut kinds[..n as usize], &mut blocks[..]);
@@ -92,6 +92,14 @@ fn check(stage: &PathStage, depth: u32, n: u32) -> (usize, u32) {
     compare::pixels(1e-3, n_outliers, &pixels(&states), &pixels(&found)).unwrap();
     let n_lit = segments.iter().filter(|segment| segment.state != SEGMENT_NONE).count();
     (n_lit, blocks.iter().map(|[n_going_on, _]| n_going_on).sum())
+}
+
+/// Paths of one pixel have the random numbers of different samples.
+#[test]
+fn agrees_for_several_samples() {
+    let stage = PathStage::new(scenes::mixed(), 2);
+    let (n_lit, n_going_on) = check(&stage, 1, 4800);
+    assert!(n_lit > 800 && n_going_on > 2000, "{n_lit} lit, {n_going_on} go on");
 }
 
 #[test]

@@ -43,10 +43,19 @@ impl PathStage {
         Self::with_options(scene, samples_log2, &RenderOptions { denoise, light_layers: true, ..Default::default() })
     }
 
+    /// Makes the same stage on another device.
+    pub fn on(context: Arc<Context>, scene: FlatScene, samples_log2: u32) -> Self {
+        let options = RenderOptions { denoise: Denoise::Off, ..RenderOptions::default() };
+        Self::on_with_options(context, scene, samples_log2, &options)
+    }
+
     fn with_options(scene: FlatScene, samples_log2: u32, options: &RenderOptions) -> Self {
+        Self::on_with_options(device(), scene, samples_log2, options)
+    }
+
+    fn on_with_options(context: Arc<Context>, scene: FlatScene, samples_log2: u32, options: &RenderOptions) -> Self {
         let (integrator, max_depth) = (Integrator::Path, 3);
         let options = RenderOptions { width: 40, height: 30, integrator, max_depth, ..options.clone() };
-        let context = device();
         let world = World::of_flat(scene, &BuildOptions::default()).expect("a world");
         let mut constants = Frame { queue_capacity: 1200 << samples_log2, ..world.frame_constants(&options) };
         constants.samples_log2 = samples_log2;

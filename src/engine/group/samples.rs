@@ -6,11 +6,11 @@ use super::{Member, RendererGroup, remove_failed, share};
 use crate::{
     frame::{Drawn, Goal, Picture, Profile, SampleRange, SampleSums, Watcher},
     gpu::GpuError,
-    layout::MOST_SAMPLES_LOG2,
+    layout::SAMPLE_BLOCK_LOG2,
 };
 
-/// Number of samples of a unit of work: those that a frame of paths draws at most.
-pub const UNIT: u32 = 1 << MOST_SAMPLES_LOG2;
+/// Number of samples of a unit of work.
+pub const UNIT: u32 = 1 << SAMPLE_BLOCK_LOG2;
 
 impl RendererGroup {
     /// Draws a picture from samples of all pixels.

@@ -38,20 +38,26 @@ use crate::layout::{EMITTER_AREA, EMITTER_LIGHT, EMITTER_SUN, EMITTER_TREE, EMIT
 /// The share of the way to a light within which another light hides it. What is beyond counts as the light itself.
 pub const LIGHT_HIDES_UP_TO: f32 = 0.9999;
 
-/// Picks a direction from which light may come to a point. `u` is in [0, 1), and `u.x` selects the emitter. What hides
-/// the light is not asked, except for rectangles, disks and spheres, which only [`seen_light`] knows.
+/// Picks a direction from which light may come to a point. `u` is in [0, 1), and `u.x` selects the emitter. Occluders
+/// are ignored, except for rectangles, disks and spheres, which only [`seen_light`] knows.
 pub fn pick_light(inputs: &KernelInputs, point_world: Vec3, u: Vec3) -> LightPick {
-    unhidden(inputs, point_world, pick_emitter(inputs, point_world, u, None))
+    pick_light_with(inputs, point_world, u, None)
 }
 
-/// Returns a pick, or none if a rectangle, disk or sphere that shines is before it.
-pub fn unhidden(inputs: &KernelInputs, point_world: Vec3, pick: LightPick) -> LightPick {
+/// Does what [`pick_light`] does. `of_environment`: what [`pick_environment`] returns for `u.yz`, if it is known
+/// already.
+pub fn pick_light_with(
+    inputs: &KernelInputs,
+    point_world: Vec3,
+    u: Vec3,
+    of_environment: Option<&LightPick>,
+) -> LightPick {
+    let pick = pick_emitter(inputs, point_world, u, of_environment);
     let before = seen_light(inputs, point_world, pick.direction, LIGHT_HIDES_UP_TO * pick.distance);
     if before.t.is_infinite() { pick } else { LightPick::NONE }
 }
 
-/// Picks as [`pick_light`] does. What hides the light is not asked at all. `of_environment`: what [`pick_environment`]
-/// returns for `u.yz`, if it is known already.
+/// Picks as [`pick_light_with`] does. All occluders are ignored.
 pub fn pick_emitter(
     inputs: &KernelInputs,
     point_world: Vec3,
