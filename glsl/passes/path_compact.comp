@@ -3,7 +3,8 @@
 #extension GL_KHR_shader_subgroup_arithmetic : require
 // Path compact: one invocation per path of the bounce, in workgroups of SCAN_GROUP_SIZE. Two lists are written for the
 // next bounce, in order and without gaps: the paths that go on, and the paths that have a segment to a light.
-// Reads child_kinds (what the path at a place of the bounce's list does), scan_blocks, bounces; updates live_paths.
+// Reads child_kinds (whether the path at a place of the bounce's list goes on and has a segment), scan_blocks, bounces;
+// updates live_paths.
 #include "layout.glsl"
 #include "paths.glsl"
 #include "scan.glsl"

@@ -3,8 +3,8 @@
 #extension GL_KHR_shader_subgroup_arithmetic : require
 // Path scatter: one invocation per path that is alive at the bounce. It adds the light that the path's ray meets,
 // samples a light at the hit, to which the next dispatch of path_trace.comp traces a segment, and samples the direction
-// in which the path goes on. Each workgroup counts those of its SCAN_GROUP_SIZE paths that go on, and those
-// that have a segment.
+// in which the path goes on. Each workgroup counts those of its SCAN_GROUP_SIZE paths that go on, and those that have a
+// segment.
 // Reads hits, live_paths, bounces and the scene; updates rays and path_states; writes segments, child_kinds (whether
 // the path at a place of the list goes on and has a segment) and scan_blocks[workgroup].
 #include "layout.glsl"

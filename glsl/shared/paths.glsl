@@ -1,9 +1,9 @@
 // The paths of a batch. Each path has a fixed place in the buffers. The samples of a pixel follow each other, because
 // their rays have much in common: they meet the same parts of the tree and the same materials. Lists of indices say
-// which paths are alive at a bounce. Twin of src/reference/paths.rs.
+// which paths are alive at a bounce, and which have a segment. Twin of src/reference/paths.rs.
 //
-// Needs nothing. Provides the push constants `batch`, `list_of`, `list_of_segments`, `path_of`, `sample_of_path`,
-// `pixel_of_path` and `key_of_path`.
+// Needs nothing. Provides `list_of`, `list_of_segments`, `path_of`, `sample_of_path`, `pixel_of_path`, `key_of_path`
+// and the push constants `batch`.
 #ifndef KDRAY_PATHS
 #define KDRAY_PATHS
 

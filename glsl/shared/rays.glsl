@@ -1,7 +1,7 @@
 // The rays of the batch, in the queue. Camera rays come first, one per pixel. They are not stored: their indices
 // define them, and to compute them is faster than to load them. In frames of paths, all rays are stored, and a pixel
-// has 2^samples_log2 of them. Needs nothing before it; provides the push constants `batch`, `pixel_of_ray`,
-// `first_ray_of` and `ray_at`.
+// has 2^samples_log2 of them. Needs nothing before it; provides `pixel_of_ray`, `first_ray_of`, `ray_at`
+// and the push constants `batch`.
 #ifndef KDRAY_RAYS
 #define KDRAY_RAYS
 

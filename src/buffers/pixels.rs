@@ -90,7 +90,8 @@ impl Pixels {
     /// does not grow with the picture.
     pub fn bytes_per_pixel_of_paths(n_samples: u32) -> u64 {
         let blocks = n_samples >> SAMPLE_BLOCK_LOG2;
-        // If a frame is a block: the sums before the last one, one for each bit of their number, and that of the last.
+        // If each frame draws one block, there is a sum for each bit of the number of blocks before the last one, and
+        // one more for the last.
         let n_sums = u64::from(blocks.saturating_sub(1).checked_ilog2().map_or(0, |log2| log2 + 1) + 1);
         (1 + n_sums) * size_of::<[f32; 4]>() as u64 + size_of::<u32>() as u64
     }

@@ -1,7 +1,7 @@
 //! The picks of sixteen directions of the environment's map. They are those of the reference's `pick_environment`, bit
 //! for bit.
 
-use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16, prelude::*};
+use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 use glam::{Vec2, vec3};
 
 use super::{
@@ -14,7 +14,7 @@ use crate::{
     world::{AliasEntry, Emitters, EnvironmentMap},
 };
 
-/// What sixteen picks from alias tables return.
+/// The results of sixteen picks from alias tables.
 struct AliasPicks<S: Simd> {
     /// The indices of the entries, as floats.
     ix: f32x16<S>,
@@ -47,7 +47,7 @@ fn below_tent<S: Simd>(u: f32x16<S>) -> f32x16<S> {
     u.simd_lt(0.5).select((u * 2.0).sqrt() - 1.0, 1.0 - ((1.0 - u) * 2.0).sqrt())
 }
 
-/// Places in the map, and directions.
+/// Sixteen places in the map, and the directions that belong to them.
 struct Places {
     right: [f32; LANES],
     down: [f32; LANES],
@@ -64,7 +64,7 @@ fn places<S: Simd>(simd: S, map: &EnvironmentMap, [ux, uy]: [&[f32; LANES]; 2]) 
         *first = row_ix as u32 * n_columns;
     }
     let column = pick_alias(&map.columns, &first_columns, n_columns, f32x16::load_array_ref(simd, uy));
-    let is_above: mask32x16<S> = row.rest.simd_lt(0.5);
+    let is_above = row.rest.simd_lt(0.5);
     let is_last = row.ix.simd_eq((n_rows - 1) as f32);
     let is_at_pole = (is_above & row.ix.simd_eq(0.0)) | (!is_above & is_last);
     let down = row.ix + is_at_pole.select(row.rest - 0.5, below_tent(row.rest));
@@ -103,6 +103,8 @@ pub fn environment_picks(
 mod tests {
     use std::path::Path;
 
+    use glam::Vec3;
+
     use super::*;
     use crate::{
         accel::kdtree::BuildOptions,
@@ -111,9 +113,9 @@ mod tests {
         world::{FlatScene, World},
     };
 
-    /// A world whose environment has a map at random, with black texels, and perhaps a sun.
+    /// Returns a world with an environment map of random and black texels, and with a sun if `has_sun` is set.
     fn world(size: [u32; 2], has_sun: bool, random: &mut Uniform) -> World {
-        let colour = |i: u32| if i % 5 == 2 { glam::Vec3::ZERO } else { 3.0 * random.point() };
+        let colour = |i: u32| if i % 5 == 2 { Vec3::ZERO } else { 3.0 * random.point() };
         let colours = (0..size[0] * size[1]).map(colour).collect();
         let (environment, _) = Environment::new(size, colours, (70.0, 1.0)).expect("an environment");
         let (towards, irradiance) = (vec3(0.3, 1.0, 0.2).normalize(), vec3(1.0, 2.0, 3.0));

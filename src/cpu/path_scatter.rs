@@ -39,7 +39,7 @@ const BLOCK_SIZE: usize = SCAN_GROUP_SIZE as usize;
 /// The number of paths from which on it is faster to take their steps together.
 const LEAST_GROUP: usize = 4;
 
-/// What is decided at random at the hits of a group of paths.
+/// The random decisions at the hits of a group of paths.
 #[derive(Default)]
 struct GroupChoices {
     pairs: [PairsSoa; PAIRS_OF_HIT],
@@ -172,8 +172,8 @@ impl BounceOfPaths<'_> {
         kind_of_path(goes_on, segment.state != SEGMENT_NONE)
     }
 
-    /// Returns what is decided at random at the hits of a group of paths. The last ray of a path only meets light, so
-    /// that there is nothing to pick at its hit.
+    /// Makes the random decisions at the hits of a group of paths. The last ray of a path only meets light, so that no
+    /// light is picked at its hit.
     fn choices_of(&self, group: &[(usize, u32)]) -> GroupChoices {
         let mut keys = KeysSoa::default();
         for (lane, &(_, path_ix)) in group.iter().enumerate() {

@@ -16,7 +16,7 @@ use crate::{
 /// The three pipelines of the pass.
 pub struct Compact {
     reduce: ComputePipeline,
-    spine: Spine,
+    pub(super) spine: Spine,
     scatter: ComputePipeline,
 }
 
@@ -37,11 +37,6 @@ impl Compact {
     /// number of each block's children in `scan_blocks`.
     pub fn reduce(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         commands.dispatch(&self.reduce, Some(batch.depth), batch, resources.scan_dispatch(batch));
-    }
-
-    /// Does what [`Spine::record`] does.
-    pub fn spine(&self, commands: &Commands, batch: &Batch) {
-        self.spine.record(commands, batch);
     }
 
     /// Needs `rays` and `hits` of the bounce, `child_kinds`, `scan_blocks` and the next bounce's row of `bounces`.

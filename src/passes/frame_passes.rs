@@ -161,7 +161,7 @@ impl PathPasses {
             Pass::PathBegin => self.path_begin.record(commands, resources, batch),
             Pass::PathTrace => self.path_trace.record(commands, resources, batch),
             Pass::PathScatter => self.path_scatter.record(commands, resources, batch),
-            Pass::CompactSpine => self.path_compact.spine(commands, batch),
+            Pass::CompactSpine => self.path_compact.spine.record(commands, batch),
             Pass::PathCompact => self.path_compact.record(commands, resources, batch),
             Pass::PathLayers => {
                 self.path_layers.as_ref().expect("the options ask for layers of light").record(commands, batch);

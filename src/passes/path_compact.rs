@@ -12,7 +12,7 @@ use crate::{
 
 /// The pipelines of the pass and of the prefix sum.
 pub struct PathCompact {
-    spine: Spine,
+    pub(super) spine: Spine,
     list: ComputePipeline,
 }
 
@@ -25,12 +25,8 @@ impl PathCompact {
         Ok(Self { spine: Spine::new(context, bindings)?, list: kernel("path_compact", spirv!("path_compact.comp"))? })
     }
 
-    /// Does what [`Spine::record`] does.
-    pub fn spine(&self, commands: &Commands, batch: &Batch) {
-        self.spine.record(commands, batch);
-    }
-
-    /// Needs `child_kinds`, `scan_blocks` and the list of this bounce in `live_paths`. Leaves that of the next bounce.
+    /// Needs `child_kinds`, `scan_blocks` and the list of this bounce in `live_paths`. Leaves that of the next bounce
+    /// and that of the segments.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         commands.dispatch(&self.list, Some(batch.depth), batch, resources.scan_dispatch(batch));
     }

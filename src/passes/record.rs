@@ -48,7 +48,7 @@ impl Passes {
             Pass::Trace => self.trace.record(commands, resources, batch),
             Pass::Features => self.features.record(commands, batch),
             Pass::CompactReduce => self.compact.reduce(commands, resources, batch),
-            Pass::CompactSpine => self.compact.spine(commands, batch),
+            Pass::CompactSpine => self.compact.spine.record(commands, batch),
             Pass::CompactScatter => self.compact.scatter(commands, resources, batch),
             Pass::Shadow => self.shadow.record(commands, resources, batch),
             Pass::Shade => self.shade.record(commands, resources, batch),

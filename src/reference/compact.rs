@@ -51,6 +51,23 @@ pub fn exclusive_prefix_sum(numbers: &mut [u32]) -> u32 {
     carry
 }
 
+/// Cuts a list into the places of each block. The last block gets the rest of the list. `begin_of`: returns from a
+/// block's element of `scan_blocks` where the block's places begin.
+pub(super) fn places_of_blocks<'a, B, T>(
+    scan_blocks: &[B],
+    begin_of: impl Fn(&B) -> u32,
+    mut list: &'a mut [T],
+) -> Vec<&'a mut [T]> {
+    let place_of = |block: usize| {
+        let begin = begin_of(&scan_blocks[block]);
+        let n_places = scan_blocks.get(block + 1).map_or(list.len(), |next| (begin_of(next) - begin) as usize);
+        let (places, rest) = std::mem::take(&mut list).split_at_mut(n_places);
+        list = rest;
+        places
+    };
+    (0..scan_blocks.len()).map(place_of).collect()
+}
+
 fn size_next_bounce(n_wanted: u32, constants: &Frame, this: &Bounce, next: &mut Bounce) {
     let first_ray = this.first_ray + this.n_rays;
     let n_rays = if n_wanted <= constants.queue_capacity.saturating_sub(first_ray) { n_wanted } else { 0 };
@@ -70,14 +87,7 @@ pub fn scatter(
     first_children: &mut [u32],
     next_rays: &mut [PathRay],
 ) {
-    let mut places = Vec::with_capacity(scan_blocks.len());
-    let mut rest = next_rays;
-    for (block, &begin) in scan_blocks.iter().enumerate() {
-        let end = scan_blocks.get(block + 1).map_or(begin as usize + rest.len(), |&end| end as usize);
-        let (place, behind) = rest.split_at_mut(end - begin as usize);
-        places.push(place);
-        rest = behind;
-    }
+    let places = places_of_blocks(scan_blocks, |begin| *begin, next_rays);
     (parents.rays.par_chunks(BLOCK).zip(parents.hits.par_chunks(BLOCK)).zip(child_kinds.par_chunks(BLOCK)))
         .zip(first_children.par_chunks_mut(BLOCK).zip(scan_blocks).zip(places))
         .with_min_len(BLOCKS_PER_TASK)

@@ -3,6 +3,7 @@
 
 use rayon::prelude::*;
 
+use super::compact::places_of_blocks;
 use crate::layout::{Bounce, Frame, PATH_GOES_ON, PATH_HAS_SEGMENT, SCAN_GROUP_SIZE};
 
 /// The fewest blocks that one thread takes at a time.
@@ -42,24 +43,12 @@ pub fn path_compact(
 ) {
     let block_size = SCAN_GROUP_SIZE as usize;
     let blocks = (live.par_chunks(block_size), child_kinds.par_chunks(block_size));
-    let places = (places_of_blocks(scan_blocks, 0, next), places_of_blocks(scan_blocks, 1, with_segment));
+    let places_in_next = places_of_blocks(scan_blocks, |begins| begins[0], next);
+    let places = (places_in_next, places_of_blocks(scan_blocks, |begins| begins[1], with_segment));
     blocks.into_par_iter().zip(places).with_min_len(BLOCKS_PER_TASK).for_each(|((live, kinds), places)| {
         for (places, bit) in [(places.0, PATH_GOES_ON), (places.1, PATH_HAS_SEGMENT)] {
             let listed = live.iter().zip(kinds).filter(|(_, kind)| **kind & bit != 0);
             listed.zip(places).for_each(|((path_ix, _), place)| *place = *path_ix);
         }
     });
-}
-
-/// Cuts a list into the places of each block. The last block gets the rest of the list. `which`: the count of the
-/// blocks that belongs to the list.
-fn places_of_blocks<'a>(scan_blocks: &[[u32; 2]], which: usize, mut list: &'a mut [u32]) -> Vec<&'a mut [u32]> {
-    let place_of = |block: usize| {
-        let begin = scan_blocks[block][which];
-        let n_places = scan_blocks.get(block + 1).map_or(list.len(), |next| (next[which] - begin) as usize);
-        let (places, rest) = std::mem::take(&mut list).split_at_mut(n_places);
-        list = rest;
-        places
-    };
-    (0..scan_blocks.len()).map(place_of).collect()
 }

@@ -18,10 +18,9 @@ pub struct PathBuffers<'a> {
     pub segments: &'a mut [Segment],
 }
 
-/// Takes the paths `live` one step further. Writes whether the path at each place of the list goes on and has a segment
-/// (`child_kinds`), and how many of each block of `SCAN_GROUP_SIZE` places do the one and the other
-/// (`scan_blocks`). `live` is in ascending
-/// order.
+/// Takes the paths `live` one step further. Writes whether the path at each place of the list goes on and has a
+/// segment (`child_kinds`). Counts both in each block of `SCAN_GROUP_SIZE` places (`scan_blocks`). `live` is in
+/// ascending order.
 pub fn path_scatter(
     inputs: &KernelInputs,
     batch: &Batch,

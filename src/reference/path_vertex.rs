@@ -29,7 +29,7 @@ pub fn first_pair_of(depth: u32) -> u32 {
     PAIRS_OF_CAMERA + PAIRS_OF_HIT as u32 * depth
 }
 
-/// What is decided at random at a hit.
+/// The random decisions at a hit.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct HitChoices {
     pub pairs: [Vec2; PAIRS_OF_HIT],
@@ -146,8 +146,8 @@ fn survives(depth: u32, u: f32, throughput: &mut Vec3) -> bool {
 }
 
 /// Adds the light that the path's ray meets to its state, samples a light at the hit, and replaces the ray by the one
-/// with which the path goes on. Returns whether it does, and the segment to the light. `choices` is called if something
-/// is decided at random.
+/// with which the path goes on. Returns whether it does, and the segment to the light. `choices` is called if the
+/// path makes random decisions.
 pub fn step_path(
     inputs: &KernelInputs,
     choices: impl FnOnce() -> HitChoices,

@@ -18,8 +18,8 @@ use crate::support::{compare, meshes, random::Random, scenes};
 /// invocations.
 const ROUND: u32 = SCAN_GROUP_SIZE * SCAN_GROUP_SIZE * SPINE_ITEMS;
 
-/// Numbers of rays around the size of a workgroup, those whose counts a subgroup of 8 or 32 invocations loads at a time
-/// and in a chunk, and a round.
+/// Numbers of rays near the bounds of the kernels' loops: a workgroup, the rays whose counts a subgroup of 8
+/// invocations loads at a time, the chunks of a subgroup of 8 and of 32 invocations, and a round.
 const COUNTS: [u32; 14] = [
     0,
     1,

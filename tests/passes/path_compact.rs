@@ -1,5 +1,5 @@
-//! Tests of the prefix sum over paths and of the kernel path_compact: the lists of the paths that go on
-//! and of those with a segment.
+//! Tests of the prefix sum over paths and of the kernel path_compact: the lists of the paths that go on and of those
+//! with a segment.
 
 use kdray::{
     frame::{Pass, Step, Touch},
@@ -20,8 +20,8 @@ const CAPACITY: usize = 1200 << 7;
 /// Number of paths whose counts fit in one round of the spine, if it has the fewest invocations.
 const ROUND: usize = (SCAN_GROUP_SIZE * SCAN_GROUP_SIZE * SPINE_ITEMS) as usize;
 
-/// Compacts `n` paths, of which these shares go on and have a segment, by the kernels and by their twin, and compares
-/// them.
+/// Compacts `n` paths by the kernels and by their twin, and compares the results. The array has the share of the paths
+/// that go on, and the share of those with a segment.
 fn check(stage: &PathStage, n: usize, [going_on, with_segment]: [f32; 2], random: &mut Random) {
     let kind = |random: &mut Random| kind_of_path(random.unit() < going_on, random.unit() < with_segment);
     let kinds: Vec<u32> = (0..n).map(|_| kind(random)).collect();
@@ -55,7 +55,7 @@ fn check(stage: &PathStage, n: usize, [going_on, with_segment]: [f32; 2], random
     let found = paths.live_paths.download().expect("live_paths");
     compare::exact(&going_on, &found[..CAPACITY]).unwrap();
     compare::exact(&with_segment, &found[2 * CAPACITY..]).unwrap();
-    // The twin itself lists what the kinds say.
+    // The twin's lists are those that follow from the kinds.
     let lists = [(PATH_GOES_ON, next.n_rays, going_on), (PATH_HAS_SEGMENT, this.n_segments, with_segment)];
     for (bit, n_listed, list) in lists {
         let of_kind = live.iter().zip(&kinds).filter(|(_, kind)| **kind & bit != 0);
