@@ -8,12 +8,7 @@ use kdray::{
     accel::{Query, kdtree::Traversal},
     cast::{Caster, CpuCaster, Hit, NO_TRIANGLE, Ray},
     layout::{TRIANGLE_HIDDEN, Triangle},
-    reference::{
-        brute,
-        search_ray::SearchRay,
-        traversal_ray::hit_from_near,
-        traverser::{Tracer, Traverser},
-    },
+    reference::{brute, search_ray::SearchRay, traversal_ray::hit_from_near, traverser::Traverser},
 };
 use support::{MeshWithTree, compare, device, meshes, random::Random, rays::nasty_ray};
 

@@ -3,6 +3,7 @@
 
 mod support;
 
+use fearless_simd::Level;
 use glam::{Vec3, vec3};
 use kdray::{
     accel::{
@@ -22,6 +23,7 @@ use support::{
     MeshWithTree, assert_silent,
     compare::first_difference,
     device, meshes,
+    packets::check_one_by_one,
     random::Random,
     rays::{N_KINDS, nasty_ray, outward_ray, ray},
 };
@@ -113,6 +115,7 @@ fn check_against_brute_force(mesh: &MeshWithTree, world: &MeshWithTree, rays: &[
         let difference = first_difference(rays, &expected, &traced(&world.inputs(), traversal, rays));
         assert_eq!(difference, None, "{traversal}, {:?}", world.tree().bounds());
     }
+    check_one_by_one(world, Level::new(), rays, &expected);
 }
 
 /// The origins are near the mesh, at all distances, and at distances just below that from which rays are moved. There,
@@ -158,6 +161,7 @@ fn rays_from_inside_never_leak() {
             let hits = traced(&world.inputs(), traversal, &rays);
             let n_leaks = hits.iter().filter(|hit| hit.t > 4.0 * scale).count();
             assert_eq!(n_leaks, 0, "{traversal}, ground of {half}");
+            check_one_by_one(&world, Level::new(), &rays, &hits);
         }
     }
 }

@@ -1,5 +1,5 @@
-//! Compares sixteen rays together, with each instruction set that the machine has, with one ray after the other. The
-//! hits are the same, bit for bit.
+//! Compares sixteen rays together, or one ray with sixteen boxes or triangles, with one ray that does one thing after
+//! the other, with each instruction set that the machine has. The hits are the same, bit for bit.
 
 mod support;
 
@@ -14,13 +14,13 @@ use kdray::{
     reference::{
         search_ray::SearchRay,
         traversal_ray::{TraversalRay, signs_of},
-        traverser::{Tracer, Traverser},
+        traverser::Traverser,
         triangle::{Shear, longest_axis},
     },
 };
 use support::{
     MeshWithTree, meshes,
-    packets::{levels, traced},
+    packets::{check_one_by_one, levels, traced},
     random::Random,
     rays::nasty_ray,
 };
@@ -128,6 +128,7 @@ fn every_set_of_instructions_finds_the_same() {
             let any = traced::<true>(&world, level, &rays);
             let is_hit = |hit: &Hit| hit.triangle_ix != NO_TRIANGLE;
             assert!(any.iter().map(is_hit).eq(expected.iter().map(is_hit)), "{level:?}");
+            check_one_by_one(&world, level, &rays, &expected);
         }
     }
 }

@@ -2,6 +2,7 @@
 
 mod support;
 
+use fearless_simd::Level;
 use glam::{Vec3, vec3};
 use kdray::{
     accel::{
@@ -24,6 +25,7 @@ use support::{
     MeshWithTree,
     compare::first_difference,
     meshes,
+    packets::check_one_by_one,
     random::Random,
     rays::{nasty_ray, outward_ray, ray},
 };
@@ -42,7 +44,11 @@ fn rays_at(world: &MeshWithTree) -> Vec<PathRay> {
 /// Returns the hits that the engine finds for rays together. They must be the reference's, bit for bit, and any-hit
 /// queries must hit with the same rays.
 fn traced(world: &MeshWithTree, traversal: Traversal, rays: &[PathRay]) -> Vec<Hit> {
-    traced_through(&world.inputs(), traversal, rays)
+    let hits = traced_through(&world.inputs(), traversal, rays);
+    if traversal == Traversal::Stack {
+        check_one_by_one(world, Level::new(), rays, &hits);
+    }
+    hits
 }
 
 fn traced_through(bindings: &KernelInputs, traversal: Traversal, rays: &[PathRay]) -> Vec<Hit> {
@@ -84,6 +90,7 @@ fn finds_what_brute_force_finds() {
     check_against_brute_force("cube", meshes::cube(9, 0.0));
     check_against_brute_force("sphere", meshes::cube(10, 1.0));
     check_against_brute_force("threefold", meshes::threefold(meshes::torus(20, 10)));
+    check_against_brute_force("stacked", vec![meshes::triangle(Vec3::X, Vec3::Y, Vec3::Z); 300]);
     check_against_brute_force("soup", meshes::soup(1200, 7));
     check_against_brute_force("tiny", meshes::placed(meshes::torus(40, 20), 1e-6, Vec3::ZERO));
     check_against_brute_force("far", meshes::placed(meshes::torus(40, 20), 0.3, vec3(1000.0, -70.0, 3.0)));
@@ -257,6 +264,9 @@ fn rays_from_afar_hit_the_same() {
 #[test]
 fn nothing_is_hit_in_an_empty_world() {
     let world = MeshWithTree::new(Vec::new());
-    let hits = traced(&world, Traversal::Mask, &[ray(Vec3::ZERO, Vec3::X), ray(Vec3::ONE, Vec3::NEG_ONE.normalize())]);
-    assert!(hits.iter().all(|hit| hit.triangle_ix == NO_TRIANGLE && hit.t == f32::INFINITY));
+    let rays = [ray(Vec3::ZERO, Vec3::X), ray(Vec3::ONE, Vec3::NEG_ONE.normalize())];
+    for traversal in tree_traversals() {
+        let hits = traced(&world, traversal, &rays);
+        assert!(hits.iter().all(|hit| hit.triangle_ix == NO_TRIANGLE && hit.t == f32::INFINITY));
+    }
 }

@@ -47,16 +47,16 @@ void add_path(inout Guide guide, uvec2 pixel, uint path_ix) {
 }
 
 void main() {
-    uint in_batch = gl_GlobalInvocationID.x;
-    if (in_batch >= batch.n_pixels) return;
-    uvec2 pixel = pixel_of_path(path_of(in_batch, 0u));
+    uint place = gl_GlobalInvocationID.x;
+    if (place >= batch.n_pixels) return;
+    uvec2 pixel = pixel_at(place);
     uint pixel_ix = pixel_ix_of(pixel), n_of_frame = 1u << frame.samples_log2;
     uint n_earlier = frame.n_samples - n_of_frame;
     Guide guide = Guide(vec3(0.0), 0u, vec3(0.0), 0.0, vec3(0.0), 0.0, vec3(0.0), 0u);
     if (n_earlier > 0u) guide = pixel_guides[pixel_ix];
     for (uint sample_ix = 0u; sample_ix < n_of_frame; ++sample_ix) {
         bool is_new = n_earlier + sample_ix >= guide.n_samples;
-        if (is_new) add_path(guide, pixel, path_of(in_batch, sample_ix));
+        if (is_new) add_path(guide, pixel, path_of(place, sample_ix));
     }
     pixel_guides[pixel_ix] = guide;
 }

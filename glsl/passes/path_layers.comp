@@ -15,12 +15,12 @@ layout(std430, set = 0, binding = BIND_PATH_SNAPSHOTS) buffer PathSnapshotsBlock
 layout(std430, set = 0, binding = BIND_PIXEL_RADIANCE) writeonly buffer PixelRadianceBlock { vec4 pixel_radiance[]; };
 
 void main() {
-    uint in_batch = gl_GlobalInvocationID.x;
-    if (in_batch >= batch.n_pixels) return;
+    uint place = gl_GlobalInvocationID.x;
+    if (place >= batch.n_pixels) return;
     uint layer_ix = min(batch.depth, LIGHT_LAYERS - 1u);
     uint n_samples = 1u << frame.samples_log2;
     for (uint sample_ix = 0u; sample_ix < n_samples; ++sample_ix) {
-        uint path_ix = path_of(in_batch, sample_ix);
+        uint path_ix = path_of(place, sample_ix);
         vec3 radiance = path_states[path_ix].xyz;
         vec3 before = layer_ix == 0u ? vec3(0.0) : path_snapshots[path_ix].xyz;
         add_sample(sample_ix, vec4(radiance - before, 1.0));
@@ -28,5 +28,5 @@ void main() {
     }
     uint n_pixels = frame.width * frame.height;
     uint layer_begin = (1u + layer_ix) * n_pixels;
-    pixel_radiance[layer_begin + pixel_ix_of(pixel_of_path(path_of(in_batch, 0u)))] = sample_sums[frame.samples_log2];
+    pixel_radiance[layer_begin + pixel_ix_of(pixel_at(place))] = sample_sums[frame.samples_log2];
 }

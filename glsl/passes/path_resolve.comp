@@ -13,12 +13,12 @@ layout(std430, set = 0, binding = BIND_PATH_STATES) readonly buffer PathStatesBl
 layout(std430, set = 0, binding = BIND_PIXEL_RADIANCE) writeonly buffer PixelRadianceBlock { vec4 pixel_radiance[]; };
 
 void main() {
-    uint in_batch = gl_GlobalInvocationID.x;
-    if (in_batch >= batch.n_pixels) return;
+    uint place = gl_GlobalInvocationID.x;
+    if (place >= batch.n_pixels) return;
     uint n_samples = 1u << frame.samples_log2;
     for (uint sample_ix = 0u; sample_ix < n_samples; ++sample_ix) {
-        vec3 radiance = path_states[path_of(in_batch, sample_ix)].xyz;
+        vec3 radiance = path_states[path_of(place, sample_ix)].xyz;
         add_sample(sample_ix, vec4(radiance, squared_luminance(radiance)));
     }
-    pixel_radiance[pixel_ix_of(pixel_of_path(path_of(in_batch, 0u)))] = sample_sums[frame.samples_log2];
+    pixel_radiance[pixel_ix_of(pixel_at(place))] = sample_sums[frame.samples_log2];
 }

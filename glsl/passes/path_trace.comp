@@ -70,8 +70,7 @@ void main() {
     if (in_list < (is_segment ? n_segments : n_rays)) {
         uint path_ix = live_paths[(is_segment ? list_of_segments() : list_of(batch.depth)) + in_list];
         uint mark = is_segment ? segments[path_ix].state : hits[path_ix].triangle_ix;
-        bool is_there = !is_segment || mark != SEGMENT_NONE;
-        if (is_there && runs_in_round(batch.round, mark)) counts = traced(path_ix, is_segment);
+        if (runs_in_round(batch.round, mark)) counts = traced(path_ix, is_segment);
     }
     if (COUNTS) {
         count_hits(batch.bounce_ix, gl_WorkGroupID.x, counts && !is_segment);

@@ -7,11 +7,7 @@
 #include "camera.glsl"
 #include "noise_tiles.glsl"
 #include "sampler.glsl"
-
-// The offset on one axis with the share `u` of a tent of radius 1 to its left.
-float tent(float u) {
-    return u < 0.5 ? sqrt(2.0 * u) - 1.0 : 1.0 - sqrt(2.0 * (1.0 - u));
-}
+#include "tent.glsl"
 
 // The direction of an angle that is the share `turn` of a full turn. Vulkan bounds the errors of sines and cosines only
 // between minus and plus half a turn.

@@ -2,8 +2,8 @@
 // their rays have much in common: they meet the same parts of the tree and the same materials. Lists of indices say
 // which paths are alive at a bounce, and which have a segment. Twin of src/reference/paths.rs.
 //
-// Needs nothing. Provides `list_of`, `list_of_segments`, `path_of`, `sample_of_path`, `pixel_of_path`, `key_of_path`
-// and the push constants `batch`.
+// Needs nothing. Provides `list_of`, `list_of_segments`, `path_of`, `sample_of_path`, `pixel_at`, `pixel_of_path`,
+// `key_of_path` and the push constants `batch`.
 #ifndef KDRAY_PATHS
 #define KDRAY_PATHS
 
@@ -24,9 +24,9 @@ uint list_of_segments() {
     return 2u * frame.queue_capacity;
 }
 
-// The path of a pixel of the batch, by its place in the batch, and of a sample of the frame.
-uint path_of(uint in_batch, uint sample_ix) {
-    return (in_batch << frame.samples_log2) + sample_ix;
+// The path of a pixel and of a sample of the frame. place: how many pixels of the batch come before the pixel.
+uint path_of(uint place, uint sample_ix) {
+    return (place << frame.samples_log2) + sample_ix;
 }
 
 // The index of a path's sample among those of the frame.
@@ -34,9 +34,14 @@ uint sample_of_path(uint path_ix) {
     return path_ix % (1u << frame.samples_log2);
 }
 
+// The window's pixel at a place in the batch.
+uvec2 pixel_at(uint place) {
+    return pixel_of(batch.first_pixel + place, frame.width, frame.height);
+}
+
 // The window's pixel of a path.
 uvec2 pixel_of_path(uint path_ix) {
-    return pixel_of(batch.first_pixel + (path_ix >> frame.samples_log2), frame.width, frame.height);
+    return pixel_at(path_ix >> frame.samples_log2);
 }
 
 // What the random numbers of a path depend on. pixel: the window's pixel.

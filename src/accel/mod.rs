@@ -1,10 +1,12 @@
-//! Acceleration structures: kd-trees and grids, which find the triangles that a ray may hit.
+//! Acceleration structures: kd-trees and grids, which find the triangles that a ray may hit. For single rays on the CPU,
+//! a kd-tree is converted to a wide hierarchy of boxes.
 
 mod bounds;
 pub mod grid;
 pub mod kdtree;
 mod query;
 mod statistics;
+pub mod wide_bvh;
 
 use glam::Vec3;
 

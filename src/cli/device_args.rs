@@ -35,11 +35,13 @@ pub fn device(word: &str) -> Result<DeviceSelector, String> {
     }
 }
 
-/// Opens the selected device. If the user selected none and the best device is a software driver, a note says so.
+/// Opens the selected device. If the user selected none and the best device is a software driver, a note says so, and
+/// that the CPU is faster without it.
 pub fn open_device(options: &ContextOptions, progress: &Progress) -> Result<Arc<Context>, GpuError> {
     let context = Context::new(options)?;
     if options.device.is_none() && context.is_software() {
-        progress.note(&format!("no GPU found, rendering in software on {}", context.info().name));
+        let name = &context.info().name;
+        progress.note(&format!("no GPU found, rendering in software on {name}, which is slower than --cpu"));
     }
     Ok(context)
 }

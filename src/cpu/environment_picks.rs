@@ -41,9 +41,9 @@ fn pick_alias<S: Simd>(entries: &[AliasEntry], first: &[u32; LANES], n: u32, u: 
     AliasPicks { ix: is_own.select(ix, alias), rest: lesser(rest, almost_one) }
 }
 
-/// Does what the reference's `below_tent` does.
+/// Does what the reference's `tent` does.
 #[inline(always)]
-fn below_tent<S: Simd>(u: f32x16<S>) -> f32x16<S> {
+fn tent<S: Simd>(u: f32x16<S>) -> f32x16<S> {
     u.simd_lt(0.5).select((u * 2.0).sqrt() - 1.0, 1.0 - ((1.0 - u) * 2.0).sqrt())
 }
 
@@ -67,8 +67,8 @@ fn places<S: Simd>(simd: S, map: &EnvironmentMap, [ux, uy]: [&[f32; LANES]; 2]) 
     let is_above = row.rest.simd_lt(0.5);
     let is_last = row.ix.simd_eq((n_rows - 1) as f32);
     let is_at_pole = (is_above & row.ix.simd_eq(0.0)) | (!is_above & is_last);
-    let down = row.ix + is_at_pole.select(row.rest - 0.5, below_tent(row.rest));
-    let right = column.ix + below_tent(column.rest);
+    let down = row.ix + is_at_pole.select(row.rest - 0.5, tent(row.rest));
+    let right = column.ix + tent(column.rest);
     let is_upper = (down + 0.5).simd_lt(0.5 * n_rows as f32);
     let from_pole = is_upper.select(down + 0.5, (n_rows as f32 - 0.5) - down);
     let (half_sine, _) = sin_cos_of_turns(from_pole * (0.25 / n_rows as f32));

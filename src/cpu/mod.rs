@@ -18,6 +18,7 @@
 //!     direction_bins     collect rays of one class of directions until they fill a packet
 //!     soa                rays and hits as structures of arrays
 //!     packet, packet_triangle, packet_traverser   trace sixteen rays through the tree together
+//!   wide_traverser   traces single rays of paths through a wide hierarchy of boxes
 //! ```
 
 mod area_lights;
@@ -42,6 +43,7 @@ mod trace;
 pub mod tracer;
 mod turns;
 mod vec3x16;
+pub mod wide_traverser;
 
 pub use self::{
     meter::metered_exposure,

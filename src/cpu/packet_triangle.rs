@@ -1,9 +1,9 @@
-//! The test of one triangle against sixteen rays. It does the operations of `reference/triangle.rs` on columns, so
-//! that each ray finds the same hit, bit for bit.
+//! The test of one triangle against sixteen rays, and of sixteen triangles against one ray. It does the operations of
+//! `reference/triangle.rs` on columns, so that each ray finds the same hit, bit for bit.
 
 use fearless_simd::{Simd, f32x16, mask32x16, prelude::*, u32x16};
 
-use super::lanes::LaneMask;
+use super::lanes::{LANES, LaneMask};
 use crate::{
     layout::{Hit, NO_TRIANGLE, Triangle},
     reference::triangle::{LEAST_EXACT_SUM, Shear, axis_last},
@@ -90,6 +90,19 @@ impl<S: Simd> Shears<S> {
         }
     }
 
+    /// Returns the shear of one ray in all lanes. `lanes_of_axis` is not set.
+    #[inline(always)]
+    pub fn splat(simd: S, shear: &Shear) -> Self {
+        let [x, y, z] = shear.origin;
+        Self {
+            origin: [f32x16::splat(simd, x), f32x16::splat(simd, y), f32x16::splat(simd, z)],
+            x: f32x16::splat(simd, shear.x),
+            y: f32x16::splat(simd, shear.y),
+            z: f32x16::splat(simd, shear.z),
+            lanes_of_axis: [0; 3],
+        }
+    }
+
     #[inline(always)]
     pub fn of_lane(&self, lane: usize) -> Shear {
         let (x, y, z) = (self.x.as_array()[lane], self.y.as_array()[lane], self.z.as_array()[lane]);
@@ -102,9 +115,21 @@ impl<S: Simd> Shears<S> {
     /// Maps a triangle's corner to the sheared space of each ray. The corner's components `[x, y, z]` are permuted so
     /// that the rays' longest axis is last.
     #[inline(always)]
-    fn corner(&self, [x, y, z]: [f32; 3]) -> [f32x16<S>; 3] {
+    fn corner<T: std::ops::Sub<f32x16<S>, Output = f32x16<S>>>(&self, [x, y, z]: [T; 3]) -> [f32x16<S>; 3] {
         let z = z - self.origin[2];
         [(x - self.origin[0]) - self.x * z, (y - self.origin[1]) - self.y * z, z]
+    }
+
+    /// Maps corners of sixteen triangles to the sheared space of the ray in their lane. `corner`: its coordinates on
+    /// each axis.
+    #[inline(always)]
+    fn corners(&self, corner: &[[f32; LANES]; 3], axis: usize) -> [f32x16<S>; 3] {
+        let (simd, [x, y, z]) = (self.x.simd, axis_last([0, 1, 2], axis));
+        self.corner([
+            f32x16::load_array_ref(simd, &corner[x]),
+            f32x16::load_array_ref(simd, &corner[y]),
+            f32x16::load_array_ref(simd, &corner[z]),
+        ])
     }
 
     /// Finds what [`Shear::intersect_triangle`] finds for each ray of `lanes`, whose longest axis is `axis`. Returns
@@ -118,12 +143,41 @@ impl<S: Simd> Shears<S> {
         axis: usize,
         lanes: LaneMask,
     ) -> Option<(HitColumns<S>, mask32x16<S>)> {
-        let simd = self.x.simd;
-        let [x0, y0, z0] = self.corner(axis_last(triangle.v0.to_array(), axis));
-        let [x1, y1, z1] = self.corner(axis_last(triangle.v1.to_array(), axis));
-        let [x2, y2, z2] = self.corner(axis_last(triangle.v2.to_array(), axis));
+        let corners = [
+            self.corner(axis_last(triangle.v0.to_array(), axis)),
+            self.corner(axis_last(triangle.v1.to_array(), axis)),
+            self.corner(axis_last(triangle.v2.to_array(), axis)),
+        ];
+        let (simd, lanes) = (self.x.simd, lanes.into());
+        self.hits(corners, u32x16::splat(simd, triangle_ix), mask32x16::from_bitmask(simd, lanes))
+    }
+
+    /// Finds what [`Shear::intersect_triangle`] finds for the triangle and the ray in each lane. The rays' longest axis
+    /// is `axis`. `corners`: the coordinates of each corner on each axis. Returns what
+    /// [`Self::intersect_triangle`] returns.
+    #[inline(always)]
+    pub fn intersect_triangles(
+        &self,
+        corners: &[[[f32; LANES]; 3]; 3],
+        triangle_ixs: u32x16<S>,
+        axis: usize,
+    ) -> Option<(HitColumns<S>, mask32x16<S>)> {
+        let [v0, v1, v2] = corners;
+        let corners = [self.corners(v0, axis), self.corners(v1, axis), self.corners(v2, axis)];
+        self.hits(corners, triangle_ixs, mask32x16::splat(self.x.simd, true))
+    }
+
+    /// Returns the hits of triangles by their sheared corners, and those of `lanes` in which they are valid. Returns none
+    /// if the rounded edge functions already exclude all hits.
+    #[inline(always)]
+    fn hits(
+        &self,
+        [[x0, y0, z0], [x1, y1, z1], [x2, y2, z2]]: [[f32x16<S>; 3]; 3],
+        triangle_ix: u32x16<S>,
+        lanes: mask32x16<S>,
+    ) -> Option<(HitColumns<S>, mask32x16<S>)> {
         let edges = [x2 * y1 - y2 * x1, x0 * y2 - y0 * x2, x1 * y0 - y1 * x0];
-        let near = !is_outside(edges) & mask32x16::from_bitmask(simd, lanes.into());
+        let near = !is_outside(edges) & lanes;
         if near.all_false() {
             return None;
         }
@@ -133,7 +187,7 @@ impl<S: Simd> Shears<S> {
         let inv_det = 1.0 / sum_of(edges);
         let (u, v) = (edges[1] * inv_det, edges[2] * inv_det);
         let t = (z0 + (u * (z1 - z0) + v * (z2 - z0))) * self.z;
-        Some((HitColumns { t, triangle_ix: u32x16::splat(simd, triangle_ix), u, v }, hit))
+        Some((HitColumns { t, triangle_ix, u, v }, hit))
     }
 }
 

@@ -14,7 +14,7 @@ use crate::{
     reference::{
         inputs::KernelInputs,
         path_camera::path_camera_ray,
-        paths::{key_of_path, path_of, pixel_of_path, place_of_path, sample_of_path},
+        paths::{key_of_path, path_of, pixel_at, place_of_path, sample_of_path},
         sampler::SampleKey,
     },
 };
@@ -34,10 +34,9 @@ pub struct PixelOfBatch {
 /// Returns the pixels of a batch, in the order of its paths.
 pub fn pixels_of_batch(inputs: &KernelInputs, batch: &Batch) -> Vec<PixelOfBatch> {
     let frame = inputs.frame();
-    let pixel = |in_batch| {
-        let path_ix = path_of(frame, in_batch, 0);
-        let at = pixel_of_path(frame, batch, path_ix);
-        PixelOfBatch { at, key: key_of_path(inputs, path_ix, at) }
+    let pixel = |place| {
+        let at = pixel_at(frame, batch, place);
+        PixelOfBatch { at, key: key_of_path(inputs, path_of(frame, place, 0), at) }
     };
     (0..batch.n_pixels).map(pixel).collect()
 }

@@ -1,7 +1,7 @@
 //! The passes of a batch of paths, with the buffers of the paths.
 
 use bytemuck::Zeroable;
-use fearless_simd::Level;
+use fearless_simd::{Level, Simd, dispatch};
 
 use super::{
     matt_surfaces::matt_materials,
@@ -9,9 +9,10 @@ use super::{
     path_scatter::{BounceOfPaths, path_scatter},
     queue::Queue,
     tracer::FastTracer,
+    wide_traverser::WideTraverser,
 };
 use crate::{
-    accel::kdtree::Traversal,
+    accel::{kdtree::Traversal, wide_bvh::WideBvh},
     layout::{Batch, Bounce, Frame, Hit, PathRay, PathState, SCAN_GROUP_SIZE, Segment},
     reference::{
         inputs::KernelInputs,
@@ -19,8 +20,30 @@ use crate::{
         path_layers::path_layers,
         path_scatter::PathBuffers,
         path_trace::{closest_hits_by, segments_by},
+        traverser::Tracer,
     },
+    world::World,
 };
+
+/// The number of triangles from which on single rays through a [`WideBvh`] are faster than packets of scattered rays
+/// (docs/experiments.md).
+const LEAST_WIDE_TRIANGLES: usize = 2048;
+/// The number of floats in the machine's vectors from which on the same is true.
+const LEAST_WIDE_VECTOR: usize = 8;
+
+/// Returns the number of floats in a vector of the machine.
+#[inline(always)]
+fn vector_size<S: Simd>(_: S) -> usize {
+    size_of::<S::f32s>() / size_of::<f32>()
+}
+
+/// Returns the hierarchy through which scattered rays of paths are traced one by one. Returns none if packets through the
+/// kd-tree are faster, or if `traversal` is another algorithm than that of packets.
+pub fn wide_bvh_for(world: &World, traversal: Traversal) -> Option<&WideBvh> {
+    let is_large = world.scene().triangles.len() >= LEAST_WIDE_TRIANGLES;
+    let is_faster = is_large && dispatch!(Level::new(), simd => vector_size(simd)) >= LEAST_WIDE_VECTOR;
+    if is_faster && traversal == Traversal::Stack { world.wide_bvh() } else { None }
+}
 
 /// What the paths of a batch have beside their rays and hits, which are in a [`Queue`]. The buffers grow with the
 /// number of paths.
@@ -60,12 +83,31 @@ impl Paths {
     }
 
     /// Finds the hits of the paths that are alive, and tests the segments of the bounce before. Returns the numbers of
-    /// hits and of segments.
-    pub fn trace(&mut self, inputs: &KernelInputs, traversal: Traversal, depth: u32, queue: &mut Queue) -> (u32, u32) {
+    /// hits and of segments. `wide_bvh`: through which all but camera rays are traced, if there is one.
+    pub fn trace(
+        &mut self,
+        inputs: &KernelInputs,
+        (traversal, wide_bvh): (Traversal, Option<&WideBvh>),
+        depth: u32,
+        queue: &mut Queue,
+    ) -> (u32, u32) {
+        match wide_bvh.filter(|_| depth > 0) {
+            Some(bvh) => self.trace_by(inputs, || WideTraverser::new(bvh, Level::new()), depth, queue),
+            None => self.trace_by(inputs, || FastTracer::new(inputs, traversal), depth, queue),
+        }
+    }
+
+    fn trace_by<T: Tracer>(
+        &mut self,
+        inputs: &KernelInputs,
+        new_tracer: impl Fn() -> T + Sync + Send,
+        depth: u32,
+        queue: &mut Queue,
+    ) -> (u32, u32) {
         let Self { states, segments, live, with_segment, .. } = self;
         let live = &live[depth as usize % 2];
-        let n_hits = closest_hits_by::<FastTracer>(inputs, traversal, live, &queue.rays, &mut queue.hits);
-        segments_by::<FastTracer>(inputs, traversal, with_segment, segments, states);
+        let n_hits = closest_hits_by(inputs, &new_tracer, live, &queue.rays, &mut queue.hits);
+        segments_by(inputs, &new_tracer, with_segment, segments, states);
         (n_hits, with_segment.len() as u32)
     }
 

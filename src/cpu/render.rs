@@ -2,7 +2,11 @@
 
 use bytemuck::Zeroable;
 
-use super::{paths::Paths, queue::Queue, timing::Clock};
+use super::{
+    paths::{Paths, wide_bvh_for},
+    queue::Queue,
+    timing::Clock,
+};
 use crate::{
     accel::kdtree::TraversalLinks,
     frame::{
@@ -96,6 +100,10 @@ impl Renderer {
         let frame = world.frame_constants(options);
         let n_pixels = frame.width as usize * frame.height as usize;
         let n_layers = if options.has_light_layers() { LIGHT_LAYERS as usize } else { 0 };
+        if options.integrator == Integrator::Path {
+            // It is made here, since the time of a frame is that of drawing alone.
+            let _ = wide_bvh_for(world, options.traversal);
+        }
         Self {
             camera: world.scene().camera,
             world: world.clone(),
@@ -359,7 +367,8 @@ impl Renderer {
     fn path_trace(&mut self, depth: u32) {
         let Self { world, frame, links, paths, queue, path_materials, .. } = self;
         let inputs = KernelInputs::new(world, frame).with_links(links).of_paths(path_materials, world.emitters());
-        let trace = || paths.trace(&inputs, self.options.traversal, depth, queue);
+        let traversal = self.options.traversal;
+        let trace = || paths.trace(&inputs, (traversal, wide_bvh_for(world, traversal)), depth, queue);
         let (n_hits, n_segments) = self.clock.time(Pass::PathTrace, Some(depth), trace);
         if let Some(before) = self.batch_stats.last_mut() {
             before.n_shadow_rays = n_segments.into();

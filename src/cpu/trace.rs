@@ -11,7 +11,7 @@ use crate::{
 
 /// Does what [`reference::trace::trace`] does.
 pub fn trace(inputs: &KernelInputs, traversal: Traversal, rays: &[PathRay], hits: &mut [Hit]) -> u32 {
-    reference::trace::trace_by::<FastTracer>(inputs, traversal, rays, hits)
+    reference::trace::trace_by(inputs, || FastTracer::new(inputs, traversal), rays, hits)
 }
 
 /// Does what [`reference::shadow::shadow`] does.
@@ -22,15 +22,15 @@ pub fn shadow(
     rays_and_hits: (&[PathRay], &[Hit]),
     light_visibility: &mut [u32],
 ) -> u32 {
-    reference::shadow::shadow_by::<FastTracer>(inputs, traversal, places, rays_and_hits, light_visibility)
+    reference::shadow::shadow_by(inputs, || FastTracer::new(inputs, traversal), places, rays_and_hits, light_visibility)
 }
 
 /// Does what [`reference::visibility::visibility`] does.
 pub fn visibility(inputs: &KernelInputs, traversal: Traversal, triangle_ids: &mut [u32]) {
-    reference::visibility::visibility_by::<FastTracer>(inputs, traversal, triangle_ids);
+    reference::visibility::visibility_by(inputs, || FastTracer::new(inputs, traversal), triangle_ids);
 }
 
 /// Does what [`reference::cast::cast`] does.
 pub fn cast(inputs: &KernelInputs, traversal: Traversal, query: Query, rays: &[Ray], hits: &mut [Hit]) {
-    reference::cast::cast_by::<FastTracer>(inputs, traversal, query, rays, hits);
+    reference::cast::cast_by(inputs, || FastTracer::new(inputs, traversal), query, rays, hits);
 }

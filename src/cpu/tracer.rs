@@ -29,6 +29,11 @@ pub enum FastTracer {
 }
 
 impl FastTracer {
+    /// Creates a tracer that uses the best instructions that the machine has.
+    pub fn new(inputs: &KernelInputs<impl ReadCounter>, traversal: Traversal) -> Self {
+        Self::at_level(inputs, traversal, Level::new())
+    }
+
     /// Creates a tracer that uses the instructions of `level`, which the machine must have. The hits are the same at
     /// every level, bit for bit.
     pub fn at_level(inputs: &KernelInputs<impl ReadCounter>, traversal: Traversal, level: Level) -> Self {
@@ -55,10 +60,6 @@ impl FastTracer {
 }
 
 impl Tracer for FastTracer {
-    fn new(inputs: &KernelInputs<impl ReadCounter>, traversal: Traversal) -> Self {
-        Self::at_level(inputs, traversal, Level::new())
-    }
-
     #[inline]
     fn trace_all<const ANY_HIT: bool, Key>(
         &mut self,

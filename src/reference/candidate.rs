@@ -20,17 +20,23 @@ impl HitFilter {
         let shear = Shear::of(ray.origin.to_array(), ray.direction.to_array());
         Self { shear, t_min: ray.t_min, source_triangle: ray.source_triangle }
     }
+
+    /// Keeps a hit in `best` if it counts and is nearer. Of two hits at the same t, the one with the lower triangle
+    /// index wins, so the order of tests does not matter.
+    #[inline(always)]
+    pub fn keep_nearest(&self, inputs: &KernelInputs<impl ReadCounter>, hit: &Hit, best: &mut Hit) {
+        let nearer = hit.t < best.t || (hit.t == best.t && hit.triangle_ix < best.triangle_ix);
+        let is_of_ray = hit.t > self.t_min && hit.triangle_ix != self.source_triangle;
+        if is_of_ray && nearer && inputs.is_accepted(hit) {
+            *best = *hit;
+        }
+    }
 }
 
-/// Tests a triangle against the ray, and keeps its hit in `best` if it is nearer. Of two hits at the same t, the one
-/// with the lower triangle index wins, so the order of tests does not matter.
+/// Tests a triangle against the ray, and keeps its hit in `best` if it is nearer.
 #[inline(always)]
 pub fn intersect(inputs: &KernelInputs<impl ReadCounter>, hit_filter: &HitFilter, triangle_ix: u32, best: &mut Hit) {
     let triangle = &inputs.triangles[triangle_ix as usize];
     let Some(hit) = hit_filter.shear.intersect_triangle(triangle, triangle_ix) else { return };
-    let nearer = hit.t < best.t || (hit.t == best.t && triangle_ix < best.triangle_ix);
-    let is_of_ray = hit.t > hit_filter.t_min && triangle_ix != hit_filter.source_triangle;
-    if is_of_ray && nearer && inputs.is_accepted(&hit) {
-        *best = hit;
-    }
+    hit_filter.keep_nearest(inputs, &hit, best);
 }

@@ -62,9 +62,9 @@ fn scaled(ray: &Ray) -> SearchRay {
 }
 
 /// Writes the hits of one task's rays.
-fn cast_all<const ANY_HIT: bool>(inputs: &KernelInputs, traverser: &mut impl Tracer, rays: &[Ray], hits: &mut [Hit]) {
+fn cast_all<const ANY_HIT: bool>(inputs: &KernelInputs, tracer: &mut impl Tracer, rays: &[Ray], hits: &mut [Hit]) {
     let search_rays = rays.iter().zip(hits).map(|(ray, hit)| ((ray, hit), scaled(ray)));
-    traverser.trace_all::<ANY_HIT, _>(inputs, search_rays, |(ray, hit), found| {
+    tracer.trace_all::<ANY_HIT, _>(inputs, search_rays, |(ray, hit), found| {
         let [scale, _] = scales_of(ray.direction);
         *hit = if found.triangle_ix == NO_TRIANGLE { MISS } else { Hit { t: found.t * scale, ..found } };
     });
@@ -72,16 +72,22 @@ fn cast_all<const ANY_HIT: bool>(inputs: &KernelInputs, traverser: &mut impl Tra
 
 /// Casts `rays` and writes `hits`, one for each ray. A miss has an infinite t.
 pub fn cast(inputs: &KernelInputs, traversal: Traversal, query: Query, rays: &[Ray], hits: &mut [Hit]) {
-    cast_by::<Traverser>(inputs, traversal, query, rays, hits);
+    cast_by(inputs, || Traverser::new(inputs, traversal), query, rays, hits);
 }
 
-/// Does what [`cast`] does, by the tracer `T`.
-pub fn cast_by<T: Tracer>(inputs: &KernelInputs, traversal: Traversal, query: Query, rays: &[Ray], hits: &mut [Hit]) {
+/// Does what [`cast`] does, by a tracer for each thread.
+pub fn cast_by<T: Tracer>(
+    inputs: &KernelInputs,
+    new_tracer: impl Fn() -> T + Sync + Send,
+    query: Query,
+    rays: &[Ray],
+    hits: &mut [Hit],
+) {
     rays.par_chunks(RAYS_PER_TASK).zip(hits.par_chunks_mut(RAYS_PER_TASK)).for_each_init(
-        || T::new(inputs, traversal),
-        |traverser, (rays, hits)| match query {
-            Query::Closest => cast_all::<false>(inputs, traverser, rays, hits),
-            Query::Any => cast_all::<true>(inputs, traverser, rays, hits),
+        new_tracer,
+        |tracer, (rays, hits)| match query {
+            Query::Closest => cast_all::<false>(inputs, tracer, rays, hits),
+            Query::Any => cast_all::<true>(inputs, tracer, rays, hits),
         },
     );
 }

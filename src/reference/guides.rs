@@ -11,7 +11,7 @@ use super::{
     material::is_unlit,
     noise::squared_luminance,
     path_camera::path_camera_ray,
-    paths::{key_of_path, path_of, pixel_of_path},
+    paths::{key_of_path, path_of, pixel_at},
     sampler::random_pair,
     surface::Surface,
 };
@@ -22,14 +22,14 @@ pub fn guides(inputs: &KernelInputs, batch: &Batch, hits: &[Hit], states: &[Path
     let frame = inputs.frame();
     let n_of_frame = 1 << frame.samples_log2;
     let n_earlier = frame.n_samples - n_of_frame;
-    for in_batch in 0..batch.n_pixels {
-        let pixel = pixel_of_path(frame, batch, path_of(frame, in_batch, 0));
+    for place in 0..batch.n_pixels {
+        let pixel = pixel_at(frame, batch, place);
         let guide = &mut pixel_guides[pixel_ix_of(frame, pixel) as usize];
         if n_earlier == 0 {
             *guide = Guide::default();
         }
         for sample_ix in guide.n_samples.saturating_sub(n_earlier).min(n_of_frame)..n_of_frame {
-            let path_ix = path_of(frame, in_batch, sample_ix);
+            let path_ix = path_of(frame, place, sample_ix);
             let (hit, seen) = (&hits[path_ix as usize], states[path_ix as usize].radiance);
             let surface = first_surface(inputs, pixel, path_ix, hit);
             add_path(guide, surface, seen);

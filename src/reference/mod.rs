@@ -83,6 +83,7 @@ pub mod shadow;
 pub mod slab;
 pub mod studio;
 pub mod surface;
+mod tent;
 pub mod texture;
 pub mod tone_curves;
 pub mod tonemap;

@@ -2,13 +2,10 @@
 
 use glam::{UVec2, Vec2, Vec3, vec2};
 
-use super::{camera::pixel_ix_of, inputs::KernelInputs, noise_tiles::picture_pixel_of, turns::sin_cos_of_turns};
+use super::{
+    camera::pixel_ix_of, inputs::KernelInputs, noise_tiles::picture_pixel_of, tent::tent, turns::sin_cos_of_turns,
+};
 use crate::layout::{FILTER_BOX, FILTER_TENT, Frame, NO_TRIANGLE, PathRay};
-
-/// The offset on one axis with the share `u` of a tent of radius 1 to its left.
-fn tent(u: f32) -> f32 {
-    if u < 0.5 { (2.0 * u).sqrt() - 1.0 } else { 1.0 - (2.0 * (1.0 - u)).sqrt() }
-}
 
 /// The direction of an angle that is the share `turn` of a full turn.
 fn on_circle(turn: f32) -> Vec2 {

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::{
     camera::pixel_ix_of,
-    paths::{path_of, pixel_of_path},
+    paths::{path_of, pixel_at},
     sample_sums::sum_of_samples,
 };
 use crate::layout::{Batch, Frame, LIGHT_LAYERS, PathState};
@@ -21,8 +21,8 @@ pub fn path_layers(
 ) {
     let layer_ix = batch.depth.min(LIGHT_LAYERS - 1);
     let layer_begin = layer_ix as usize * pixel_layers.len() / LIGHT_LAYERS as usize;
-    for in_batch in 0..batch.n_pixels {
-        let path_ix = |sample_ix: u32| path_of(frame, in_batch, sample_ix) as usize;
+    for place in 0..batch.n_pixels {
+        let path_ix = |sample_ix: u32| path_of(frame, place, sample_ix) as usize;
         let sum = sum_of_samples(frame.samples_log2, |sample_ix| {
             let [x, y, z, _] = snapshots[path_ix(sample_ix)];
             let before = if layer_ix == 0 { Vec3::ZERO } else { Vec3::new(x, y, z) };
@@ -31,7 +31,7 @@ pub fn path_layers(
         (0..1 << frame.samples_log2).map(path_ix).for_each(|path_ix| {
             snapshots[path_ix] = states[path_ix].radiance.extend(0.0).to_array();
         });
-        let pixel_ix = pixel_ix_of(frame, pixel_of_path(frame, batch, path_of(frame, in_batch, 0))) as usize;
+        let pixel_ix = pixel_ix_of(frame, pixel_at(frame, batch, place)) as usize;
         pixel_layers[layer_begin + pixel_ix] = sum.to_array();
     }
 }

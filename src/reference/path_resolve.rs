@@ -4,7 +4,7 @@
 use super::{
     camera::pixel_ix_of,
     noise::squared_luminance,
-    paths::{path_of, pixel_of_path},
+    paths::{path_of, pixel_at},
     sample_sums::sum_of_samples,
 };
 use crate::layout::{Batch, Frame, PathState};
@@ -12,12 +12,12 @@ use crate::layout::{Batch, Frame, PathState};
 /// Writes the pixels of the batch: the sum of the frame's samples, and in the fourth component that of their squared
 /// luminances, added in a binary tree.
 pub fn path_resolve(frame: &Frame, batch: &Batch, states: &[PathState], pixel_radiance: &mut [[f32; 4]]) {
-    for in_batch in 0..batch.n_pixels {
+    for place in 0..batch.n_pixels {
         let sum = sum_of_samples(frame.samples_log2, |sample_ix| {
-            let radiance = states[path_of(frame, in_batch, sample_ix) as usize].radiance;
+            let radiance = states[path_of(frame, place, sample_ix) as usize].radiance;
             radiance.extend(squared_luminance(radiance))
         });
-        let pixel_ix = pixel_ix_of(frame, pixel_of_path(frame, batch, path_of(frame, in_batch, 0)));
+        let pixel_ix = pixel_ix_of(frame, pixel_at(frame, batch, place));
         pixel_radiance[pixel_ix as usize] = sum.to_array();
     }
 }

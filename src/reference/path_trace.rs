@@ -24,13 +24,13 @@ pub fn closest_hits(
     rays: &[PathRay],
     hits: &mut [Hit],
 ) -> u32 {
-    closest_hits_by::<Traverser>(inputs, traversal, live, rays, hits)
+    closest_hits_by(inputs, || Traverser::new(inputs, traversal), live, rays, hits)
 }
 
-/// Does what [`closest_hits`] does, by the tracer `T`.
+/// Does what [`closest_hits`] does, by a tracer for each thread.
 pub fn closest_hits_by<T: Tracer>(
     inputs: &KernelInputs,
-    traversal: Traversal,
+    new_tracer: impl Fn() -> T + Sync + Send,
     live: &[u32],
     rays: &[PathRay],
     hits: &mut [Hit],
@@ -46,7 +46,7 @@ pub fn closest_hits_by<T: Tracer>(
         n_hits
     };
     let chunks = live.par_chunks(RAYS_PER_TASK).zip(parts(hits, live, RAYS_PER_TASK));
-    chunks.map_init(|| T::new(inputs, traversal), |tracer, (live, hits)| trace(tracer, live, hits)).sum()
+    chunks.map_init(new_tracer, |tracer, (live, hits)| trace(tracer, live, hits)).sum()
 }
 
 /// Tests the segments of the paths `with_segment`, which are in ascending order. Light that arrives is added to the
@@ -58,13 +58,13 @@ pub fn segments(
     segments: &mut [Segment],
     states: &mut [PathState],
 ) {
-    segments_by::<Traverser>(inputs, traversal, with_segment, segments, states);
+    segments_by(inputs, || Traverser::new(inputs, traversal), with_segment, segments, states);
 }
 
-/// Does what [`segments`] does, by the tracer `T`.
+/// Does what [`segments`] does, by a tracer for each thread.
 pub fn segments_by<T: Tracer>(
     inputs: &KernelInputs,
-    traversal: Traversal,
+    new_tracer: impl Fn() -> T + Sync + Send,
     with_segment: &[u32],
     segments: &mut [Segment],
     states: &mut [PathState],
@@ -84,7 +84,7 @@ pub fn segments_by<T: Tracer>(
     let of_paths = (parts(segments, with_segment, RAYS_PER_TASK), parts(states, with_segment, RAYS_PER_TASK));
     let chunks = with_segment.par_chunks(RAYS_PER_TASK).zip(of_paths);
     let test_chunk = |tracer: &mut T, (list, (segments, states))| test(tracer, list, segments, states);
-    chunks.for_each_init(|| T::new(inputs, traversal), test_chunk);
+    chunks.for_each_init(new_tracer, test_chunk);
 }
 
 fn ray_of(segment: &Segment) -> PathRay {

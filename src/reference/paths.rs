@@ -10,9 +10,9 @@ use super::{
 };
 use crate::layout::{Batch, Frame};
 
-/// The path of a pixel of the batch, by its place in the batch, and of a sample of the frame.
-pub fn path_of(frame: &Frame, in_batch: u32, sample_ix: u32) -> u32 {
-    (in_batch << frame.samples_log2) + sample_ix
+/// The path of a pixel and of a sample of the frame. `place`: how many pixels of the batch come before the pixel.
+pub fn path_of(frame: &Frame, place: u32, sample_ix: u32) -> u32 {
+    (place << frame.samples_log2) + sample_ix
 }
 
 /// The index of a path's sample among those of the frame.
@@ -25,9 +25,14 @@ pub fn place_of_path(frame: &Frame, path_ix: u32) -> u32 {
     path_ix >> frame.samples_log2
 }
 
+/// The window's pixel at a place in the batch.
+pub fn pixel_at(frame: &Frame, batch: &Batch, place: u32) -> UVec2 {
+    pixel_of(batch.first_pixel + place, frame.width, frame.height)
+}
+
 /// The window's pixel of a path.
 pub fn pixel_of_path(frame: &Frame, batch: &Batch, path_ix: u32) -> UVec2 {
-    pixel_of(batch.first_pixel + place_of_path(frame, path_ix), frame.width, frame.height)
+    pixel_at(frame, batch, place_of_path(frame, path_ix))
 }
 
 /// What the random numbers of a path depend on. `pixel`: the window's pixel.

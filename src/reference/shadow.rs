@@ -54,13 +54,13 @@ pub fn shadow(
     (rays, hits): (&[PathRay], &[Hit]),
     light_visibility: &mut [u32],
 ) -> u32 {
-    shadow_by::<Traverser>(inputs, traversal, places, (rays, hits), light_visibility)
+    shadow_by(inputs, || Traverser::new(inputs, traversal), places, (rays, hits), light_visibility)
 }
 
-/// Does what [`shadow`] does, by the tracer `T`.
+/// Does what [`shadow`] does, by a tracer for each thread.
 pub fn shadow_by<T: Tracer>(
     inputs: &KernelInputs,
-    traversal: Traversal,
+    new_tracer: impl Fn() -> T + Sync + Send,
     places: &Range<usize>,
     (rays, hits): (&[PathRay], &[Hit]),
     light_visibility: &mut [u32],
@@ -68,7 +68,7 @@ pub fn shadow_by<T: Tracer>(
     let (rays, hits) = (&rays[places.clone()], &hits[places.clone()]);
     let inputs = &inputs.through_veils();
     let of_light = |(light, visibility): (&Light, &mut [u32])| -> u32 {
-        let of_task = |traverser: &mut T, ((rays, hits), visibility): ((&[PathRay], &[Hit]), &mut [u32])| {
+        let of_task = |tracer: &mut T, ((rays, hits), visibility): ((&[PathRay], &[Hit]), &mut [u32])| {
             let mut n_tested = 0;
             let segments = rays.iter().zip(hits).zip(visibility).filter_map(|((ray, hit), visible)| {
                 *visible = LIGHT_UNTESTED;
@@ -77,7 +77,7 @@ pub fn shadow_by<T: Tracer>(
                 n_tested += 1;
                 Some((visible, SearchRay::from(&segment)))
             });
-            traverser.trace_all::<true, _>(inputs, segments, |visible, hit| {
+            tracer.trace_all::<true, _>(inputs, segments, |visible, hit| {
                 *visible = if hit.triangle_ix == NO_TRIANGLE { LIGHT_LIT } else { LIGHT_SHADOWED };
             });
             n_tested
@@ -85,7 +85,7 @@ pub fn shadow_by<T: Tracer>(
         rays.par_chunks(RAYS_PER_TASK)
             .zip(hits.par_chunks(RAYS_PER_TASK))
             .zip(visibility[places.clone()].par_chunks_mut(RAYS_PER_TASK))
-            .map_init(|| T::new(inputs, traversal), of_task)
+            .map_init(&new_tracer, of_task)
             .sum()
     };
     let stride = inputs.frame().queue_capacity as usize;

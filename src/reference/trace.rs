@@ -15,24 +15,26 @@ use crate::{
 
 /// Writes `hits`, one for each ray. Returns the number of rays that hit something.
 pub fn trace(inputs: &KernelInputs, traversal: Traversal, rays: &[PathRay], hits: &mut [Hit]) -> u32 {
-    trace_by::<Traverser>(inputs, traversal, rays, hits)
+    trace_by(inputs, || Traverser::new(inputs, traversal), rays, hits)
 }
 
-/// Does what [`trace`] does, by the tracer `T`.
-pub fn trace_by<T: Tracer>(inputs: &KernelInputs, traversal: Traversal, rays: &[PathRay], hits: &mut [Hit]) -> u32 {
+/// Does what [`trace`] does, by a tracer for each thread.
+pub fn trace_by<T: Tracer>(
+    inputs: &KernelInputs,
+    new_tracer: impl Fn() -> T + Sync + Send,
+    rays: &[PathRay],
+    hits: &mut [Hit],
+) -> u32 {
     rays.par_chunks(RAYS_PER_TASK)
         .zip(hits.par_chunks_mut(RAYS_PER_TASK))
-        .map_init(
-            || T::new(inputs, traversal),
-            |traverser, (rays, hits)| {
-                let mut n_hits = 0;
-                let search_rays = rays.iter().map(SearchRay::from);
-                traverser.trace_all::<false, _>(inputs, hits.iter_mut().zip(search_rays), |hit, found| {
-                    *hit = found;
-                    n_hits += u32::from(found.triangle_ix != NO_TRIANGLE);
-                });
-                n_hits
-            },
-        )
+        .map_init(new_tracer, |tracer, (rays, hits)| {
+            let mut n_hits = 0;
+            let search_rays = rays.iter().map(SearchRay::from);
+            tracer.trace_all::<false, _>(inputs, hits.iter_mut().zip(search_rays), |hit, found| {
+                *hit = found;
+                n_hits += u32::from(found.triangle_ix != NO_TRIANGLE);
+            });
+            n_hits
+        })
         .sum()
 }

@@ -23,10 +23,6 @@ use crate::{
 
 /// Finds the hits of many rays. Each thread has its own tracer.
 pub trait Tracer {
-    /// Makes a tracer for the acceleration structure of the inputs. `traversal` is the algorithm for a kd-tree. A
-    /// grid ignores it.
-    fn new(inputs: &KernelInputs<impl ReadCounter>, traversal: Traversal) -> Self;
-
     /// Calls `found` with each ray's key and its closest hit in (t_min, t_max], or with `ANY_HIT` one that need not
     /// be the closest. The calls come in any order. A miss has t = t_max.
     fn trace_all<const ANY_HIT: bool, Key>(
@@ -51,6 +47,22 @@ pub enum Traverser {
 }
 
 impl Traverser {
+    /// Makes a traverser for the acceleration structure of the inputs. `traversal` is the algorithm for a kd-tree. A
+    /// grid ignores it.
+    pub fn new(inputs: &KernelInputs<impl ReadCounter>, traversal: Traversal) -> Self {
+        match traversal {
+            _ if inputs.lattice.is_some() => Self::Grid,
+            Traversal::Mask => Self::Mask(Pending::new()),
+            Traversal::MaskBoxes => Self::MaskBoxes(Pending::new()),
+            Traversal::Restart => Self::Restart(Pending::new()),
+            Traversal::Backtrack => Self::Backtrack(Pending::new()),
+            Traversal::ShortStack => Self::ShortStack(Pending::new()),
+            Traversal::Ropes => Self::Ropes,
+            Traversal::Stack => Self::Stack(Pending::new()),
+            Traversal::Brute => Self::Brute,
+        }
+    }
+
     /// Finds a ray's closest hit in (t_min, t_max], or with `ANY_HIT` one that need not be the closest. A miss has
     /// t = t_max.
     #[inline]
@@ -79,20 +91,6 @@ impl Traverser {
 }
 
 impl Tracer for Traverser {
-    fn new(inputs: &KernelInputs<impl ReadCounter>, traversal: Traversal) -> Self {
-        match traversal {
-            _ if inputs.lattice.is_some() => Self::Grid,
-            Traversal::Mask => Self::Mask(Pending::new()),
-            Traversal::MaskBoxes => Self::MaskBoxes(Pending::new()),
-            Traversal::Restart => Self::Restart(Pending::new()),
-            Traversal::Backtrack => Self::Backtrack(Pending::new()),
-            Traversal::ShortStack => Self::ShortStack(Pending::new()),
-            Traversal::Ropes => Self::Ropes,
-            Traversal::Stack => Self::Stack(Pending::new()),
-            Traversal::Brute => Self::Brute,
-        }
-    }
-
     #[inline]
     fn trace_all<const ANY_HIT: bool, Key>(
         &mut self,

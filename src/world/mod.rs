@@ -37,6 +37,7 @@ use crate::{
         Accel, AccelOptions, Statistics,
         grid::DeviceBuild,
         kdtree::{BuildOptions, KdTree},
+        wide_bvh::WideBvh,
     },
     scene::{Scene, Up},
     util::progress::Progress,
@@ -57,6 +58,8 @@ struct Parts {
     accel_options: AccelOptions,
     /// Made when they are first needed.
     emitters: OnceLock<Emitters>,
+    /// The same; none if the structure is a grid.
+    wide_bvh: OnceLock<Option<WideBvh>>,
     /// The same, for each axis that may point up.
     stand_ins: [OnceLock<StandIn>; 2],
 }
@@ -102,6 +105,7 @@ impl World {
             accel,
             accel_options: options.clone(),
             emitters: OnceLock::new(),
+            wide_bvh: OnceLock::new(),
             stand_ins: Default::default(),
         })))
     }
@@ -120,6 +124,7 @@ impl World {
             accel,
             accel_options,
             emitters: OnceLock::new(),
+            wide_bvh: OnceLock::new(),
             stand_ins: Default::default(),
         })))
     }
@@ -132,6 +137,13 @@ impl World {
     /// The tables from which the path tracer picks lights. They are made at the first call.
     pub fn emitters(&self) -> &Emitters {
         self.0.emitters.get_or_init(|| Emitters::new(&self.0.scene))
+    }
+
+    /// The wide hierarchy of the kd-tree's boxes, through which the CPU traces single rays; none for a grid. It is made at
+    /// the first call, on the current rayon pool.
+    pub fn wide_bvh(&self) -> Option<&WideBvh> {
+        let make = || Some(WideBvh::new(self.0.accel.as_kdtree()?, &self.0.scene.triangles));
+        self.0.wide_bvh.get_or_init(make).as_ref()
     }
 
     /// The ambient light that stands for light of which only paths know. It is made at the first call.

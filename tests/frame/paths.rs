@@ -3,6 +3,7 @@
 
 use glam::{DVec3, Vec3, vec3};
 use kdray::{
+    accel::kdtree::Traversal,
     cpu::{self, Batching},
     frame::{
         Crop, Denoise, FrameKind, Goal, Integrator, Pass, PathOptions, Picture, PixelFilter, Plan, RenderOptions, plan,
@@ -98,6 +99,20 @@ fn device_and_cpu_agree() {
         assert!(n_differing <= 1200 / 20, "{name}: {n_differing} of 1200 pixels differ");
         let n_others = differing(&found, &on_cpu(&scene, &options, 2), 1e-3).len();
         assert!(n_others > 300, "{name}: pictures of other samples differ in {n_others} pixels");
+    }
+}
+
+/// In a scene of many triangles, the CPU traces all but camera rays one by one through a wide hierarchy, unless another
+/// traversal than that of packets is asked for.
+#[test]
+fn rays_one_by_one_make_the_picture_of_the_tree() {
+    for mut scene in [scenes::mixed(), scenes::mixed_outdoors()] {
+        scenes::add(&mut scene, meshes::torus(60, 30), scenes::veil(vec3(0.8, 0.5, 0.2), 0.5));
+        scenes::add(&mut scene, scenes::smooth_sphere(20, 0.7, Vec3::ZERO), scenes::glass(1.5));
+        assert!(scene.triangles.len() > 4096, "{}", scene.triangles.len());
+        let picture = |traversal| on_cpu(&scene, &RenderOptions { traversal, ..options(48, 36, 6) }, 4);
+        let [expected, found] = [Traversal::Mask, Traversal::OF_CPU].map(picture);
+        assert!(identical(&expected, &found), "{} pixels differ", differing(&expected, &found, 0.0).len());
     }
 }
 

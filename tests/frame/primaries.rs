@@ -8,11 +8,7 @@ use kdray::{
     engine::choices::{Processor, primary_by_rule, traversal_by_rule},
     frame::{Crop, Picture, Primary, RenderOptions},
     layout::Frame,
-    reference::{
-        inputs::KernelInputs,
-        primary_hit::camera_ray,
-        traverser::{Tracer, Traverser},
-    },
+    reference::{inputs::KernelInputs, primary_hit::camera_ray, traverser::Traverser},
     render::Renderer,
     world::{FlatScene, World},
 };

@@ -1,14 +1,14 @@
-//! Traces rays as packets.
+//! Traces rays as packets, and one by one through a wide hierarchy.
 
 use fearless_simd::{Level, Simd};
 use kdray::{
-    accel::kdtree::Traversal,
-    cpu::tracer::FastTracer,
-    layout::{Hit, PathRay},
+    accel::{kdtree::Traversal, wide_bvh::WideBvh},
+    cpu::{tracer::FastTracer, wide_traverser::WideTraverser},
+    layout::{Hit, NO_TRIANGLE, PathRay},
     reference::{search_ray::SearchRay, traverser::Tracer},
 };
 
-use super::MeshWithTree;
+use super::{MeshWithTree, compare::first_difference};
 
 /// Returns the instruction sets that the machine has, the baseline first.
 pub fn levels() -> Vec<Level> {
@@ -25,9 +25,28 @@ pub fn levels() -> Vec<Level> {
 
 /// Returns the hits of rays that are traced as packets, with the instructions of a level.
 pub fn traced<const ANY_HIT: bool>(world: &MeshWithTree, level: Level, rays: &[PathRay]) -> Vec<Hit> {
+    traced_by::<ANY_HIT>(world, FastTracer::at_level(&world.inputs(), Traversal::Stack, level), rays)
+}
+
+/// Compares the hits of rays that are traced one by one through the wide hierarchy of the world's kd-tree with what is
+/// expected: the closest hits bit for bit, and of any hits, which rays have one. Rays whose directions are so short that
+/// their lengths underflow only have to end: all t are infinite.
+pub fn check_one_by_one(world: &MeshWithTree, level: Level, rays: &[PathRay], expected: &[Hit]) {
+    let bvh = WideBvh::new(world.tree(), &world.triangles);
+    let traverser = || WideTraverser::new(&bvh, level);
+    let mut closest = traced_by::<false>(world, traverser(), rays);
+    let mut any = traced_by::<true>(world, traverser(), rays);
+    for (i, _) in rays.iter().enumerate().filter(|(_, ray)| !ray.direction.length_squared().is_normal()) {
+        (closest[i], any[i]) = (expected[i], expected[i]);
+    }
+    assert_eq!(first_difference(rays, expected, &closest), None, "one by one, {level:?}");
+    let is_hit = |hit: &Hit| hit.triangle_ix != NO_TRIANGLE;
+    assert!(any.iter().map(is_hit).eq(expected.iter().map(is_hit)), "one by one, {level:?}");
+}
+
+fn traced_by<const ANY_HIT: bool>(world: &MeshWithTree, mut tracer: impl Tracer, rays: &[PathRay]) -> Vec<Hit> {
     let mut hits = vec![None; rays.len()];
     let search_rays = hits.iter_mut().zip(rays.iter().map(SearchRay::from));
-    let mut tracer = FastTracer::at_level(&world.inputs(), Traversal::Stack, level);
     tracer.trace_all::<ANY_HIT, _>(&world.inputs(), search_rays, |place, hit| {
         assert_eq!(place.replace(hit), None, "a ray has one hit");
     });

@@ -14,6 +14,7 @@
 #define KDRAY_ENVIRONMENT
 
 #include "layout.glsl"
+#include "tent.glsl"
 #include "texture_words.glsl"
 #include "emitters/alias.glsl"
 #include "emitters/kinds.glsl"
@@ -98,11 +99,6 @@ struct MapPick {
     MapValue value;
 };
 
-// How far a place below a tent is from the tent's middle, -1 to 1. u: in [0, 1).
-float below_tent(float u) {
-    return u < 0.5 ? sqrt(2.0 * u) - 1.0 : 1.0 - sqrt(2.0 * (1.0 - u));
-}
-
 // A direction of the map.
 MapPick pick_map_direction(vec2 u) {
     uint n_rows = accel.environment_height, n_columns = accel.environment_width;
@@ -111,8 +107,8 @@ MapPick pick_map_direction(vec2 u) {
     AliasPick column = pick_alias(columns_begin, 2u, n_columns, u.y, 0.0);
     // Between a pole and the middle of its row, there is no other row: the tent's half is a rectangle of half a texel.
     bool is_at_pole = row.rest < 0.5 ? row.ix == 0u : row.ix == n_rows - 1u;
-    float down = float(row.ix) + (is_at_pole ? row.rest - 0.5 : below_tent(row.rest));
-    float right = float(column.ix) + below_tent(column.rest);
+    float down = float(row.ix) + (is_at_pole ? row.rest - 0.5 : tent(row.rest));
+    float right = float(column.ix) + tent(column.rest);
     // The polar angle is taken from the nearer pole, where sines are exact.
     bool is_upper = down + 0.5 < 0.5 * float(n_rows);
     float half_sine = sin(0.5 * EMITTER_PI / float(n_rows) * (is_upper ? down + 0.5 : float(n_rows) - 0.5 - down));

@@ -31,7 +31,10 @@ mod subtree;
 mod traversal;
 mod validate;
 
-use crate::layout::{AccelConstants, KD_AXIS_MASK, KD_LEAF, KD_MAX_DEPTH, KD_PAIR_SHIFT, KD_PLANE_EPSILON, KdNode};
+use crate::{
+    accel::bounds::Bounds,
+    layout::{AccelConstants, KD_AXIS_MASK, KD_LEAF, KD_MAX_DEPTH, KD_PAIR_SHIFT, KD_PLANE_EPSILON, KdNode, Triangle},
+};
 
 pub use links::TraversalLinks;
 pub use parts::Parts;
@@ -60,6 +63,14 @@ impl KdTree {
         let plane_epsilon = KD_PLANE_EPSILON * largest_coordinate;
         let origin_reach = self.scales.origin_reach(largest_coordinate);
         AccelConstants { box_min, box_max, plane_epsilon, origin_reach, ..AccelConstants::default() }
+    }
+
+    /// Returns the part of a leaf's cell that one of the leaf's triangles, grown by its margin, reaches. No corner of the
+    /// part is outside of the triangle's grown bounds.
+    pub(super) fn part_in(&self, triangle: &Triangle, cell: &Bounds) -> Bounds {
+        let part = Bounds::of(triangle).grown(self.scales.margin_of(triangle)).intersection(cell);
+        // A triangle of the leaf reaches the cell. If rounding says otherwise, the part is not less than the cell.
+        if (0..3).all(|axis| part.min[axis] <= part.max[axis]) { part } else { *cell }
     }
 }
 

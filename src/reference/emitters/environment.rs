@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     layout::AreaLight,
-    reference::{inputs::KernelInputs, turns::sin_cos_of_turns},
+    reference::{inputs::KernelInputs, tent::tent, turns::sin_cos_of_turns},
     world::{Emitters, EnvironmentMap},
 };
 
@@ -102,11 +102,6 @@ fn ambient_from(emitters: &Emitters, direction: Vec3) -> Vec3 {
     if direction[emitters.up_axis] < 0.0 { emitters.ground_ambient } else { emitters.ambient }
 }
 
-/// How far a place below a tent is from the tent's middle, -1 to 1. `u`: in [0, 1).
-fn below_tent(u: f32) -> f32 {
-    if u < 0.5 { (2.0 * u).sqrt() - 1.0 } else { 1.0 - (2.0 * (1.0 - u)).sqrt() }
-}
-
 fn pick_in_map(emitters: &Emitters, map: &EnvironmentMap, u: Vec2) -> LightPick {
     let [n_columns, n_rows] = map.size;
     let row = pick_alias(n_rows, |ix| map.rows[ix as usize].parts(), u.x, 0.0);
@@ -114,8 +109,8 @@ fn pick_in_map(emitters: &Emitters, map: &EnvironmentMap, u: Vec2) -> LightPick 
     let column = pick_alias(n_columns, |ix| map.columns[(first_column + ix) as usize].parts(), u.y, 0.0);
     // Between a pole and the middle of its row, there is no other row: the tent's half is a rectangle of half a texel.
     let is_at_pole = if row.rest < 0.5 { row.ix == 0 } else { row.ix == n_rows - 1 };
-    let down = row.ix as f32 + if is_at_pole { row.rest - 0.5 } else { below_tent(row.rest) };
-    let right = column.ix as f32 + below_tent(column.rest);
+    let down = row.ix as f32 + if is_at_pole { row.rest - 0.5 } else { tent(row.rest) };
+    let right = column.ix as f32 + tent(column.rest);
     // The polar angle is taken from the nearer pole, where sines are exact.
     let is_upper = down + 0.5 < 0.5 * n_rows as f32;
     let from_pole = if is_upper { down + 0.5 } else { n_rows as f32 - 0.5 - down };

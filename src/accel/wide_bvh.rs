@@ -1,0 +1,317 @@
+//! A bounding volume hierarchy with sixteen children a node, for single rays on the CPU: a ray tests all boxes of a
+//! node at once, and all triangles of a block (Wald, Benthin, Boulos: "Getting rid of packets: efficient SIMD single-ray
+//! traversal using multi-branching BVHs", 2008).
+//!
+//! It is made from a kd-tree. Subtrees with at most sixteen triangles become blocks; of the splits above them, up to
+//! fifteen become one node. So it has a twelfth of the kd-tree's nodes or less, and is ready in a tenth of the time that
+//! the kd-tree takes.
+//!
+//! # Why no ray misses a triangle
+//!
+//! The box of a kd-tree's leaf is the part of the leaf's cell that the leaf's triangles, grown by their margins, reach.
+//! The builder of the kd-tree could have cut off the rest of the cell as empty by six more splits. So the proof for the
+//! leaves of the kd-tree (bounds.rs) holds for the box, too. All other boxes contain those of their leaves, and the t at
+//! which a ray meets a plane grows with the plane's distance, also after rounding.
+
+use arrayvec::ArrayVec;
+use rayon::prelude::*;
+
+use super::{
+    bounds::Bounds,
+    kdtree::{KdTree, Node},
+};
+use crate::layout::{NO_TRIANGLE, Triangle};
+
+/// The most children of a node, and the most triangles of a block.
+pub const WIDTH: usize = 16;
+/// Set in a reference to a block. The other bits are the block's index. Without it, they are a node's index.
+pub const IS_BLOCK: u32 = 1 << 31;
+/// A reference to the first block, which is empty. Unused children refer to it, since a ray whose direction is infinite
+/// may seem to meet their boxes.
+const EMPTY_BLOCK: u32 = IS_BLOCK;
+/// The number of levels below the root of the kd-tree whose subtrees are converted in parallel.
+const PARALLEL_LEVELS: u32 = 8;
+
+/// The boxes of up to sixteen subtrees, as a structure of arrays. Unused boxes are empty.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+pub struct WideNode {
+    /// The boxes' lower sides on each axis, followed by their upper sides, world units.
+    pub sides: [[f32; WIDTH]; 6],
+    /// References to the subtrees.
+    pub children: [u32; WIDTH],
+}
+
+/// Up to sixteen triangles, as a structure of arrays. Unused triangles have corners of NaN, so that no ray hits them.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+pub struct TriangleBlock {
+    /// The coordinates of each corner on each axis, world units.
+    pub corners: [[[f32; WIDTH]; 3]; 3],
+    /// The indices of the triangles.
+    pub triangle_ixs: [u32; WIDTH],
+}
+
+/// The hierarchy. Its root is the first node.
+#[derive(Clone, Debug)]
+pub struct WideBvh {
+    nodes: Vec<WideNode>,
+    blocks: Vec<TriangleBlock>,
+}
+
+/// The triangles of a block, in ascending order.
+type BlockList = ArrayVec<u32, WIDTH>;
+
+/// A subtree before it is written to the arrays.
+enum Subtree {
+    Empty,
+    Block { bounds: Bounds, triangle_ixs: BlockList },
+    Inner { bounds: Bounds, children: Box<[Subtree; 2]> },
+}
+
+/// Returns half of a box's surface area.
+fn half_area(bounds: &Bounds) -> f64 {
+    let [x, y, z] = bounds.extent();
+    x * y + y * z + z * x
+}
+
+/// Returns the union of two ascending lists, if it fits into a block.
+fn union(a: &BlockList, b: &BlockList) -> Option<BlockList> {
+    let mut both: ArrayVec<u32, { 2 * WIDTH }> = a.iter().chain(b).copied().collect();
+    both.sort_unstable();
+    let mut all = BlockList::new();
+    for triangle_ix in both {
+        if all.last() != Some(&triangle_ix) {
+            all.try_push(triangle_ix).ok()?;
+        }
+    }
+    Some(all)
+}
+
+impl Subtree {
+    /// Converts the subtree of a kd-tree's node. `level`: of the node below the root.
+    fn of(tree: &KdTree, triangles: &[Triangle], node_ix: u32, cell: &Bounds, level: u32) -> Self {
+        match tree.node(node_ix) {
+            Node::Leaf { first, count } => {
+                let entries = first as usize..(first + count) as usize;
+                Self::of_leaf(tree, triangles, &tree.leaf_triangles()[entries], cell)
+            }
+            Node::Split { axis, position, child } => {
+                let [below, above] = cell.split(axis, position);
+                let of_below = || Self::of(tree, triangles, child, &below, level + 1);
+                let of_above = || Self::of(tree, triangles, child + 1, &above, level + 1);
+                let (below, above) = match level < PARALLEL_LEVELS {
+                    true => rayon::join(of_below, of_above),
+                    false => (of_below(), of_above()),
+                };
+                Self::join(below, above)
+            }
+        }
+    }
+
+    /// Converts a leaf. Triangles that do not fit into a block are halved.
+    fn of_leaf(tree: &KdTree, triangles: &[Triangle], triangle_ixs: &[u32], cell: &Bounds) -> Self {
+        if triangle_ixs.len() > WIDTH {
+            let (a, b) = triangle_ixs.split_at(triangle_ixs.len() / 2);
+            return Self::join(Self::of_leaf(tree, triangles, a, cell), Self::of_leaf(tree, triangles, b, cell));
+        }
+        let part_of = |triangle_ix: &u32| tree.part_in(&triangles[*triangle_ix as usize], cell);
+        let Some(bounds) = triangle_ixs.iter().map(part_of).reduce(|a, b| a.union(&b)) else { return Self::Empty };
+        let mut triangle_ixs: BlockList = triangle_ixs.iter().copied().collect();
+        triangle_ixs.sort_unstable();
+        Self::Block { bounds, triangle_ixs }
+    }
+
+    /// Returns the subtree of two subtrees. Two blocks become one if it has room, and if rays are no likelier to meet
+    /// its box than one of theirs.
+    fn join(a: Self, b: Self) -> Self {
+        let bounds = match (a.bounds(), b.bounds()) {
+            (Some(a), Some(b)) => a.union(b),
+            (None, _) => return b,
+            (_, None) => return a,
+        };
+        if let (Self::Block { bounds: of_a, triangle_ixs: in_a }, Self::Block { bounds: of_b, triangle_ixs: in_b }) =
+            (&a, &b)
+            && half_area(&bounds) <= half_area(of_a) + half_area(of_b)
+            && let Some(triangle_ixs) = union(in_a, in_b)
+        {
+            return Self::Block { bounds, triangle_ixs };
+        }
+        Self::Inner { bounds, children: Box::new([a, b]) }
+    }
+
+    fn bounds(&self) -> Option<&Bounds> {
+        match self {
+            Self::Empty => None,
+            Self::Block { bounds, .. } | Self::Inner { bounds, .. } => Some(bounds),
+        }
+    }
+
+    /// Returns the surface area if the subtree can be replaced by its two children.
+    fn area_of_inner(&self) -> Option<f64> {
+        if let Self::Inner { bounds, .. } = self { Some(half_area(bounds)) } else { None }
+    }
+
+    /// Returns the subtrees that become the children of this subtree's node. Those with the largest boxes are replaced
+    /// by their own children as long as there is room.
+    fn into_children(self) -> ArrayVec<Self, WIDTH> {
+        let mut children = ArrayVec::from_iter([self]);
+        while !children.is_full() {
+            let inner = children.iter().enumerate().filter_map(|(place, child)| Some((place, child.area_of_inner()?)));
+            let Some((largest, _)) = inner.max_by(|a, b| a.1.total_cmp(&b.1)) else { break };
+            if let Self::Inner { children: both, .. } = children.swap_remove(largest) {
+                children.extend(*both);
+            }
+        }
+        children
+    }
+}
+
+impl WideNode {
+    /// Returns a node with empty boxes.
+    fn empty() -> Self {
+        let (lower, upper) = ([f32::MAX; WIDTH], [f32::MIN; WIDTH]);
+        Self { sides: [lower, lower, lower, upper, upper, upper], children: [EMPTY_BLOCK; WIDTH] }
+    }
+
+    fn set(&mut self, lane: usize, bounds: &Bounds, child: u32) {
+        for axis in 0..3 {
+            self.sides[axis][lane] = bounds.min[axis];
+            self.sides[3 + axis][lane] = bounds.max[axis];
+        }
+        self.children[lane] = child;
+    }
+}
+
+impl TriangleBlock {
+    fn new(triangles: &[Triangle], triangle_ixs: &BlockList) -> Self {
+        let mut block = Self { corners: [[[f32::NAN; WIDTH]; 3]; 3], triangle_ixs: [NO_TRIANGLE; WIDTH] };
+        for (lane, &triangle_ix) in triangle_ixs.iter().enumerate() {
+            let triangle = &triangles[triangle_ix as usize];
+            for (columns, corner) in block.corners.iter_mut().zip([triangle.v0, triangle.v1, triangle.v2]) {
+                (0..3).for_each(|axis| columns[axis][lane] = corner[axis]);
+            }
+            block.triangle_ixs[lane] = triangle_ix;
+        }
+        block
+    }
+}
+
+/// Writes the node of a subtree and all nodes below it. Appends the lists of their blocks to `lists`.
+fn write(subtree: Subtree, nodes: &mut Vec<WideNode>, lists: &mut Vec<BlockList>) {
+    let place = nodes.len();
+    nodes.push(WideNode::empty());
+    for (lane, child) in subtree.into_children().into_iter().enumerate() {
+        let (bounds, reference) = match &child {
+            Subtree::Empty => continue,
+            Subtree::Block { bounds, .. } => (*bounds, IS_BLOCK | lists.len() as u32),
+            Subtree::Inner { bounds, .. } => (*bounds, nodes.len() as u32),
+        };
+        nodes[place].set(lane, &bounds, reference);
+        match child {
+            Subtree::Block { triangle_ixs, .. } => lists.push(triangle_ixs),
+            inner => write(inner, nodes, lists),
+        }
+    }
+}
+
+impl WideBvh {
+    /// Makes the hierarchy of the triangles that a kd-tree was built from, on the current rayon pool.
+    pub fn new(tree: &KdTree, triangles: &[Triangle]) -> Self {
+        let cell = Bounds { min: tree.box_min().to_array(), max: tree.box_max().to_array() };
+        let (mut nodes, mut lists) = (Vec::new(), vec![BlockList::new()]);
+        write(Subtree::of(tree, triangles, 0, &cell, 0), &mut nodes, &mut lists);
+        let blocks = lists.par_iter().map(|list| TriangleBlock::new(triangles, list)).collect();
+        Self { nodes, blocks }
+    }
+
+    /// All nodes, the root first.
+    pub fn nodes(&self) -> &[WideNode] {
+        &self.nodes
+    }
+
+    /// All blocks. The first one is empty.
+    pub fn blocks(&self) -> &[TriangleBlock] {
+        &self.blocks
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Vec3, vec3};
+
+    use super::*;
+    use crate::accel::kdtree::BuildOptions;
+
+    /// Triangles of a bumpy sheet, and others that all share a corner.
+    fn triangles() -> Vec<Triangle> {
+        let at = |i: i32, j: i32| vec3(i as f32, ((i * i + 3 * j) % 7) as f32 * 0.1, j as f32);
+        let of_sheet = |i: i32| {
+            let (x, y) = (i % 40, i / 40);
+            Triangle { v0: at(x, y), v1: at(x + 1, y), v2: at(x, y + 1), ..Triangle::default() }
+        };
+        let of_fan = |i: i32| {
+            let turn = i as f32 * 0.01;
+            Triangle { v0: vec3(20.0, 5.0, 20.0), v1: vec3(turn.cos(), 9.0, turn.sin()), ..of_sheet(i) }
+        };
+        (0..1600).map(of_sheet).chain((0..600).map(of_fan)).collect()
+    }
+
+    fn bounds_of(node: &WideNode, lane: usize) -> Bounds {
+        let side = |first: usize| [0, 1, 2].map(|axis| node.sides[first + axis][lane]);
+        Bounds { min: side(0), max: side(3) }
+    }
+
+    /// Calls `visit` with each block and the boxes around it, from the root's child on.
+    fn visit_blocks(bvh: &WideBvh, node_ix: u32, boxes: &mut Vec<Bounds>, visit: &mut impl FnMut(u32, &[Bounds])) {
+        let node = &bvh.nodes()[node_ix as usize];
+        for lane in 0..WIDTH {
+            let bounds = bounds_of(node, lane);
+            if bounds.min[0] > bounds.max[0] {
+                continue;
+            }
+            boxes.push(bounds);
+            match node.children[lane] {
+                child if child & IS_BLOCK != 0 => visit(child & !IS_BLOCK, boxes),
+                child => visit_blocks(bvh, child, boxes, visit),
+            }
+            boxes.pop();
+        }
+    }
+
+    #[test]
+    fn each_triangle_is_in_blocks_and_each_block_in_its_boxes() {
+        let triangles = triangles();
+        for options in [BuildOptions::default(), BuildOptions::fast()] {
+            let bvh = WideBvh::new(&KdTree::build(&triangles, &options), &triangles);
+            let (mut n_visits, mut is_seen) = (vec![0; bvh.blocks().len()], vec![false; triangles.len()]);
+            visit_blocks(&bvh, 0, &mut Vec::new(), &mut |block_ix, boxes| {
+                n_visits[block_ix as usize] += 1;
+                let innermost = boxes.last().unwrap();
+                assert!(boxes.iter().all(|around| around.union(innermost) == *around));
+                let block = &bvh.blocks()[block_ix as usize];
+                for (lane, &triangle_ix) in block.triangle_ixs.iter().enumerate() {
+                    let corner = |i: usize| Vec3::from_array([0, 1, 2].map(|axis| block.corners[i][axis][lane]));
+                    if triangle_ix == NO_TRIANGLE {
+                        assert!(corner(0).is_nan());
+                        continue;
+                    }
+                    let triangle = &triangles[triangle_ix as usize];
+                    assert_eq!([corner(0), corner(1), corner(2)], [triangle.v0, triangle.v1, triangle.v2]);
+                    assert!(Bounds::of(triangle).touches(innermost));
+                    is_seen[triangle_ix as usize] = true;
+                }
+            });
+            assert!(n_visits[0] == 0 && n_visits[1..].iter().all(|n| *n == 1));
+            assert!(is_seen.iter().all(|is_seen| *is_seen));
+            assert!(bvh.nodes().len() > 10, "{}", bvh.nodes().len());
+        }
+    }
+
+    #[test]
+    fn a_world_without_triangles_has_a_root_without_children() {
+        let bvh = WideBvh::new(&KdTree::build(&[], &BuildOptions::default()), &[]);
+        visit_blocks(&bvh, 0, &mut Vec::new(), &mut |_, _| panic!("a block"));
+        assert_eq!((bvh.nodes().len(), bvh.blocks().len()), (1, 1));
+    }
+}

@@ -1,0 +1,229 @@
+//! Traversal of single rays through a [`WideBvh`]. Rays that have nothing in common gain nothing from packets; here
+//! such a ray tests sixteen boxes or triangles at once. It finds the same hit as by every other traversal, bit for bit.
+
+use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
+
+use super::{lanes::LaneMask, packet_triangle::Shears};
+use crate::{
+    accel::wide_bvh::{IS_BLOCK, TriangleBlock, WIDTH, WideBvh, WideNode},
+    layout::{Hit, KD_MAX_DEPTH},
+    reference::{
+        candidate::HitFilter,
+        counting::table::ReadCounter,
+        inputs::KernelInputs,
+        kdtree::is_done,
+        search_ray::SearchRay,
+        traversal_ray::{TraversalRay, hit_from_near},
+        traverser::Tracer,
+    },
+};
+
+/// The most levels of the hierarchy. Each one has a level of the kd-tree, or halves a leaf with too many triangles.
+const MOST_LEVELS: usize = KD_MAX_DEPTH as usize + 32;
+/// The most subtrees that are pending: at each level, all children but one.
+const MOST_PENDING: usize = MOST_LEVELS * (WIDTH - 1);
+
+/// A pending subtree: one that the ray visits later.
+#[derive(Clone, Copy, Default)]
+struct Pending {
+    /// The t at which the ray enters the subtree's box.
+    t_enter: f32,
+    /// A reference to the subtree.
+    subtree: u32,
+}
+
+/// The stack of pending subtrees. The nearest one is on top.
+struct Stack {
+    entries: [Pending; MOST_PENDING],
+    size: usize,
+}
+
+/// Traces rays through a [`WideBvh`] on one thread, and owns the working memory for that.
+pub struct WideTraverser<'a> {
+    bvh: &'a WideBvh,
+    level: Level,
+    stack: Stack,
+}
+
+/// A ray as columns that are the same in all lanes.
+struct RayColumns<S: Simd> {
+    inv_direction: [f32x16<S>; 3],
+    bias: [f32x16<S>; 3],
+    t_enter: f32x16<S>,
+    shears: Shears<S>,
+    /// For each axis, the side through which the ray enters boxes, as an index into [`WideNode::sides`].
+    near_sides: [usize; 3],
+    /// For each axis, the side through which the ray leaves boxes.
+    far_sides: [usize; 3],
+}
+
+/// The children whose boxes a ray meets, and the t at which it enters each box.
+struct Entered {
+    lanes: LaneMask,
+    t_enter: [f32; WIDTH],
+}
+
+impl<S: Simd> RayColumns<S> {
+    #[inline(always)]
+    fn new(simd: S, ray: &TraversalRay) -> Self {
+        let [x, y, z, _] = ray.inv_direction;
+        let [bias_x, bias_y, bias_z, _] = ray.bias;
+        let goes_down = [x < 0.0, y < 0.0, z < 0.0];
+        Self {
+            inv_direction: [f32x16::splat(simd, x), f32x16::splat(simd, y), f32x16::splat(simd, z)],
+            bias: [f32x16::splat(simd, bias_x), f32x16::splat(simd, bias_y), f32x16::splat(simd, bias_z)],
+            t_enter: f32x16::splat(simd, ray.t_enter),
+            shears: Shears::splat(simd, &ray.hit_filter.shear),
+            near_sides: [0, 1, 2].map(|axis| if goes_down[axis] { 3 + axis } else { axis }),
+            far_sides: [0, 1, 2].map(|axis| if goes_down[axis] { axis } else { 3 + axis }),
+        }
+    }
+
+    /// Returns the t at which the ray meets a side of each box.
+    #[inline(always)]
+    fn t_at(&self, node: &WideNode, side: usize) -> f32x16<S> {
+        let axis = if side < 3 { side } else { side - 3 };
+        f32x16::load_array_ref(self.t_enter.simd, &node.sides[side]) * self.inv_direction[axis] + self.bias[axis]
+    }
+
+    /// Returns the children whose boxes the ray enters no farther than `t_best`.
+    #[inline(always)]
+    fn enter(&self, node: &WideNode, t_best: f32) -> Entered {
+        let ([near_x, near_y, near_z], [far_x, far_y, far_z]) = (self.near_sides, self.far_sides);
+        let (x, y, z) = (self.t_at(node, near_x), self.t_at(node, near_y), self.t_at(node, near_z));
+        let t_enter = x.max(y).max(z.max(self.t_enter));
+        let (x, y, z) = (self.t_at(node, far_x), self.t_at(node, far_y), self.t_at(node, far_z));
+        let t_exit = x.min(y).min(z.min(f32x16::splat(self.t_enter.simd, t_best)));
+        Entered { lanes: t_enter.simd_le(t_exit).to_bitmask() as LaneMask, t_enter: t_enter.to_array() }
+    }
+
+    /// Tests a block's triangles, as `candidate::intersect` does with each.
+    #[inline(always)]
+    fn intersect(
+        &self,
+        inputs: &KernelInputs<impl ReadCounter>,
+        filter: &HitFilter,
+        block: &TriangleBlock,
+        best: &mut Hit,
+    ) {
+        let triangle_ixs = u32x16::load_array_ref(self.t_enter.simd, &block.triangle_ixs);
+        let Some((found, is_hit)) = self.shears.intersect_triangles(&block.corners, triangle_ixs, filter.shear.axis)
+        else {
+            return;
+        };
+        let may_count = is_hit & found.t.simd_le(best.t) & found.t.simd_gt(filter.t_min);
+        let mut lanes = may_count.to_bitmask() as LaneMask;
+        while lanes != 0 {
+            let hit = found.of_lane(lanes.trailing_zeros() as usize);
+            filter.keep_nearest(inputs, &hit, best);
+            lanes &= lanes - 1;
+        }
+    }
+}
+
+impl Stack {
+    /// Makes all children that the ray enters pending but the nearest one, and returns that.
+    #[inline(always)]
+    fn push_all_but_nearest(&mut self, node: &WideNode, entered: &Entered) -> Option<u32> {
+        let mut lanes = entered.lanes;
+        let mut next = || {
+            let lane = lanes.trailing_zeros() as usize;
+            lanes &= lanes.wrapping_sub(1);
+            (lane < WIDTH).then(|| Pending { t_enter: entered.t_enter[lane], subtree: node.children[lane] })
+        };
+        let (bottom, mut nearest) = (self.size, next()?);
+        while let Some(mut pending) = next() {
+            if pending.t_enter < nearest.t_enter {
+                std::mem::swap(&mut pending, &mut nearest);
+            }
+            let mut place = self.size;
+            while place > bottom && self.entries[place - 1].t_enter < pending.t_enter {
+                self.entries[place] = self.entries[place - 1];
+                place -= 1;
+            }
+            self.entries[place] = pending;
+            self.size += 1;
+        }
+        Some(nearest.subtree)
+    }
+
+    /// Returns the next pending subtree that the ray enters no farther than `t_best`.
+    #[inline(always)]
+    fn pop(&mut self, t_best: f32) -> Option<u32> {
+        while self.size > 0 {
+            self.size -= 1;
+            let Pending { t_enter, subtree } = self.entries[self.size];
+            if t_enter <= t_best {
+                return Some(subtree);
+            }
+        }
+        None
+    }
+}
+
+impl<'a> WideTraverser<'a> {
+    /// Creates a traverser that uses the instructions of `level`, which the machine must have. The hits are the same at
+    /// every level, bit for bit.
+    pub fn new(bvh: &'a WideBvh, level: Level) -> Self {
+        Self { bvh, level, stack: Stack { entries: [Pending::default(); MOST_PENDING], size: 0 } }
+    }
+
+    /// Visits all blocks whose boxes the ray meets, until no nearer hit can follow.
+    #[inline(always)]
+    fn search<S: Simd, const ANY_HIT: bool>(
+        &mut self,
+        simd: S,
+        inputs: &KernelInputs<impl ReadCounter>,
+        ray: &TraversalRay,
+        best: &mut Hit,
+    ) {
+        let columns = RayColumns::new(simd, ray);
+        let mut subtree = 0;
+        self.stack.size = 0;
+        loop {
+            let nearest = if subtree & IS_BLOCK != 0 {
+                columns.intersect(inputs, &ray.hit_filter, &self.bvh.blocks()[(subtree & !IS_BLOCK) as usize], best);
+                if is_done::<ANY_HIT>(best) {
+                    return;
+                }
+                None
+            } else {
+                let node = &self.bvh.nodes()[subtree as usize];
+                self.stack.push_all_but_nearest(node, &columns.enter(node, best.t))
+            };
+            match nearest.or_else(|| self.stack.pop(best.t)) {
+                Some(next) => subtree = next,
+                None => return,
+            }
+        }
+    }
+
+    /// Finds a ray's closest hit in (t_min, t_max], or with `ANY_HIT` one that need not be the closest. A miss has
+    /// t = t_max.
+    #[inline]
+    pub fn traverse<const ANY_HIT: bool>(
+        &mut self,
+        inputs: &KernelInputs<impl ReadCounter>,
+        search_ray: &SearchRay,
+    ) -> Hit {
+        hit_from_near(inputs, search_ray, |near, best| {
+            let ray = TraversalRay::new(inputs, near);
+            // The comparison is not `>`, since a NaN has to miss.
+            if ray.t_enter <= ray.t_exit {
+                dispatch!(self.level, simd => self.search::<_, ANY_HIT>(simd, inputs, &ray, best));
+            }
+        })
+    }
+}
+
+impl Tracer for WideTraverser<'_> {
+    #[inline]
+    fn trace_all<const ANY_HIT: bool, Key>(
+        &mut self,
+        inputs: &KernelInputs<impl ReadCounter>,
+        search_rays: impl Iterator<Item = (Key, SearchRay)>,
+        mut found: impl FnMut(Key, Hit),
+    ) {
+        search_rays.for_each(|(key, search_ray)| found(key, self.traverse::<ANY_HIT>(inputs, &search_ray)));
+    }
+}
