@@ -1,5 +1,5 @@
-// A tent, which falls from its middle to both sides. The pixel's filter `tent` and the places in an environment's map are
-// sampled by it. Twin of src/reference/tent.rs. Needs nothing.
+// A tent, which falls from its middle to both sides. The pixel's filter `tent` and the places in an environment's map
+// are sampled by it. Twin of src/reference/tent.rs. Needs nothing.
 #ifndef KDRAY_TENT
 #define KDRAY_TENT
 

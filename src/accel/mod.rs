@@ -1,5 +1,5 @@
-//! Acceleration structures: kd-trees and grids, which find the triangles that a ray may hit. For single rays on the CPU,
-//! a kd-tree is converted to a wide hierarchy of boxes.
+//! Acceleration structures: kd-trees and grids, which find the triangles that a ray may hit. For single rays on the
+//! CPU, a kd-tree is converted to a wide hierarchy of boxes.
 
 mod bounds;
 pub mod grid;

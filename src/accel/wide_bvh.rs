@@ -1,17 +1,17 @@
 //! A bounding volume hierarchy with sixteen children a node, for single rays on the CPU: a ray tests all boxes of a
-//! node at once, and all triangles of a block (Wald, Benthin, Boulos: "Getting rid of packets: efficient SIMD single-ray
-//! traversal using multi-branching BVHs", 2008).
+//! node at once, and all triangles of a block (Wald, Benthin, Boulos: "Getting rid of packets: efficient SIMD
+//! single-ray traversal using multi-branching BVHs", 2008).
 //!
 //! It is made from a kd-tree. Subtrees with at most sixteen triangles become blocks; of the splits above them, up to
-//! fifteen become one node. So it has a twelfth of the kd-tree's nodes or less, and is ready in a tenth of the time that
-//! the kd-tree takes.
+//! fifteen become one node.
 //!
 //! # Why no ray misses a triangle
 //!
-//! The box of a kd-tree's leaf is the part of the leaf's cell that the leaf's triangles, grown by their margins, reach.
-//! The builder of the kd-tree could have cut off the rest of the cell as empty by six more splits. So the proof for the
-//! leaves of the kd-tree (bounds.rs) holds for the box, too. All other boxes contain those of their leaves, and the t at
-//! which a ray meets a plane grows with the plane's distance, also after rounding.
+//! The box of a kd-tree's leaf is the part of the leaf's cell that the bounds of the leaf's triangles, grown by their
+//! margins, reach. The builder of the kd-tree could have cut off the rest of the cell as empty by six more splits. So
+//! the proof for the leaves of the kd-tree (bounds.rs) holds for the box, too. All other boxes contain those of their
+//! leaves. A ray that enters a box also enters them: of two planes, it meets the one that it comes to first at no
+//! greater t, also after rounding.
 
 use arrayvec::ArrayVec;
 use rayon::prelude::*;

@@ -167,8 +167,8 @@ impl<S: Simd> Shears<S> {
         self.hits(corners, triangle_ixs, mask32x16::splat(self.x.simd, true))
     }
 
-    /// Returns the hits of triangles by their sheared corners, and those of `lanes` in which they are valid. Returns none
-    /// if the rounded edge functions already exclude all hits.
+    /// Returns the hits of triangles by their sheared corners, and those of `lanes` in which they are valid. Returns
+    /// none if the rounded edge functions already exclude all hits.
     #[inline(always)]
     fn hits(
         &self,

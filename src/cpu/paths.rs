@@ -37,8 +37,8 @@ fn vector_size<S: Simd>(_: S) -> usize {
     size_of::<S::f32s>() / size_of::<f32>()
 }
 
-/// Returns the hierarchy through which scattered rays of paths are traced one by one. Returns none if packets through the
-/// kd-tree are faster, or if `traversal` is another algorithm than that of packets.
+/// Returns the hierarchy through which scattered rays of paths are traced one by one. Returns none if packets through
+/// the kd-tree are faster, or if `traversal` is another algorithm than that of packets.
 pub fn wide_bvh_for(world: &World, traversal: Traversal) -> Option<&WideBvh> {
     let is_large = world.scene().triangles.len() >= LEAST_WIDE_TRIANGLES;
     let is_faster = is_large && dispatch!(Level::new(), simd => vector_size(simd)) >= LEAST_WIDE_VECTOR;

@@ -139,8 +139,8 @@ impl World {
         self.0.emitters.get_or_init(|| Emitters::new(&self.0.scene))
     }
 
-    /// The wide hierarchy of the kd-tree's boxes, through which the CPU traces single rays; none for a grid. It is made at
-    /// the first call, on the current rayon pool.
+    /// The wide hierarchy, made from the kd-tree, through which the CPU traces single rays. There is none for a grid. It
+    /// is made at the first call, on the current rayon pool.
     pub fn wide_bvh(&self) -> Option<&WideBvh> {
         let make = || Some(WideBvh::new(self.0.accel.as_kdtree()?, &self.0.scene.triangles));
         self.0.wide_bvh.get_or_init(make).as_ref()

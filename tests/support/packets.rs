@@ -29,8 +29,8 @@ pub fn traced<const ANY_HIT: bool>(world: &MeshWithTree, level: Level, rays: &[P
 }
 
 /// Compares the hits of rays that are traced one by one through the wide hierarchy of the world's kd-tree with what is
-/// expected: the closest hits bit for bit, and of any hits, which rays have one. Rays whose directions are so short that
-/// their lengths underflow only have to end: all t are infinite.
+/// expected: the closest hits bit for bit, and of any hits, which rays have one. Rays whose directions are so short
+/// that their lengths underflow only have to end: all t are infinite.
 pub fn check_one_by_one(world: &MeshWithTree, level: Level, rays: &[PathRay], expected: &[Hit]) {
     let bvh = WideBvh::new(world.tree(), &world.triangles);
     let traverser = || WideTraverser::new(&bvh, level);

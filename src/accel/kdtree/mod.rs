@@ -65,11 +65,10 @@ impl KdTree {
         AccelConstants { box_min, box_max, plane_epsilon, origin_reach, ..AccelConstants::default() }
     }
 
-    /// Returns the part of a leaf's cell that one of the leaf's triangles, grown by its margin, reaches. No corner of the
-    /// part is outside of the triangle's grown bounds.
+    /// Returns the box in a leaf's cell that the bounds of one of the leaf's triangles, grown by its margin, reach.
     pub(super) fn part_in(&self, triangle: &Triangle, cell: &Bounds) -> Bounds {
         let part = Bounds::of(triangle).grown(self.scales.margin_of(triangle)).intersection(cell);
-        // A triangle of the leaf reaches the cell. If rounding says otherwise, the part is not less than the cell.
+        // A triangle of the leaf reaches the cell. If rounding says otherwise, the part is the cell.
         if (0..3).all(|axis| part.min[axis] <= part.max[axis]) { part } else { *cell }
     }
 }
