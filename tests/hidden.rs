@@ -3,14 +3,15 @@
 
 mod support;
 
+use fearless_simd::Level;
 use glam::Vec3;
 use kdray::{
-    accel::{Query, kdtree::Traversal},
+    accel::{Query, kdtree::Traversal, wide_bvh::WideBvh},
     cast::{Caster, CpuCaster, Hit, NO_TRIANGLE, Ray},
     layout::{TRIANGLE_HIDDEN, Triangle},
     reference::{brute, search_ray::SearchRay, traversal_ray::hit_from_near, traverser::Traverser},
 };
-use support::{MeshWithTree, compare, device, meshes, random::Random, rays::nasty_ray};
+use support::{MeshWithTree, compare, device, meshes, packets::traced_one_by_one, random::Random, rays::nasty_ray};
 
 const MISS: Hit = Hit { t: f32::INFINITY, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
 
@@ -97,6 +98,24 @@ fn the_cpu_finds_what_is_not_hidden() {
             assert_eq!(occluded(&expected), occluded(&any), "{traversal}");
             assert!(any.iter().all(|hit| !case.hidden.contains(&hit.triangle_ix)), "{traversal}");
         }
+    }
+}
+
+#[test]
+fn single_rays_find_what_is_not_hidden() {
+    for case in cases() {
+        let word_of = |ix| if case.hidden.contains(&ix) { TRIANGLE_HIDDEN } else { 0 };
+        let words: Vec<u32> = (0..case.mesh.triangles.len() as u32).map(word_of).collect();
+        let inputs = case.mesh.inputs().with_hidden(&words);
+        let rays: Vec<_> = (0..3000).map(|i| nasty_ray(&mut Random(i as u64), &case.mesh, i)).collect();
+        let mut reference = Traverser::new(&inputs, Traversal::Mask);
+        let expected: Vec<_> = rays.iter().map(|ray| reference.traverse::<false>(&inputs, &ray.into())).collect();
+        let bvh = WideBvh::new(case.mesh.tree(), &case.mesh.triangles);
+        let found = traced_one_by_one::<false>(&inputs, &bvh, Level::new(), &rays);
+        assert_eq!(compare::first_difference(&rays, &expected, &found), None);
+        let any = traced_one_by_one::<true>(&inputs, &bvh, Level::new(), &rays);
+        assert_eq!(occluded(&expected), occluded(&any));
+        assert!(expected.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count() > 300);
     }
 }
 

@@ -1,5 +1,5 @@
-//! Compares sixteen rays together, or one ray with sixteen boxes or triangles, with one ray that does one thing after
-//! the other, with each instruction set that the machine has. The hits are the same, bit for bit.
+//! Compares sixteen rays at once, and one ray with sixteen boxes or triangles at once, with the reference, which does
+//! one test after the other. This is done with each instruction set of the machine. The hits are the same, bit for bit.
 
 mod support;
 

@@ -8,6 +8,7 @@ use kdray::{
     accel::{
         Query,
         kdtree::{BuildOptions, KdTree, Traversal},
+        wide_bvh::WideBvh,
     },
     cpu::tracer::FastTracer,
     layout::{Hit, NO_TRIANGLE, PathRay, Slab, Triangle},
@@ -25,7 +26,7 @@ use support::{
     MeshWithTree,
     compare::first_difference,
     meshes,
-    packets::check_one_by_one,
+    packets::{check_one_by_one, traced_one_by_one},
     random::Random,
     rays::{nasty_ray, outward_ray, ray},
 };
@@ -134,6 +135,9 @@ fn a_missing_triangle_in_a_leaf_is_noticed() {
     without[world.tree().leaf_triangles()[0] as usize].v0 = Vec3::NAN;
     world = MeshWithTree::with_tree(world.triangles, KdTree::build(&without, &BuildOptions::default()));
     assert!(first_difference(&rays, &hits, &traced(&world, Traversal::Mask, &rays)).is_some());
+    let bvh = WideBvh::new(world.tree(), &world.triangles);
+    let one_by_one = traced_one_by_one::<false>(&world.inputs(), &bvh, Level::new(), &rays);
+    assert!(first_difference(&rays, &hits, &one_by_one).is_some());
 }
 
 #[test]

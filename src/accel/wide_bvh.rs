@@ -2,16 +2,18 @@
 //! node at once, and all triangles of a block (Wald, Benthin, Boulos: "Getting rid of packets: efficient SIMD
 //! single-ray traversal using multi-branching BVHs", 2008).
 //!
-//! It is made from a kd-tree. Subtrees with at most sixteen triangles become blocks; of the splits above them, up to
+//! It is made from a kd-tree. Leaves become blocks of triangles. Two sibling blocks are joined if they have at most
+//! sixteen triangles together, and if the joint box is no larger than both boxes. Of the splits above the blocks, up to
 //! fifteen become one node.
 //!
 //! # Why no ray misses a triangle
 //!
 //! The box of a kd-tree's leaf is the part of the leaf's cell that the bounds of the leaf's triangles, grown by their
 //! margins, reach. The builder of the kd-tree could have cut off the rest of the cell as empty by six more splits. So
-//! the proof for the leaves of the kd-tree (bounds.rs) holds for the box, too. All other boxes contain those of their
-//! leaves. A ray that enters a box also enters them: of two planes, it meets the one that it comes to first at no
-//! greater t, also after rounding.
+//! the proof for the leaves of the kd-tree (bounds.rs) holds for the box, too. If a leaf is halved, the same is true of
+//! each half and its own triangles. All other boxes contain those of their leaves. A ray that enters a box enters them,
+//! too: rounding keeps the order of planes, so the ray enters a larger box at no greater t, and leaves it at no smaller
+//! t.
 
 use arrayvec::ArrayVec;
 use rayon::prelude::*;
@@ -20,7 +22,7 @@ use super::{
     bounds::Bounds,
     kdtree::{KdTree, Node},
 };
-use crate::layout::{NO_TRIANGLE, Triangle};
+use crate::layout::{KD_MAX_DEPTH, NO_TRIANGLE, Triangle};
 
 /// The most children of a node, and the most triangles of a block.
 pub const WIDTH: usize = 16;
@@ -31,6 +33,9 @@ pub const IS_BLOCK: u32 = 1 << 31;
 const EMPTY_BLOCK: u32 = IS_BLOCK;
 /// The number of levels below the root of the kd-tree whose subtrees are converted in parallel.
 const PARALLEL_LEVELS: u32 = 8;
+/// The most levels of nodes. A node is at least one split above its children: one of the kd-tree, or one that halves a
+/// leaf of too many triangles. There are at most 32 halvings.
+pub const MOST_LEVELS: usize = KD_MAX_DEPTH as usize + 32;
 
 /// The boxes of up to sixteen subtrees, as a structure of arrays. Unused boxes are empty.
 #[derive(Clone, Debug)]
@@ -67,6 +72,13 @@ enum Subtree {
     Empty,
     Block { bounds: Bounds, triangle_ixs: BlockList },
     Inner { bounds: Bounds, children: Box<[Subtree; 2]> },
+}
+
+/// Returns the part of a leaf's cell that the bounds of one of the leaf's triangles, grown by its margin, reach.
+fn part_in(tree: &KdTree, triangle: &Triangle, cell: &Bounds) -> Bounds {
+    let part = Bounds::of(triangle).grown(tree.margin_of(triangle)).intersection(cell);
+    // A triangle of the leaf reaches the cell. If rounding says otherwise, the part is the cell.
+    if (0..3).all(|axis| part.min[axis] <= part.max[axis]) { part } else { *cell }
 }
 
 /// Returns half of a box's surface area.
@@ -115,15 +127,15 @@ impl Subtree {
             let (a, b) = triangle_ixs.split_at(triangle_ixs.len() / 2);
             return Self::join(Self::of_leaf(tree, triangles, a, cell), Self::of_leaf(tree, triangles, b, cell));
         }
-        let part_of = |triangle_ix: &u32| tree.part_in(&triangles[*triangle_ix as usize], cell);
+        let part_of = |triangle_ix: &u32| part_in(tree, &triangles[*triangle_ix as usize], cell);
         let Some(bounds) = triangle_ixs.iter().map(part_of).reduce(|a, b| a.union(&b)) else { return Self::Empty };
         let mut triangle_ixs: BlockList = triangle_ixs.iter().copied().collect();
         triangle_ixs.sort_unstable();
         Self::Block { bounds, triangle_ixs }
     }
 
-    /// Returns the subtree of two subtrees. Two blocks become one if it has room, and if rays are no likelier to meet
-    /// its box than one of theirs.
+    /// Returns the subtree of two subtrees. Two blocks become one if it has room, and if its box has no larger surface
+    /// than both boxes together: then rays visit no more blocks than before.
     fn join(a: Self, b: Self) -> Self {
         let bounds = match (a.bounds(), b.bounds()) {
             (Some(a), Some(b)) => a.union(b),
@@ -147,8 +159,8 @@ impl Subtree {
         }
     }
 
-    /// Returns the surface area if the subtree can be replaced by its two children.
-    fn area_of_inner(&self) -> Option<f64> {
+    /// Returns half of the surface area of the box, if the subtree can be replaced by its two children.
+    fn half_area_of_inner(&self) -> Option<f64> {
         if let Self::Inner { bounds, .. } = self { Some(half_area(bounds)) } else { None }
     }
 
@@ -157,7 +169,8 @@ impl Subtree {
     fn into_children(self) -> ArrayVec<Self, WIDTH> {
         let mut children = ArrayVec::from_iter([self]);
         while !children.is_full() {
-            let inner = children.iter().enumerate().filter_map(|(place, child)| Some((place, child.area_of_inner()?)));
+            let area_at = |(place, child): (usize, &Self)| Some((place, child.half_area_of_inner()?));
+            let inner = children.iter().enumerate().filter_map(area_at);
             let Some((largest, _)) = inner.max_by(|a, b| a.1.total_cmp(&b.1)) else { break };
             if let Self::Inner { children: both, .. } = children.swap_remove(largest) {
                 children.extend(*both);
@@ -279,16 +292,28 @@ mod tests {
         }
     }
 
+    /// Calls `visit` with the triangles of each leaf of the tree and the leaf's cell.
+    fn visit_leaves(tree: &KdTree, node_ix: u32, cell: &Bounds, visit: &mut impl FnMut(&[u32], &Bounds)) {
+        match tree.node(node_ix) {
+            Node::Leaf { first, count } => visit(&tree.leaf_triangles()[first as usize..][..count as usize], cell),
+            Node::Split { axis, position, child } => {
+                let [below, above] = cell.split(axis, position);
+                visit_leaves(tree, child, &below, visit);
+                visit_leaves(tree, child + 1, &above, visit);
+            }
+        }
+    }
+
     #[test]
-    fn each_triangle_is_in_blocks_and_each_block_in_its_boxes() {
+    fn each_block_is_in_its_boxes() {
         let triangles = triangles();
         for options in [BuildOptions::default(), BuildOptions::fast()] {
             let bvh = WideBvh::new(&KdTree::build(&triangles, &options), &triangles);
-            let (mut n_visits, mut is_seen) = (vec![0; bvh.blocks().len()], vec![false; triangles.len()]);
+            let mut n_visits = vec![0; bvh.blocks().len()];
             visit_blocks(&bvh, 0, &mut Vec::new(), &mut |block_ix, boxes| {
                 n_visits[block_ix as usize] += 1;
                 let innermost = boxes.last().unwrap();
-                assert!(boxes.iter().all(|around| around.union(innermost) == *around));
+                assert!(boxes.len() <= MOST_LEVELS && boxes.iter().all(|around| around.union(innermost) == *around));
                 let block = &bvh.blocks()[block_ix as usize];
                 for (lane, &triangle_ix) in block.triangle_ixs.iter().enumerate() {
                     let corner = |i: usize| Vec3::from_array([0, 1, 2].map(|axis| block.corners[i][axis][lane]));
@@ -299,13 +324,49 @@ mod tests {
                     let triangle = &triangles[triangle_ix as usize];
                     assert_eq!([corner(0), corner(1), corner(2)], [triangle.v0, triangle.v1, triangle.v2]);
                     assert!(Bounds::of(triangle).touches(innermost));
-                    is_seen[triangle_ix as usize] = true;
                 }
             });
             assert!(n_visits[0] == 0 && n_visits[1..].iter().all(|n| *n == 1));
-            assert!(is_seen.iter().all(|is_seen| *is_seen));
             assert!(bvh.nodes().len() > 10, "{}", bvh.nodes().len());
         }
+    }
+
+    /// For each entry of a leaf, the part of the triangle's bounds in the leaf's cell is in the box of a block that has
+    /// the triangle.
+    #[test]
+    fn boxes_hold_what_leaves_hold() {
+        let triangles = triangles();
+        let tree = KdTree::build(&triangles, &BuildOptions::default());
+        let bvh = WideBvh::new(&tree, &triangles);
+        let mut boxes_of = vec![Vec::new(); triangles.len()];
+        visit_blocks(&bvh, 0, &mut Vec::new(), &mut |block_ix, boxes| {
+            let triangle_ixs = bvh.blocks()[block_ix as usize].triangle_ixs;
+            for triangle_ix in triangle_ixs.into_iter().filter(|ix| *ix != NO_TRIANGLE) {
+                boxes_of[triangle_ix as usize].push(*boxes.last().unwrap());
+            }
+        });
+        let mut n_entries = 0;
+        let cell = Bounds { min: tree.box_min().to_array(), max: tree.box_max().to_array() };
+        visit_leaves(&tree, 0, &cell, &mut |triangle_ixs, cell| {
+            for &triangle_ix in triangle_ixs {
+                let triangle = &triangles[triangle_ix as usize];
+                let part = Bounds::of(triangle).grown(tree.margin_of(triangle)).intersection(cell);
+                assert!(boxes_of[triangle_ix as usize].iter().any(|around| around.union(&part) == *around));
+                n_entries += 1;
+            }
+        });
+        assert!(n_entries > triangles.len());
+    }
+
+    #[test]
+    fn coinciding_triangles_make_few_levels() {
+        let triangles = vec![triangles()[0]; 1 << 17];
+        let bvh = WideBvh::new(&KdTree::build(&triangles, &BuildOptions::default()), &triangles);
+        let (mut n_levels, mut n_blocks) = (0, 0);
+        visit_blocks(&bvh, 0, &mut Vec::new(), &mut |_, boxes| {
+            (n_levels, n_blocks) = (n_levels.max(boxes.len()), n_blocks + 1);
+        });
+        assert!(n_levels > 3 && n_levels <= MOST_LEVELS && n_blocks >= triangles.len() / WIDTH, "{n_levels}");
     }
 
     #[test]

@@ -90,7 +90,7 @@ impl<S: Simd> Shears<S> {
         }
     }
 
-    /// Returns the shear of one ray in all lanes. `lanes_of_axis` is not set.
+    /// Returns the shear of one ray in all lanes.
     #[inline(always)]
     pub fn splat(simd: S, shear: &Shear) -> Self {
         let [x, y, z] = shear.origin;
@@ -99,7 +99,7 @@ impl<S: Simd> Shears<S> {
             x: f32x16::splat(simd, shear.x),
             y: f32x16::splat(simd, shear.y),
             z: f32x16::splat(simd, shear.z),
-            lanes_of_axis: [0; 3],
+            lanes_of_axis: [0, 1, 2].map(|axis| if axis == shear.axis { LaneMask::MAX } else { 0 }),
         }
     }
 

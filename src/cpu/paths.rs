@@ -1,7 +1,7 @@
 //! The passes of a batch of paths, with the buffers of the paths.
 
 use bytemuck::Zeroable;
-use fearless_simd::{Level, Simd, dispatch};
+use fearless_simd::Level;
 
 use super::{
     matt_surfaces::matt_materials,
@@ -22,28 +22,7 @@ use crate::{
         path_trace::{closest_hits_by, segments_by},
         traverser::Tracer,
     },
-    world::World,
 };
-
-/// The number of triangles from which on single rays through a [`WideBvh`] are faster than packets of scattered rays
-/// (docs/experiments.md).
-const LEAST_WIDE_TRIANGLES: usize = 2048;
-/// The number of floats in the machine's vectors from which on the same is true.
-const LEAST_WIDE_VECTOR: usize = 8;
-
-/// Returns the number of floats in a vector of the machine.
-#[inline(always)]
-fn vector_size<S: Simd>(_: S) -> usize {
-    size_of::<S::f32s>() / size_of::<f32>()
-}
-
-/// Returns the hierarchy through which scattered rays of paths are traced one by one. Returns none if packets through
-/// the kd-tree are faster, or if `traversal` is another algorithm than that of packets.
-pub fn wide_bvh_for(world: &World, traversal: Traversal) -> Option<&WideBvh> {
-    let is_large = world.scene().triangles.len() >= LEAST_WIDE_TRIANGLES;
-    let is_faster = is_large && dispatch!(Level::new(), simd => vector_size(simd)) >= LEAST_WIDE_VECTOR;
-    if is_faster && traversal == Traversal::Stack { world.wide_bvh() } else { None }
-}
 
 /// What the paths of a batch have beside their rays and hits, which are in a [`Queue`]. The buffers grow with the
 /// number of paths.
@@ -83,7 +62,7 @@ impl Paths {
     }
 
     /// Finds the hits of the paths that are alive, and tests the segments of the bounce before. Returns the numbers of
-    /// hits and of segments. `wide_bvh`: through which all but camera rays are traced, if there is one.
+    /// hits and of segments. `wide_bvh`: the hierarchy through which all but camera rays are traced, if there is one.
     pub fn trace(
         &mut self,
         inputs: &KernelInputs,

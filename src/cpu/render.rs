@@ -2,11 +2,7 @@
 
 use bytemuck::Zeroable;
 
-use super::{
-    paths::{Paths, wide_bvh_for},
-    queue::Queue,
-    timing::Clock,
-};
+use super::{paths::Paths, queue::Queue, timing::Clock, wide_traverser::wide_bvh_for};
 use crate::{
     accel::kdtree::TraversalLinks,
     frame::{
@@ -101,8 +97,8 @@ impl Renderer {
         let n_pixels = frame.width as usize * frame.height as usize;
         let n_layers = if options.has_light_layers() { LIGHT_LAYERS as usize } else { 0 };
         if options.integrator == Integrator::Path {
-            // It is made here, since the time of a frame is that of drawing alone.
-            let _ = wide_bvh_for(world, options.traversal);
+            // Makes the hierarchy now, so that the time of the first frame is that of drawing alone.
+            wide_bvh_for(world, options.traversal);
         }
         Self {
             camera: world.scene().camera,

@@ -1,5 +1,6 @@
-//! The tracer of the CPU engine. With [`Traversal::Stack`], rays of one class of directions ([`DirectionBins`])
-//! go through a kd-tree as packets. With any other algorithm, or through a grid, rays are traced one after the other.
+//! The tracer of the CPU engine for all rays but those of a [wide traverser](super::wide_traverser). With
+//! [`Traversal::Stack`], rays of one class of directions ([`DirectionBins`]) go through a kd-tree as packets. With any
+//! other algorithm, or through a grid, rays are traced one after the other.
 
 use fearless_simd::Level;
 

@@ -1,12 +1,16 @@
-//! Traversal of single rays through a [`WideBvh`]. Rays that have nothing in common gain nothing from packets; here
-//! such a ray tests sixteen boxes or triangles at once. It finds the same hit as by every other traversal, bit for bit.
+//! Traversal of single rays through a [`WideBvh`]. Rays that have nothing in common gain nothing from a packet, so each
+//! of them tests sixteen boxes or triangles at once. The hits are those of all other traversals, bit for bit, unless
+//! the length of a ray's direction underflows.
 
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
 
 use super::{lanes::LaneMask, packet_triangle::Shears};
 use crate::{
-    accel::wide_bvh::{IS_BLOCK, TriangleBlock, WIDTH, WideBvh, WideNode},
-    layout::{Hit, KD_MAX_DEPTH},
+    accel::{
+        kdtree::Traversal,
+        wide_bvh::{IS_BLOCK, MOST_LEVELS, TriangleBlock, WIDTH, WideBvh, WideNode},
+    },
+    layout::Hit,
     reference::{
         candidate::HitFilter,
         counting::table::ReadCounter,
@@ -16,12 +20,35 @@ use crate::{
         traversal_ray::{TraversalRay, hit_from_near},
         traverser::Tracer,
     },
+    world::World,
 };
 
-/// The most levels of the hierarchy. Each one has a level of the kd-tree, or halves a leaf with too many triangles.
-const MOST_LEVELS: usize = KD_MAX_DEPTH as usize + 32;
+/// The least number of triangles with which single rays through a [`WideBvh`] are faster than packets of scattered rays
+/// (docs/experiments.md).
+const LEAST_TRIANGLES: usize = 2048;
+/// The least number of floats in a vector of the machine with which this is so. With four floats, packets are faster in
+/// some scenes.
+const LEAST_VECTOR_SIZE: usize = 8;
 /// The most subtrees that are pending: at each level, all children but one.
 const MOST_PENDING: usize = MOST_LEVELS * (WIDTH - 1);
+
+/// Returns the number of floats in a vector of the machine.
+#[inline(always)]
+fn vector_size<S: Simd>(_: S) -> usize {
+    size_of::<S::f32s>() / size_of::<f32>()
+}
+
+/// Whether scattered rays of paths are traced one by one. `traversal`: the algorithm that the options name. Only the
+/// default one, by packets, leaves these rays to the hierarchy.
+fn traces_one_by_one(n_triangles: usize, vector_size: usize, traversal: Traversal) -> bool {
+    n_triangles >= LEAST_TRIANGLES && vector_size >= LEAST_VECTOR_SIZE && traversal == Traversal::OF_CPU
+}
+
+/// Returns the hierarchy through which scattered rays of paths are traced one by one; none if they are not.
+pub fn wide_bvh_for(world: &World, traversal: Traversal) -> Option<&WideBvh> {
+    let vector_size = dispatch!(Level::new(), simd => vector_size(simd));
+    if traces_one_by_one(world.scene().triangles.len(), vector_size, traversal) { world.wide_bvh() } else { None }
+}
 
 /// A pending subtree: one that the ray visits later.
 #[derive(Clone, Copy, Default)]
@@ -32,7 +59,7 @@ struct Pending {
     subtree: u32,
 }
 
-/// The stack of pending subtrees. The nearest one is on top.
+/// The stack of pending subtrees. Of one node's children, the nearest one is on top.
 struct Stack {
     entries: [Pending; MOST_PENDING],
     size: usize,
@@ -86,7 +113,8 @@ impl<S: Simd> RayColumns<S> {
         f32x16::load_array_ref(self.t_enter.simd, &node.sides[side]) * self.inv_direction[axis] + self.bias[axis]
     }
 
-    /// Returns the children whose boxes the ray enters no farther than `t_best`.
+    /// Returns the children whose boxes the ray enters no farther than `t_best`. If a product overflows, t may be NaN.
+    /// Most machines then ignore that side of the box.
     #[inline(always)]
     fn enter(&self, node: &WideNode, t_best: f32) -> Entered {
         let ([near_x, near_y, near_z], [far_x, far_y, far_z]) = (self.near_sides, self.far_sides);
@@ -225,5 +253,17 @@ impl Tracer for WideTraverser<'_> {
         mut found: impl FnMut(Key, Hit),
     ) {
         search_rays.for_each(|(key, search_ray)| found(key, self.traverse::<ANY_HIT>(inputs, &search_ray)));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn few_triangles_narrow_vectors_and_other_algorithms_keep_to_the_tree() {
+        assert!(traces_one_by_one(2048, 8, Traversal::Stack) && traces_one_by_one(1 << 20, 16, Traversal::Stack));
+        assert!(!traces_one_by_one(2047, 8, Traversal::Stack) && !traces_one_by_one(2048, 4, Traversal::Stack));
+        assert!(!traces_one_by_one(2048, 8, Traversal::Mask));
     }
 }

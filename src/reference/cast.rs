@@ -75,7 +75,7 @@ pub fn cast(inputs: &KernelInputs, traversal: Traversal, query: Query, rays: &[R
     cast_by(inputs, || Traverser::new(inputs, traversal), query, rays, hits);
 }
 
-/// Does what [`cast`] does, by a tracer for each thread.
+/// Does what [`cast`] does, by tracers that `new_tracer` makes, at least one for each thread that works.
 pub fn cast_by<T: Tracer>(
     inputs: &KernelInputs,
     new_tracer: impl Fn() -> T + Sync + Send,

@@ -27,7 +27,7 @@ pub fn closest_hits(
     closest_hits_by(inputs, || Traverser::new(inputs, traversal), live, rays, hits)
 }
 
-/// Does what [`closest_hits`] does, by a tracer for each thread.
+/// Does what [`closest_hits`] does, by tracers that `new_tracer` makes, at least one for each thread that works.
 pub fn closest_hits_by<T: Tracer>(
     inputs: &KernelInputs,
     new_tracer: impl Fn() -> T + Sync + Send,
@@ -61,7 +61,7 @@ pub fn segments(
     segments_by(inputs, || Traverser::new(inputs, traversal), with_segment, segments, states);
 }
 
-/// Does what [`segments`] does, by a tracer for each thread.
+/// Does what [`segments`] does, by tracers that `new_tracer` makes, at least one for each thread that works.
 pub fn segments_by<T: Tracer>(
     inputs: &KernelInputs,
     new_tracer: impl Fn() -> T + Sync + Send,

@@ -57,7 +57,7 @@ pub fn shadow(
     shadow_by(inputs, || Traverser::new(inputs, traversal), places, (rays, hits), light_visibility)
 }
 
-/// Does what [`shadow`] does, by a tracer for each thread.
+/// Does what [`shadow`] does, by tracers that `new_tracer` makes, at least one for each thread that works.
 pub fn shadow_by<T: Tracer>(
     inputs: &KernelInputs,
     new_tracer: impl Fn() -> T + Sync + Send,

@@ -18,7 +18,7 @@ pub fn trace(inputs: &KernelInputs, traversal: Traversal, rays: &[PathRay], hits
     trace_by(inputs, || Traverser::new(inputs, traversal), rays, hits)
 }
 
-/// Does what [`trace`] does, by a tracer for each thread.
+/// Does what [`trace`] does, by tracers that `new_tracer` makes, at least one for each thread that works.
 pub fn trace_by<T: Tracer>(
     inputs: &KernelInputs,
     new_tracer: impl Fn() -> T + Sync + Send,

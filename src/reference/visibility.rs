@@ -17,7 +17,7 @@ pub fn visibility(inputs: &KernelInputs, traversal: Traversal, triangle_ids: &mu
     visibility_by(inputs, || Traverser::new(inputs, traversal), triangle_ids);
 }
 
-/// Does what [`visibility`] does, by a tracer for each thread.
+/// Does what [`visibility`] does, by tracers that `new_tracer` makes, at least one for each thread that works.
 pub fn visibility_by<T: Tracer>(
     inputs: &KernelInputs,
     new_tracer: impl Fn() -> T + Sync + Send,

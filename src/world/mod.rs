@@ -56,12 +56,23 @@ struct Parts {
     scene: FlatScene,
     accel: Accel,
     accel_options: AccelOptions,
-    /// Made when they are first needed.
+    /// What [`World::emitters`] returns, once it is needed.
     emitters: OnceLock<Emitters>,
-    /// The same; none if the structure is a grid.
+    /// What [`World::wide_bvh`] returns, once it is needed.
     wide_bvh: OnceLock<Option<WideBvh>>,
-    /// The same, for each axis that may point up.
+    /// What [`World::stand_in`] returns for each axis that may point up, once it is needed.
     stand_ins: [OnceLock<StandIn>; 2],
+}
+
+/// Returns what `cell` holds. If it is empty, calls `make` first. Other threads do not wait meanwhile, so two may both
+/// call `make`. If they waited, a thread that waits for rayon could take a task that needs the same, and wait for
+/// itself.
+fn made_once<T>(cell: &OnceLock<T>, make: impl FnOnce() -> T) -> &T {
+    if let Some(made) = cell.get() {
+        return made;
+    }
+    let made = make();
+    cell.get_or_init(|| made)
 }
 
 impl World {
@@ -100,14 +111,7 @@ impl World {
     ) -> Result<Self, Mismatch> {
         mismatch::check_materials(&scene)?;
         let accel = Accel::new_observed(&scene.triangles, options, progress);
-        Ok(Self(Arc::new(Parts {
-            scene,
-            accel,
-            accel_options: options.clone(),
-            emitters: OnceLock::new(),
-            wide_bvh: OnceLock::new(),
-            stand_ins: Default::default(),
-        })))
+        Ok(Self::of_parts(scene, accel, options.clone()))
     }
 
     /// Joins a scene and a kd-tree that was built elsewhere. `build_options`: the options that the tree was built
@@ -119,14 +123,13 @@ impl World {
         mismatch::check_materials(&scene)?;
         let (accel, accel_options) = (Accel::KdTree(tree), AccelOptions::KdTree(build_options.clone()));
         Geometry::new(&scene.triangles, &accel)?;
-        Ok(Self(Arc::new(Parts {
-            scene,
-            accel,
-            accel_options,
-            emitters: OnceLock::new(),
-            wide_bvh: OnceLock::new(),
-            stand_ins: Default::default(),
-        })))
+        Ok(Self::of_parts(scene, accel, accel_options))
+    }
+
+    /// Joins what fits together.
+    fn of_parts(scene: FlatScene, accel: Accel, accel_options: AccelOptions) -> Self {
+        let (emitters, wide_bvh, stand_ins) = Default::default();
+        Self(Arc::new(Parts { scene, accel, accel_options, emitters, wide_bvh, stand_ins }))
     }
 
     /// The flattened scene.
@@ -136,19 +139,19 @@ impl World {
 
     /// The tables from which the path tracer picks lights. They are made at the first call.
     pub fn emitters(&self) -> &Emitters {
-        self.0.emitters.get_or_init(|| Emitters::new(&self.0.scene))
+        made_once(&self.0.emitters, || Emitters::new(&self.0.scene))
     }
 
-    /// The wide hierarchy, made from the kd-tree, through which the CPU traces single rays. There is none for a grid. It
-    /// is made at the first call, on the current rayon pool.
+    /// The wide hierarchy, made from the kd-tree, through which the CPU traces single rays. There is none for a grid.
+    /// It is made at the first call, on the current rayon pool.
     pub fn wide_bvh(&self) -> Option<&WideBvh> {
         let make = || Some(WideBvh::new(self.0.accel.as_kdtree()?, &self.0.scene.triangles));
-        self.0.wide_bvh.get_or_init(make).as_ref()
+        made_once(&self.0.wide_bvh, make).as_ref()
     }
 
     /// The ambient light that stands for light of which only paths know. It is made at the first call.
     fn stand_in(&self, up: Up) -> StandIn {
-        *self.0.stand_ins[usize::from(up == Up::Z)].get_or_init(|| StandIn::new(&self.0.scene, up))
+        *made_once(&self.0.stand_ins[usize::from(up == Up::Z)], || StandIn::new(&self.0.scene, up))
     }
 
     /// The acceleration structure over the scene's triangles.

@@ -102,8 +102,8 @@ fn device_and_cpu_agree() {
     }
 }
 
-/// In a scene of many triangles, the CPU traces all but camera rays one by one through a wide hierarchy, unless another
-/// traversal than that of packets is asked for.
+/// In a scene of many triangles, the CPU traces all but camera rays one by one through a wide hierarchy, unless the
+/// options name another traversal than that of packets.
 #[test]
 fn rays_one_by_one_make_the_picture_of_the_tree() {
     for mut scene in [scenes::mixed(), scenes::mixed_outdoors()] {

@@ -1,12 +1,14 @@
 //! Traces rays as packets, and one by one through a wide hierarchy.
 
 use fearless_simd::{Level, Simd};
+use glam::Vec3;
 use kdray::{
     accel::{kdtree::Traversal, wide_bvh::WideBvh},
     cpu::{tracer::FastTracer, wide_traverser::WideTraverser},
     layout::{Hit, NO_TRIANGLE, PathRay},
-    reference::{search_ray::SearchRay, traverser::Tracer},
+    reference::{inputs::KernelInputs, search_ray::SearchRay, traverser::Tracer},
 };
+use rayon::prelude::*;
 
 use super::{MeshWithTree, compare::first_difference};
 
@@ -25,18 +27,29 @@ pub fn levels() -> Vec<Level> {
 
 /// Returns the hits of rays that are traced as packets, with the instructions of a level.
 pub fn traced<const ANY_HIT: bool>(world: &MeshWithTree, level: Level, rays: &[PathRay]) -> Vec<Hit> {
-    traced_by::<ANY_HIT>(world, FastTracer::at_level(&world.inputs(), Traversal::Stack, level), rays)
+    traced_by::<ANY_HIT>(&world.inputs(), FastTracer::at_level(&world.inputs(), Traversal::Stack, level), rays)
+}
+
+/// Returns the hits of rays that are traced one by one through a wide hierarchy.
+pub fn traced_one_by_one<const ANY_HIT: bool>(
+    inputs: &KernelInputs,
+    bvh: &WideBvh,
+    level: Level,
+    rays: &[PathRay],
+) -> Vec<Hit> {
+    let of_task = |rays: &[PathRay]| traced_by::<ANY_HIT>(inputs, WideTraverser::new(bvh, level), rays);
+    rays.par_chunks(1001).flat_map_iter(of_task).collect()
 }
 
 /// Compares the hits of rays that are traced one by one through the wide hierarchy of the world's kd-tree with what is
 /// expected: the closest hits bit for bit, and of any hits, which rays have one. Rays whose directions are so short
 /// that their lengths underflow only have to end: all t are infinite.
 pub fn check_one_by_one(world: &MeshWithTree, level: Level, rays: &[PathRay], expected: &[Hit]) {
-    let bvh = WideBvh::new(world.tree(), &world.triangles);
-    let traverser = || WideTraverser::new(&bvh, level);
-    let mut closest = traced_by::<false>(world, traverser(), rays);
-    let mut any = traced_by::<true>(world, traverser(), rays);
-    for (i, _) in rays.iter().enumerate().filter(|(_, ray)| !ray.direction.length_squared().is_normal()) {
+    let (bvh, inputs) = (WideBvh::new(world.tree(), &world.triangles), world.inputs());
+    let mut closest = traced_one_by_one::<false>(&inputs, &bvh, level, rays);
+    let mut any = traced_one_by_one::<true>(&inputs, &bvh, level, rays);
+    let underflows = |direction: Vec3| direction != Vec3::ZERO && direction.length_squared() < f32::MIN_POSITIVE;
+    for (i, _) in rays.iter().enumerate().filter(|(_, ray)| underflows(ray.direction)) {
         (closest[i], any[i]) = (expected[i], expected[i]);
     }
     assert_eq!(first_difference(rays, expected, &closest), None, "one by one, {level:?}");
@@ -44,10 +57,10 @@ pub fn check_one_by_one(world: &MeshWithTree, level: Level, rays: &[PathRay], ex
     assert!(any.iter().map(is_hit).eq(expected.iter().map(is_hit)), "one by one, {level:?}");
 }
 
-fn traced_by<const ANY_HIT: bool>(world: &MeshWithTree, mut tracer: impl Tracer, rays: &[PathRay]) -> Vec<Hit> {
+fn traced_by<const ANY_HIT: bool>(inputs: &KernelInputs, mut tracer: impl Tracer, rays: &[PathRay]) -> Vec<Hit> {
     let mut hits = vec![None; rays.len()];
     let search_rays = hits.iter_mut().zip(rays.iter().map(SearchRay::from));
-    tracer.trace_all::<ANY_HIT, _>(&world.inputs(), search_rays, |place, hit| {
+    tracer.trace_all::<ANY_HIT, _>(inputs, search_rays, |place, hit| {
         assert_eq!(place.replace(hit), None, "a ray has one hit");
     });
     hits.into_iter().map(|hit| hit.expect("a ray has a hit")).collect()

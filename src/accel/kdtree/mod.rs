@@ -31,9 +31,8 @@ mod subtree;
 mod traversal;
 mod validate;
 
-use crate::{
-    accel::bounds::Bounds,
-    layout::{AccelConstants, KD_AXIS_MASK, KD_LEAF, KD_MAX_DEPTH, KD_PAIR_SHIFT, KD_PLANE_EPSILON, KdNode, Triangle},
+use crate::layout::{
+    AccelConstants, KD_AXIS_MASK, KD_LEAF, KD_MAX_DEPTH, KD_PAIR_SHIFT, KD_PLANE_EPSILON, KdNode, Triangle,
 };
 
 pub use links::TraversalLinks;
@@ -65,11 +64,9 @@ impl KdTree {
         AccelConstants { box_min, box_max, plane_epsilon, origin_reach, ..AccelConstants::default() }
     }
 
-    /// Returns the box in a leaf's cell that the bounds of one of the leaf's triangles, grown by its margin, reach.
-    pub(super) fn part_in(&self, triangle: &Triangle, cell: &Bounds) -> Bounds {
-        let part = Bounds::of(triangle).grown(self.scales.margin_of(triangle)).intersection(cell);
-        // A triangle of the leaf reaches the cell. If rounding says otherwise, the part is the cell.
-        if (0..3).all(|axis| part.min[axis] <= part.max[axis]) { part } else { *cell }
+    /// Returns the distance from a cell within which a triangle counts as inside the cell, world units.
+    pub(super) fn margin_of(&self, triangle: &Triangle) -> f32 {
+        self.scales.margin_of(triangle)
     }
 }
 
