@@ -19,7 +19,7 @@ use kdray::{
         variant::Variant,
     },
     layout::{Hit, NO_TRIANGLE, PathRay},
-    reference::traverser::Traverser,
+    reference::traverser::{Tracer, Traverser},
     world::{FlatScene, World},
 };
 use serde_json::Value;

@@ -9,7 +9,12 @@ use kdray::{
     accel::{Query, kdtree::Traversal, wide_bvh::WideBvh},
     cast::{Caster, CpuCaster, Hit, NO_TRIANGLE, Ray},
     layout::{TRIANGLE_HIDDEN, Triangle},
-    reference::{brute, search_ray::SearchRay, traversal_ray::hit_from_near, traverser::Traverser},
+    reference::{
+        brute,
+        search_ray::SearchRay,
+        traversal_ray::hit_from_near,
+        traverser::{Tracer, Traverser},
+    },
 };
 use support::{MeshWithTree, compare, device, meshes, packets::traced_one_by_one, random::Random, rays::nasty_ray};
 

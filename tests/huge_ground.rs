@@ -161,7 +161,9 @@ fn rays_from_inside_never_leak() {
             let hits = traced(&world.inputs(), traversal, &rays);
             let n_leaks = hits.iter().filter(|hit| hit.t > 4.0 * scale).count();
             assert_eq!(n_leaks, 0, "{traversal}, ground of {half}");
-            check_one_by_one(&world, Level::new(), &rays, &hits);
+            if traversal == Traversal::Stack {
+                check_one_by_one(&world, Level::new(), &rays, &hits);
+            }
         }
     }
 }

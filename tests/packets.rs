@@ -14,7 +14,7 @@ use kdray::{
     reference::{
         search_ray::SearchRay,
         traversal_ray::{TraversalRay, signs_of},
-        traverser::Traverser,
+        traverser::{Tracer, Traverser},
         triangle::{Shear, longest_axis},
     },
 };

@@ -15,9 +15,9 @@ layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hit
 layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock { Feature pixel_features[]; };
 
 void main() {
-    uint in_batch = gl_GlobalInvocationID.x;
-    if (in_batch >= batch.n_pixels) return;
-    uint ray_ix = first_ray_of(in_batch);
+    uint place = gl_GlobalInvocationID.x;
+    if (place >= batch.n_pixels) return;
+    uint ray_ix = first_ray_of(place);
     PathRay ray = ray_at(ray_ix);
     Hit hit = hits[ray_ix];
     uint pixel_ix = ray.pixel_ix;

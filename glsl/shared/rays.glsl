@@ -18,8 +18,8 @@ uvec2 pixel_of_ray(uint ray_ix) {
 }
 
 // The index in the queue of a pixel's first camera ray, by the pixel's place in the batch.
-uint first_ray_of(uint in_batch) {
-    return PATHS ? in_batch << frame.samples_log2 : in_batch;
+uint first_ray_of(uint place) {
+    return PATHS ? place << frame.samples_log2 : place;
 }
 
 // Any ray of the batch, by its index in the queue.

@@ -3,17 +3,17 @@
 //! single-ray traversal using multi-branching BVHs", 2008).
 //!
 //! It is made from a kd-tree. Leaves become blocks of triangles. Two sibling blocks are joined if they have at most
-//! sixteen triangles together, and if the joint box is no larger than both boxes. Of the splits above the blocks, up to
-//! fifteen become one node.
+//! sixteen triangles together, and if the joint box has no larger surface than both. Of the splits above the blocks, up
+//! to fifteen become one node.
 //!
 //! # Why no ray misses a triangle
 //!
 //! The box of a kd-tree's leaf is the part of the leaf's cell that the bounds of the leaf's triangles, grown by their
 //! margins, reach. The builder of the kd-tree could have cut off the rest of the cell as empty by six more splits. So
 //! the proof for the leaves of the kd-tree (bounds.rs) holds for the box, too. If a leaf is halved, the same is true of
-//! each half and its own triangles. All other boxes contain those of their leaves. A ray that enters a box enters them,
-//! too: rounding keeps the order of planes, so the ray enters a larger box at no greater t, and leaves it at no smaller
-//! t.
+//! each half and its own triangles. All other boxes contain those of their leaves. A ray that enters the box of a leaf
+//! also enters the boxes around it: rounding keeps the order of planes, so the ray enters a larger box at no greater t,
+//! and leaves it at no smaller t.
 
 use arrayvec::ArrayVec;
 use rayon::prelude::*;
@@ -26,7 +26,8 @@ use crate::layout::{KD_MAX_DEPTH, NO_TRIANGLE, Triangle};
 
 /// The most children of a node, and the most triangles of a block.
 pub const WIDTH: usize = 16;
-/// Set in a reference to a block. The other bits are the block's index. Without it, they are a node's index.
+/// This bit is set in a reference to a block. The other bits are the index of the block, or without this bit, of a
+/// node.
 pub const IS_BLOCK: u32 = 1 << 31;
 /// A reference to the first block, which is empty. Unused children refer to it, since a ray whose direction is infinite
 /// may seem to meet their boxes.
@@ -101,7 +102,7 @@ fn union(a: &BlockList, b: &BlockList) -> Option<BlockList> {
 }
 
 impl Subtree {
-    /// Converts the subtree of a kd-tree's node. `level`: of the node below the root.
+    /// Converts the subtree of a kd-tree's node. `level`: the number of splits above the node.
     fn of(tree: &KdTree, triangles: &[Triangle], node_ix: u32, cell: &Bounds, level: u32) -> Self {
         match tree.node(node_ix) {
             Node::Leaf { first, count } => {
@@ -135,7 +136,7 @@ impl Subtree {
     }
 
     /// Returns the subtree of two subtrees. Two blocks become one if it has room, and if its box has no larger surface
-    /// than both boxes together: then rays visit no more blocks than before.
+    /// than both boxes together: then a ray visits no more blocks on average.
     fn join(a: Self, b: Self) -> Self {
         let bounds = match (a.bounds(), b.bounds()) {
             (Some(a), Some(b)) => a.union(b),

@@ -120,8 +120,8 @@ impl<S: Simd> Shears<S> {
         [(x - self.origin[0]) - self.x * z, (y - self.origin[1]) - self.y * z, z]
     }
 
-    /// Maps corners of sixteen triangles to the sheared space of the ray in their lane. `corner`: its coordinates on
-    /// each axis.
+    /// Maps one corner of each of sixteen triangles to the sheared space of the ray in the triangle's lane. `corner`:
+    /// the corners' coordinates on each axis.
     #[inline(always)]
     fn corners(&self, corner: &[[f32; LANES]; 3], axis: usize) -> [f32x16<S>; 3] {
         let (simd, [x, y, z]) = (self.x.simd, axis_last([0, 1, 2], axis));

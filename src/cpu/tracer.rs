@@ -43,10 +43,11 @@ impl FastTracer {
             other => Self::Single(Traverser::new(inputs, other)),
         }
     }
+}
 
-    /// Finds one ray's hit, as [`Traverser::traverse`] does.
+impl Tracer for FastTracer {
     #[inline]
-    pub fn traverse<const ANY_HIT: bool>(
+    fn traverse<const ANY_HIT: bool>(
         &mut self,
         inputs: &KernelInputs<impl ReadCounter>,
         search_ray: &SearchRay,
@@ -58,9 +59,7 @@ impl FastTracer {
             Self::Single(traverser) => traverser.traverse::<ANY_HIT>(inputs, search_ray),
         }
     }
-}
 
-impl Tracer for FastTracer {
     #[inline]
     fn trace_all<const ANY_HIT: bool, Key>(
         &mut self,

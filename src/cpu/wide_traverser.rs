@@ -26,7 +26,7 @@ use crate::{
 /// The least number of triangles with which single rays through a [`WideBvh`] are faster than packets of scattered rays
 /// (docs/experiments.md).
 const LEAST_TRIANGLES: usize = 2048;
-/// The least number of floats in a vector of the machine with which this is so. With four floats, packets are faster in
+/// The least size of the machine's vectors, in floats, with which this is so. With four floats, packets are faster in
 /// some scenes.
 const LEAST_VECTOR_SIZE: usize = 8;
 /// The most subtrees that are pending: at each level, all children but one.
@@ -44,7 +44,8 @@ fn traces_one_by_one(n_triangles: usize, vector_size: usize, traversal: Traversa
     n_triangles >= LEAST_TRIANGLES && vector_size >= LEAST_VECTOR_SIZE && traversal == Traversal::OF_CPU
 }
 
-/// Returns the hierarchy through which scattered rays of paths are traced one by one; none if they are not.
+/// Returns the hierarchy through which scattered rays of paths are traced one by one. Returns none if they are traced
+/// in another way.
 pub fn wide_bvh_for(world: &World, traversal: Traversal) -> Option<&WideBvh> {
     let vector_size = dispatch!(Level::new(), simd => vector_size(simd));
     if traces_one_by_one(world.scene().triangles.len(), vector_size, traversal) { world.wide_bvh() } else { None }
@@ -114,7 +115,7 @@ impl<S: Simd> RayColumns<S> {
     }
 
     /// Returns the children whose boxes the ray enters no farther than `t_best`. If a product overflows, t may be NaN.
-    /// Most machines then ignore that side of the box.
+    /// x86 then ignores that side of the box, and ARM the whole box.
     #[inline(always)]
     fn enter(&self, node: &WideNode, t_best: f32) -> Entered {
         let ([near_x, near_y, near_z], [far_x, far_y, far_z]) = (self.near_sides, self.far_sides);
@@ -150,7 +151,7 @@ impl<S: Simd> RayColumns<S> {
 }
 
 impl Stack {
-    /// Makes all children that the ray enters pending but the nearest one, and returns that.
+    /// Makes those children pending that the ray enters, apart from the nearest one, which is returned.
     #[inline(always)]
     fn push_all_but_nearest(&mut self, node: &WideNode, entered: &Entered) -> Option<u32> {
         let mut lanes = entered.lanes;
@@ -225,11 +226,11 @@ impl<'a> WideTraverser<'a> {
             }
         }
     }
+}
 
-    /// Finds a ray's closest hit in (t_min, t_max], or with `ANY_HIT` one that need not be the closest. A miss has
-    /// t = t_max.
+impl Tracer for WideTraverser<'_> {
     #[inline]
-    pub fn traverse<const ANY_HIT: bool>(
+    fn traverse<const ANY_HIT: bool>(
         &mut self,
         inputs: &KernelInputs<impl ReadCounter>,
         search_ray: &SearchRay,
@@ -241,18 +242,6 @@ impl<'a> WideTraverser<'a> {
                 dispatch!(self.level, simd => self.search::<_, ANY_HIT>(simd, inputs, &ray, best));
             }
         })
-    }
-}
-
-impl Tracer for WideTraverser<'_> {
-    #[inline]
-    fn trace_all<const ANY_HIT: bool, Key>(
-        &mut self,
-        inputs: &KernelInputs<impl ReadCounter>,
-        search_rays: impl Iterator<Item = (Key, SearchRay)>,
-        mut found: impl FnMut(Key, Hit),
-    ) {
-        search_rays.for_each(|(key, search_ray)| found(key, self.traverse::<ANY_HIT>(inputs, &search_ray)));
     }
 }
 

@@ -21,16 +21,23 @@ use crate::{
     layout::{Hit, SHORT_STACK_SIZE},
 };
 
-/// Finds the hits of many rays. Each thread has its own tracer.
+/// Finds the hits of rays. Each thread has its own tracer.
 pub trait Tracer {
-    /// Calls `found` with each ray's key and its closest hit in (t_min, t_max], or with `ANY_HIT` one that need not
-    /// be the closest. The calls come in any order. A miss has t = t_max.
+    /// Finds a ray's closest hit in (t_min, t_max], or with `ANY_HIT` one that need not be the closest. A miss has
+    /// t = t_max.
+    fn traverse<const ANY_HIT: bool>(&mut self, inputs: &KernelInputs<impl ReadCounter>, search_ray: &SearchRay)
+    -> Hit;
+
+    /// Calls `found` with the key of each ray and the hit that [`Self::traverse`] finds. The calls come in any order.
+    #[inline]
     fn trace_all<const ANY_HIT: bool, Key>(
         &mut self,
         inputs: &KernelInputs<impl ReadCounter>,
         search_rays: impl Iterator<Item = (Key, SearchRay)>,
-        found: impl FnMut(Key, Hit),
-    );
+        mut found: impl FnMut(Key, Hit),
+    ) {
+        search_rays.for_each(|(key, search_ray)| found(key, self.traverse::<ANY_HIT>(inputs, &search_ray)));
+    }
 }
 
 /// An algorithm with its working memory, which is reused from ray to ray.
@@ -62,11 +69,11 @@ impl Traverser {
             Traversal::Brute => Self::Brute,
         }
     }
+}
 
-    /// Finds a ray's closest hit in (t_min, t_max], or with `ANY_HIT` one that need not be the closest. A miss has
-    /// t = t_max.
+impl Tracer for Traverser {
     #[inline]
-    pub fn traverse<const ANY_HIT: bool>(
+    fn traverse<const ANY_HIT: bool>(
         &mut self,
         inputs: &KernelInputs<impl ReadCounter>,
         search_ray: &SearchRay,
@@ -87,17 +94,5 @@ impl Traverser {
                 }
             }
         })
-    }
-}
-
-impl Tracer for Traverser {
-    #[inline]
-    fn trace_all<const ANY_HIT: bool, Key>(
-        &mut self,
-        inputs: &KernelInputs<impl ReadCounter>,
-        search_rays: impl Iterator<Item = (Key, SearchRay)>,
-        mut found: impl FnMut(Key, Hit),
-    ) {
-        search_rays.for_each(|(key, search_ray)| found(key, self.traverse::<ANY_HIT>(inputs, &search_ray)));
     }
 }

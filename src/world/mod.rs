@@ -56,11 +56,11 @@ struct Parts {
     scene: FlatScene,
     accel: Accel,
     accel_options: AccelOptions,
-    /// What [`World::emitters`] returns, once it is needed.
+    /// The tables from which lights are picked. Like the next two fields, they are made when they are first needed.
     emitters: OnceLock<Emitters>,
-    /// What [`World::wide_bvh`] returns, once it is needed.
+    /// The wide hierarchy. There is none if the structure is a grid.
     wide_bvh: OnceLock<Option<WideBvh>>,
-    /// What [`World::stand_in`] returns for each axis that may point up, once it is needed.
+    /// The ambient light that stands for light of which only paths know, for each axis that may point up.
     stand_ins: [OnceLock<StandIn>; 2],
 }
 
@@ -126,7 +126,7 @@ impl World {
         Ok(Self::of_parts(scene, accel, accel_options))
     }
 
-    /// Joins what fits together.
+    /// Makes a world of parts that fit together.
     fn of_parts(scene: FlatScene, accel: Accel, accel_options: AccelOptions) -> Self {
         let (emitters, wide_bvh, stand_ins) = Default::default();
         Self(Arc::new(Parts { scene, accel, accel_options, emitters, wide_bvh, stand_ins }))

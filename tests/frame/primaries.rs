@@ -8,7 +8,11 @@ use kdray::{
     engine::choices::{Processor, primary_by_rule, traversal_by_rule},
     frame::{Crop, Picture, Primary, RenderOptions},
     layout::Frame,
-    reference::{inputs::KernelInputs, primary_hit::camera_ray, traverser::Traverser},
+    reference::{
+        inputs::KernelInputs,
+        primary_hit::camera_ray,
+        traverser::{Tracer, Traverser},
+    },
     render::Renderer,
     world::{FlatScene, World},
 };

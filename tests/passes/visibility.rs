@@ -4,7 +4,12 @@
 use glam::{DVec2, dvec2, swizzles::Vec4Swizzles, uvec2, vec3};
 use kdray::{
     layout::{Batch, Frame, NO_TRIANGLE},
-    reference::{self, camera::pixel_of, primary_hit::camera_ray, traverser::Traverser},
+    reference::{
+        self,
+        camera::pixel_of,
+        primary_hit::camera_ray,
+        traverser::{Tracer, Traverser},
+    },
 };
 
 use super::stage::{FIRST, Stage, options};

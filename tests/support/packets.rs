@@ -42,8 +42,8 @@ pub fn traced_one_by_one<const ANY_HIT: bool>(
 }
 
 /// Compares the hits of rays that are traced one by one through the wide hierarchy of the world's kd-tree with what is
-/// expected: the closest hits bit for bit, and of any hits, which rays have one. Rays whose directions are so short
-/// that their lengths underflow only have to end: all t are infinite.
+/// expected: the closest hits bit for bit, and of any hits, which rays have one. If a direction is so short that its
+/// length underflows, every t is infinite. Of such a ray, the test only demands that its search ends.
 pub fn check_one_by_one(world: &MeshWithTree, level: Level, rays: &[PathRay], expected: &[Hit]) {
     let (bvh, inputs) = (WideBvh::new(world.tree(), &world.triangles), world.inputs());
     let mut closest = traced_one_by_one::<false>(&inputs, &bvh, level, rays);

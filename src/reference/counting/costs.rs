@@ -5,7 +5,12 @@
 use rayon::prelude::*;
 
 use super::table::ReadCounts;
-use crate::reference::{RAYS_PER_TASK, inputs::KernelInputs, shadow::shadow_segment, traverser::Traverser};
+use crate::reference::{
+    RAYS_PER_TASK,
+    inputs::KernelInputs,
+    shadow::shadow_segment,
+    traverser::{Tracer, Traverser},
+};
 use crate::{
     accel::kdtree::Traversal,
     layout::{Feature, Hit, NO_TRIANGLE, PathRay},

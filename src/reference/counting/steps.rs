@@ -4,7 +4,11 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::table::ReadCounts;
-use crate::reference::{RAYS_PER_TASK, inputs::KernelInputs, traverser::Traverser};
+use crate::reference::{
+    RAYS_PER_TASK,
+    inputs::KernelInputs,
+    traverser::{Tracer, Traverser},
+};
 use crate::{
     accel::{Query, kdtree::Traversal},
     layout::PathRay,
