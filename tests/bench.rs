@@ -100,7 +100,7 @@ fn a_slow_variant_warms_up_with_fewer_casts_than_a_fast_one() {
     let stage = Stage::in_room(scene, SIZE, &BuildOptions::default());
     let context = device();
     let variants = [Traversal::Mask, Traversal::Brute].map(Variant::KdTree);
-    let mut tracers = Tracers::new(Some(&context), &stage, &variants).unwrap();
+    let mut tracers = Tracers::new(Some(&context.into()), &stage, &variants).unwrap();
     let [primary, ..] = ray_sets(&stage);
     // Other work on the machine may delay the cast from which the numbers are estimated.
     let attempts: Vec<_> = (0..5).map(|_| tracers.n_warm_up(&primary).unwrap()).collect();

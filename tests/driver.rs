@@ -23,7 +23,7 @@ use kdray::{
     },
     buffers::{AccelBuffers, CastResources},
     cast::{Contender, Kernel, Ray},
-    gpu::{Access, Commands, Context, ContextOptions, GpuError},
+    gpu::{Access, Commands, Context, ContextOptions, Device, GpuError},
     layout::NO_TRIANGLE,
     world::World,
 };
@@ -190,7 +190,7 @@ fn the_suite_runs_or_says_what_the_device_lacks() {
     write_scene(directory.path());
     let suite = ["bench", "driver", "box.toml", "--size", "40x30", "--repeat", "3"];
     let suite = [&suite[..], &["--json", "x.json", "--svg", "x.svg"]].concat();
-    match Context::with_ray_tracing(&ContextOptions::default()) {
+    match Device::with_ray_tracing(&ContextOptions::default()) {
         Err(GpuError::Lacks { missing, .. }) => {
             assert!(missing.contains("VK_KHR_ray_tracing_pipeline"), "{missing}");
             fail(directory.path(), &suite, 4, "lacks VK_KHR_acceleration_structure, VK_KHR_ray_tracing_pipeline");

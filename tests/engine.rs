@@ -42,8 +42,8 @@ fn an_engine_renders_and_casts_alike_on_device_and_cpu() {
     assert!(on_device.display.iter().any(|pixel| pixel != &on_device.display[0]), "the picture shows something");
     assert!(device_hits.iter().zip(&cpu_hits).all(|(a, b)| a.triangle_ix == b.triangle_ix));
     assert!(cpu_hits.iter().any(|hit| hit.triangle_ix != NO_TRIANGLE));
-    let context = device.context().expect("a device");
-    assert_eq!(context.validation_messages(), Vec::<String>::new());
+    let device = device.device().expect("a device");
+    assert_eq!(device.validation_messages(), Vec::<String>::new());
 }
 
 /// The engine's choice of tree changes no hit.

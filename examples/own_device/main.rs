@@ -14,7 +14,7 @@ use ash::vk;
 use kdray::{
     engine::{Built, Engine, choices::Workload},
     frame::{Goal, RenderOptions},
-    gpu::{Context, GivenImage, TimelinePoint},
+    gpu::{Device, ExternalImage, TimelinePoint},
     scene::Scene,
 };
 use program::Program;
@@ -57,17 +57,17 @@ unsafe fn render(
     scene: Scene,
     options: &RenderOptions,
 ) -> Result<(), Box<dyn Error>> {
-    // SAFETY: the handles are the program's, which lives longer than the context; it has one thread.
-    let (context, image, [cleared, written]) = unsafe {
+    // SAFETY: the handles are the program's, which lives longer than the device handle; it has one thread.
+    let (device, image, [cleared, written]) = unsafe {
         let layouts = [vk::ImageLayout::TRANSFER_DST_OPTIMAL, vk::ImageLayout::TRANSFER_SRC_OPTIMAL];
         (
-            Context::on_given(program.given())?,
-            GivenImage::new(target.image, (options.width, options.height), layouts),
+            Device::external(program.external())?,
+            ExternalImage::new(target.image, (options.width, options.height), layouts),
             [CLEARED, WRITTEN].map(|value| TimelinePoint::new(program.timeline, value)),
         )
     };
     let workload = Workload::of_pictures(options, scene.lights.len(), 1);
-    let engine = Engine::on_device(context);
+    let engine = Engine::on_device(device);
     let Built { world, .. } = engine.build(scene, &workload)?;
     let options = engine.methods(&world, &workload)?.apply(options);
     let mut renderer = engine.renderer(&world, &options)?;

@@ -1,9 +1,9 @@
 //! A program's own device, with as little Vulkan as the examples need.
 
-use std::error::Error;
+use std::{error::Error, sync::Arc};
 
 use ash::vk;
-use kdray::gpu::{GivenDevice, RequiredFeatures};
+use kdray::gpu::{ExternalDevice, RequiredFeatures};
 
 /// The program's device.
 pub struct Program {
@@ -55,14 +55,15 @@ impl Program {
     }
 
     /// Returns the device in the form in which kdray takes it.
-    pub fn given(&self) -> GivenDevice {
-        GivenDevice {
+    pub fn external(&self) -> ExternalDevice {
+        ExternalDevice {
             entry: self.entry.clone(),
             instance: self.instance.clone(),
             physical: self.physical,
             device: self.device.clone(),
             queue_family: self.queue_family,
             queue: self.queue,
+            queue_lock: Arc::default(), // the program has one thread
             int64_atomics: false,
         }
     }

@@ -16,7 +16,7 @@ use kdray::{
     accel::{Query, kdtree::Traversal},
     cast::{Caster, Hit, NO_TRIANGLE, Ray},
     engine::{Built, Engine, choices::Workload},
-    gpu::{Context, GivenBuffer, GivenCommands},
+    gpu::{Device, ExternalBuffer, ExternalCommands},
     scene::Scene,
 };
 use program::Program;
@@ -58,20 +58,20 @@ const WRITTEN: u64 = 1;
 
 /// Casts the rays in a command buffer of the program.
 unsafe fn cast(program: &Program, buffers: &Buffers, scene: Scene) -> Result<(), Box<dyn Error>> {
-    // SAFETY: the handles are the program's, which lives longer than the context; it has one thread.
-    let (context, [rays, hits]) = unsafe {
-        let given = |ix: usize| GivenBuffer::new(buffers.raw[ix], 0, SIZES[ix]);
-        (Context::on_given(program.given())?, [0, 1].map(given))
+    // SAFETY: the handles are the program's, which lives longer than the device handle; it has one thread.
+    let (device, [rays, hits]) = unsafe {
+        let external = |ix: usize| ExternalBuffer::new(buffers.raw[ix], 0, SIZES[ix]);
+        (Device::external(program.external())?, [0, 1].map(external))
     };
-    let engine = Engine::on_device(context.clone());
+    let engine = Engine::on_device(&device);
     let Built { world, .. } = engine.build(scene, &Workload::of_rays(N_RAYS as u64))?;
-    let mut caster = Caster::new(&context, world.geometry(), Traversal::Mask)?;
+    let mut caster = Caster::new(&device, world.geometry(), Traversal::Mask)?;
     let cast = caster.recorded(rays, hits, Query::Closest)?;
     let record = |commands: vk::CommandBuffer| {
         // The cast needs no barrier before it: the submission makes the rays, which the host has written, visible.
         // SAFETY: the command buffer is being recorded.
         unsafe {
-            cast.record(&GivenCommands::new(commands));
+            cast.record(&ExternalCommands::new(commands));
             buffers.show_to_host(program, commands);
         }
     };

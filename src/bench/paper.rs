@@ -15,7 +15,7 @@ use crate::{
     cpu,
     engine::choices::{Request, primary_by_rule},
     frame::{BounceStats, Goal, Profile, RenderOptions},
-    gpu::{Context, GpuError},
+    gpu::{Device, GpuError},
     render::BandedRenderer,
     world::{FlatScene, World},
 };
@@ -62,12 +62,12 @@ pub fn options(scene: &FlatScene, (width, height): (u32, u32), traversal: Traver
 /// # Errors
 /// Fails as [`BandedRenderer::new`] and [`BandedRenderer::draw`] do.
 pub fn draw_on_gpu(
-    context: &Arc<Context>,
+    device: &Device,
     world: &World,
     options: &RenderOptions,
     n_frames: u16,
 ) -> Result<Vec<Profile>, GpuError> {
-    let scene = world.scene();
+    let (scene, context) = (world.scene(), device.inner());
     let primary = primary_by_rule(Some(context), scene.triangles.len(), (options.width, options.height));
     let options = &RenderOptions { primary, ..options.clone() };
     let mut renderer = BandedRenderer::new(Arc::clone(context), world, options)?;

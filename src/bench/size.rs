@@ -1,7 +1,7 @@
 //! The benchmark of cost against size: one shape cut into more and more triangles, with the same number of rays each
 //! time. In a good tree, the time of a ray grows like the logarithm of the number of triangles.
 
-use std::{sync::Arc, time::Instant};
+use std::time::Instant;
 
 use glam::{DVec3, Vec3};
 use serde::Serialize;
@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{
     accel::{Accel, Statistics, kdtree::BuildOptions},
-    gpu::{Context, GpuError},
+    gpu::{Device, GpuError},
     scene::{
         Camera, Instance, Material, Projection, RenderDefaults, Scene, Transform,
         generate::{Generator, MAX_TRIANGLES, TriangleBudget},
@@ -96,14 +96,14 @@ impl KnotStage {
     /// Fails as [`Tracers::new`] and [`Tracers::measure`] do.
     pub fn measure(
         &self,
-        context: Option<&Arc<Context>>,
+        device: Option<&Device>,
         variant: Variant,
         sets: &[RaySet],
         n_times: u16,
     ) -> Result<Row, GpuError> {
         let variants = [variant];
         let begin = Instant::now();
-        let mut tracers = Tracers::new(context, &self.stage, &variants)?; // builds a grid if there is a device
+        let mut tracers = Tracers::new(device, &self.stage, &variants)?; // builds a grid if there is a device
         let accel = self.stage.statistics(variant); // builds a grid if there is none
         let grid_ms = begin.elapsed().as_secs_f64() * 1e3;
         let build_ms = match self.stage.geometry(variant).accel() {

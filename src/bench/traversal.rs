@@ -1,7 +1,7 @@
 //! The benchmark of searches through the kd-tree and through grids on the same rays: their speeds, and whether all
 //! find the same hits.
 
-use std::{sync::Arc, time::Instant};
+use std::time::Instant;
 
 use bytemuck::Zeroable;
 use serde::Serialize;
@@ -21,7 +21,7 @@ use crate::{
     },
     cast::{Caster, Ray, cast_ray},
     cpu,
-    gpu::{Context, GpuError, Statistic, StatisticValue},
+    gpu::{Device, GpuError, Statistic, StatisticValue},
     layout::{Hit, NO_TRIANGLE},
     reference::counting::steps::{Steps, count_steps},
 };
@@ -42,9 +42,10 @@ impl<'a> Tracers<'a> {
     ///
     /// # Errors
     /// Fails as [`Caster::new`] does.
-    pub fn new(context: Option<&Arc<Context>>, stage: &'a Stage, variants: &'a [Variant]) -> Result<Self, GpuError> {
-        let caster = |context, variant: Variant| Caster::new(context, stage.geometry(variant), variant.traversal());
-        let casters = context.map(|context| variants.iter().map(|&variant| caster(context, variant)).collect());
+    pub fn new(device: Option<&Device>, stage: &'a Stage, variants: &'a [Variant]) -> Result<Self, GpuError> {
+        let caster =
+            |device: &Device, variant: Variant| Caster::new(device, stage.geometry(variant), variant.traversal());
+        let casters = device.map(|device| variants.iter().map(|&variant| caster(device, variant)).collect());
         Ok(Self { stage, variants, casters: casters.transpose()? })
     }
 

@@ -95,12 +95,21 @@ impl AccelBuffers {
         world: &World,
         of_paths: bool,
     ) -> Result<Self, GpuError> {
-        let mut next = self.clone();
+        let mut next = self.with_own_stalls(context)?;
         if of_paths && !self.has_emitters {
             next.add_words(context, &TextureWords::new(&world.scene().textures, world.emitters()))?;
             next.has_emitters = true;
         }
         Ok(next)
+    }
+
+    /// Returns buffers that share all arrays, for kernels that may run at the same time: each has room of its own for
+    /// the rays that stall.
+    ///
+    /// # Errors
+    /// Memory runs out.
+    pub fn with_own_stalls(&self, context: &Arc<Context>) -> Result<Self, GpuError> {
+        Ok(Self { stalls: Stalls::new(context)?, ..self.clone() })
     }
 
     /// Uploads triangles and their structure. `n_texture_words`: the length that `texture_words` will have.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{AccelBuffers, accel, binding};
 use crate::{
-    gpu::{Binding, BindingLayout, BindingSet, Buffer, BufferUse, Context, GivenBuffer, GpuError},
+    gpu::{Binding, BindingLayout, BindingSet, Buffer, BufferUse, Context, ExternalBuffer, GpuError},
     layout::{BIND_CAST_HITS, BIND_CAST_RAYS, CastBatch, Hit, Ray},
 };
 
@@ -31,13 +31,13 @@ impl CastResources {
     ///
     /// # Errors
     /// Memory runs out.
-    pub fn given(
+    pub fn external(
         bindings: &Arc<BindingLayout>,
         accel: &AccelBuffers,
-        rays: GivenBuffer,
-        hits: GivenBuffer,
+        rays: ExternalBuffer,
+        hits: ExternalBuffer,
     ) -> Result<BindingSet, GpuError> {
-        let own = [(BIND_CAST_RAYS, Binding::Given(rays)), (BIND_CAST_HITS, Binding::Given(hits))];
+        let own = [(BIND_CAST_RAYS, Binding::External(rays)), (BIND_CAST_HITS, Binding::External(hits))];
         BindingSet::new(bindings, "recorded cast", &[&accel.objects(), &own[..]].concat())
     }
 

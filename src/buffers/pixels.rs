@@ -59,7 +59,7 @@ impl Pixels {
             let target = |name, kind| Target::new(context, name, kind, size).map(Arc::new);
             (target("triangle_ids", TargetKind::Uint)?, Some(target("depth", TargetKind::Depth)?))
         } else {
-            (Arc::new(Target::unread(context, "triangle_ids")?), None)
+            (Target::unread(context, "triangle_ids")?, None)
         };
         Ok(Self {
             pixel_radiance: Buffer::new(context, "pixel_radiance", n_pixels * n_layers(options) as usize, storage)?,

@@ -142,7 +142,7 @@ macro_rules! declare {
 
         impl SceneArrays {
             /// Returns the buffers in the order of `NUMBERS`.
-            fn buffers(&self) -> [&AnyBuffer; NUMBERS.len()] {
+            fn buffers(&self) -> [&Arc<AnyBuffer>; NUMBERS.len()] {
                 [$(self.$name.any()),*]
             }
 

@@ -12,17 +12,17 @@ mod recorded;
 mod rounds;
 mod write;
 
-use std::{mem, rc::Rc, sync::Arc, time::Instant};
+use std::{mem, sync::Arc, time::Instant};
 
 use bytemuck::Zeroable;
 use rayon::prelude::*;
 
 pub(crate) use self::rounds::time_in_turn;
+#[doc(hidden)]
+pub use self::{kernel::Kernel, rounds::Contender};
 pub use self::{
-    kernel::Kernel,
     read::{RayFileError, RayReader},
     recorded::RecordedCast,
-    rounds::Contender,
     write::HitWriter,
 };
 pub use crate::layout::{Hit, NO_TRIANGLE, Ray};
@@ -33,7 +33,7 @@ use crate::{
     },
     buffers::{AccelBuffers, CastResources, Round, hidden_words},
     cpu,
-    gpu::{Access, BindingLayout, CommandBuffer, Context, GpuError, Limits, Statistic, Timer},
+    gpu::{Access, BindingLayout, CommandBuffer, Context, Device, GpuError, Limits, Statistic, Timer},
     layout::{PathRay, RAY_GROUP_SIZE},
     passes, reference,
     world::Geometry,
@@ -63,9 +63,9 @@ pub struct Caster {
     bindings: Arc<BindingLayout>,
     traversal: Traversal,
     /// The kernel for [`Query::Closest`], created at its first use.
-    closest: Option<Rc<passes::Cast>>,
+    closest: Option<Arc<passes::Cast>>,
     /// The kernel for [`Query::Any`], created at its first use.
-    any: Option<Rc<passes::Cast>>,
+    any: Option<Arc<passes::Cast>>,
     resources: CastResources,
     rays_per_batch: usize,
 }
@@ -75,7 +75,9 @@ impl Caster {
     ///
     /// # Errors
     /// The triangles are beyond the device's limits or memory, or too many for brute force.
-    pub fn new(context: &Arc<Context>, geometry: Geometry, traversal: Traversal) -> Result<Self, GpuError> {
+    pub fn new(device: impl Into<Device>, geometry: Geometry, traversal: Traversal) -> Result<Self, GpuError> {
+        let device = device.into();
+        let context = device.inner();
         let mut buffers = AccelBuffers::new(context, geometry)?;
         buffers.add_links(context, geometry.accel(), traversal)?;
         let bindings = CastResources::bindings(context, &buffers)?;
@@ -134,6 +136,7 @@ impl Caster {
     ///
     /// # Errors
     /// Memory runs out.
+    #[doc(hidden)]
     pub fn statistics(&self, query: Query) -> Result<Vec<Statistic>, GpuError> {
         let kernel = match query {
             Query::Closest => &self.closest,
@@ -143,16 +146,16 @@ impl Caster {
     }
 
     /// Returns the query's kernel, which is created at its first use.
-    fn prepare_kernel(&mut self, query: Query) -> Result<Rc<passes::Cast>, GpuError> {
+    fn prepare_kernel(&mut self, query: Query) -> Result<Arc<passes::Cast>, GpuError> {
         let kernel = match query {
             Query::Closest => &mut self.closest,
             Query::Any => &mut self.any,
         };
         if let Some(kernel) = kernel {
-            return Ok(Rc::clone(kernel));
+            return Ok(Arc::clone(kernel));
         }
-        let made = Rc::new(passes::Cast::new(&self.context, &self.bindings, self.traversal, query)?);
-        Ok(Rc::clone(kernel.insert(made)))
+        let made = Arc::new(passes::Cast::new(&self.context, &self.bindings, self.traversal, query)?);
+        Ok(Arc::clone(kernel.insert(made)))
     }
 
     /// Creates the query's kernel and buffers for a batch, unless they exist.
@@ -186,8 +189,7 @@ impl Caster {
             })
         };
         let buffers = (0..n_times).map(record).collect::<Result<Vec<_>, _>>()?;
-        self.context.submit(&buffers.iter().collect::<Vec<_>>())?;
-        self.context.wait()?;
+        self.context.wait_for(self.context.submit(buffers)?)?;
         let began_ms = Instant::now();
         let n_rounds = self.tree.stalls.finish(&self.context, |commands, round| {
             kernel.record(commands, &self.resources.set, n_rays, round);

@@ -1,19 +1,20 @@
 //! A cast that is recorded into the caller's own command buffer, over the caller's own buffers.
 
-use std::{rc::Rc, sync::Arc};
+use std::sync::Arc;
 
 use super::{Caster, Hit, Ray, most_rays};
 use crate::{
     accel::Query,
     buffers::{CastResources, Round, Stalls},
-    gpu::{BindingSet, Context, GivenBuffer, GivenCommands, GpuError},
+    gpu::{BindingSet, Context, ExternalBuffer, ExternalCommands, GpuError},
     passes,
 };
 
-/// A cast that is ready to be recorded into command buffers, any number of times.
+/// A cast that is ready to be recorded into command buffers, any number of times. It keeps the triangles, their
+/// structure and the kernel, so the caster may be dropped.
 pub struct RecordedCast {
     context: Arc<Context>,
-    kernel: Rc<passes::Cast>,
+    kernel: Arc<passes::Cast>,
     set: BindingSet,
     stalls: Stalls,
     n_rays: u32,
@@ -26,17 +27,23 @@ impl Caster {
     /// # Errors
     /// `hits` has too little room, there are more rays than a dispatch or a storage buffer can have, memory runs out,
     /// or a call fails.
-    pub fn recorded(&mut self, rays: GivenBuffer, hits: GivenBuffer, query: Query) -> Result<RecordedCast, GpuError> {
+    pub fn recorded(
+        &mut self,
+        rays: ExternalBuffer,
+        hits: ExternalBuffer,
+        query: Query,
+    ) -> Result<RecordedCast, GpuError> {
         let n_rays = rays.bytes() / size_of::<Ray>() as u64;
         let room = (hits.bytes() / size_of::<Hit>() as u64).min(most_rays(self.context.limits()) as u64);
         if n_rays > room {
             return Err(GpuError::Limit { what: "rays of a recorded cast", value: n_rays, limit: room });
         }
+        let tree = self.tree.with_own_stalls(&self.context)?;
         Ok(RecordedCast {
             context: Arc::clone(&self.context),
             kernel: self.prepare_kernel(query)?,
-            set: CastResources::given(&self.bindings, &self.tree, rays, hits)?,
-            stalls: self.tree.stalls.clone(),
+            set: CastResources::external(&self.bindings, &tree, rays, hits)?,
+            stalls: tree.stalls,
             n_rays: n_rays as u32,
         })
     }
@@ -48,8 +55,8 @@ impl RecordedCast {
     /// storage. Rays that the host has written before the submission need no barrier. The cast replaces the pipeline,
     /// descriptor set and push constants that are bound for compute, and the descriptor set for graphics.
     ///
-    /// Only one cast of a [`Caster`] may run at a time. The cast must live until the device has run the commands.
-    pub fn record(&self, commands: &GivenCommands) {
+    /// A cast may not run twice at the same time. Several casts of a [`Caster`] may.
+    pub fn record(&self, commands: &ExternalCommands) {
         let commands = commands.commands(&self.context);
         self.stalls.reset(&commands);
         self.kernel.record(&commands, &self.set, self.n_rays, Round::Begin);

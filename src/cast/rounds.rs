@@ -45,8 +45,7 @@ pub(crate) fn time_in_turn(
         })
     };
     let buffers = (0..n_passes).map(record).collect::<Result<Vec<_>, _>>()?;
-    context.submit(&buffers.iter().collect::<Vec<_>>())?;
-    context.wait()?;
+    context.wait_for(context.submit(buffers)?)?;
     let rows = timer.rows()?;
     assert_eq!(rows.len(), n_passes, "a contender is one pass");
     Ok(rows[contenders.len()..].iter().map(|row| row.span_ms.map(|(begin, end)| end - begin)).collect())

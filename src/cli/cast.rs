@@ -36,10 +36,10 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
     let progress = Progress::new(args.quiet, 3);
     let (scene, load_ms) = progress.stage(&format!("loading {}", args.mesh.display()), || args.load.load(&args.mesh));
     let scene = scene?;
-    let device = ContextOptions::new(args.device.clone(), args.validate);
-    let context = if args.cpu { None } else { Some(open_device(&device, &progress)?) };
+    let options = ContextOptions::new(args.device.clone(), args.validate);
+    let device = if args.cpu { None } else { Some(open_device(&options, &progress)?) };
 
-    let engine = context.clone().map_or_else(Engine::on_cpu, Engine::on_device).with_request(args.request());
+    let engine = device.clone().map_or_else(Engine::on_cpu, Engine::on_device).with_request(args.request());
     let (n_triangles, workload) = (scene.n_triangles(), Workload::of_rays(rays.n_rays()));
     let accel = engine.choose_accel(n_triangles, &workload);
     build::check_memory(accel, n_triangles)?;
@@ -78,7 +78,7 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
     if !args.quiet {
         print(&report.text())?;
     }
-    context.map_or(Ok(()), |context| report_validation(&context))
+    device.as_ref().map_or(Ok(()), report_validation)
 }
 
 /// Refuses an output that the command also reads, or that it writes twice.

@@ -1,8 +1,8 @@
 //! The argument `--device`, and the devices that it opens.
 
-use std::{collections::BTreeSet, str::FromStr, sync::Arc};
+use std::{collections::BTreeSet, str::FromStr};
 
-use kdray::gpu::{Context, ContextOptions, DeviceInfo, DeviceSelector, GpuError, chosen_device, devices};
+use kdray::gpu::{ContextOptions, Device, DeviceInfo, DeviceSelector, GpuError, chosen_device, devices};
 
 use super::progress::Progress;
 
@@ -37,22 +37,18 @@ pub fn device(word: &str) -> Result<DeviceSelector, String> {
 
 /// Opens the selected device. If the user selected none and the best device is a software driver, a note says so, and
 /// that the CPU is faster without it.
-pub fn open_device(options: &ContextOptions, progress: &Progress) -> Result<Arc<Context>, GpuError> {
-    let context = Context::new(options)?;
-    if options.device.is_none() && context.is_software() {
-        let name = &context.info().name;
+pub fn open_device(options: &ContextOptions, progress: &Progress) -> Result<Device, GpuError> {
+    let device = Device::open(options)?;
+    if options.device.is_none() && device.is_software() {
+        let name = &device.info().name;
         progress.note(&format!("no GPU found, rendering in software on {name}, which is slower than --cpu"));
     }
-    Ok(context)
+    Ok(device)
 }
 
 /// Opens the devices of the list, or the best device if there is no list. If the devices differ in name or driver, a
 /// note warns that they may round in different ways.
-pub fn open_devices(
-    list: Option<&DeviceList>,
-    validate: bool,
-    progress: &Progress,
-) -> Result<Vec<Arc<Context>>, GpuError> {
+pub fn open_devices(list: Option<&DeviceList>, validate: bool, progress: &Progress) -> Result<Vec<Device>, GpuError> {
     let selectors = match list {
         None => vec![None],
         Some(DeviceList::Named(named)) => named.iter().cloned().map(Some).collect(),
@@ -65,14 +61,13 @@ pub fn open_devices(
         }
     };
     let open = |selector| open_device(&ContextOptions::new(selector, validate), progress);
-    let contexts = selectors.into_iter().map(open).collect::<Result<Vec<_>, _>>()?;
-    let kinds: BTreeSet<String> =
-        contexts.iter().map(|it| format!("{}, {}", it.info().name, it.info().driver)).collect();
+    let opened = selectors.into_iter().map(open).collect::<Result<Vec<_>, _>>()?;
+    let kinds: BTreeSet<String> = opened.iter().map(|it| format!("{}, {}", it.info().name, it.info().driver)).collect();
     if kinds.len() > 1 {
         let kinds = kinds.into_iter().collect::<Vec<_>>().join("; ");
         progress.note(&format!("the devices are of several kinds, which may round in different ways: {kinds}"));
     }
-    Ok(contexts)
+    Ok(opened)
 }
 
 #[cfg(test)]

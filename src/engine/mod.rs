@@ -25,7 +25,7 @@ use crate::{
     accel::{Query, kdtree::Traversal},
     cast::{Hit, Ray},
     frame::{Goal, RenderOptions},
-    gpu::{Context, ContextOptions, GpuError},
+    gpu::{Context, ContextOptions, Device, GpuError},
     scene::Scene,
     util::progress::Progress,
     world::{FlatScene, Geometry, Mismatch, World},
@@ -36,9 +36,9 @@ use crate::{
 #[derive(Clone)]
 pub struct Engine {
     /// The Vulkan device; none on the CPU.
-    context: Option<Arc<Context>>,
+    device: Option<Device>,
     /// Further devices, which help to draw pictures.
-    others: Vec<Arc<Context>>,
+    others: Vec<Device>,
     request: Request,
     cache: Cache,
     progress: Progress,
@@ -59,12 +59,12 @@ impl Engine {
     /// # Errors
     /// There is no Vulkan driver or no such device, or the device lacks what kdray needs.
     pub fn open(options: &ContextOptions) -> Result<Self, GpuError> {
-        Context::new(options).map(Self::on_device)
+        Device::open(options).map(Self::on_device)
     }
 
     /// Uses a Vulkan device that is already open.
-    pub fn on_device(context: Arc<Context>) -> Self {
-        Self { context: Some(context), ..Self::on_cpu() }
+    pub fn on_device(device: impl Into<Device>) -> Self {
+        Self { device: Some(device.into()), ..Self::on_cpu() }
     }
 
     /// Uses several Vulkan devices that are already open. They share the drawing of a picture or of the frames of a
@@ -72,16 +72,16 @@ impl Engine {
     ///
     /// # Panics
     /// There are no devices.
-    pub fn on_devices(contexts: Vec<Arc<Context>>) -> Self {
-        let mut contexts = contexts.into_iter();
-        let first = contexts.next().expect("at least one device");
-        Self { others: contexts.collect(), ..Self::on_device(first) }
+    pub fn on_devices(devices: Vec<impl Into<Device>>) -> Self {
+        let mut devices = devices.into_iter().map(Into::into);
+        let first: Device = devices.next().expect("at least one device");
+        Self { others: devices.collect(), ..Self::on_device(first) }
     }
 
     /// Uses the CPU without Vulkan, on the current rayon pool.
     pub fn on_cpu() -> Self {
         Self {
-            context: None,
+            device: None,
             others: Vec::new(),
             request: Request::default(),
             cache: Cache::open(),
@@ -102,24 +102,32 @@ impl Engine {
     }
 
     /// Returns all Vulkan devices, none on the CPU.
-    pub fn contexts(&self) -> impl Iterator<Item = &Arc<Context>> {
-        self.context.iter().chain(&self.others)
+    pub fn devices(&self) -> impl Iterator<Item = &Device> {
+        self.device.iter().chain(&self.others)
     }
 
     /// Returns the Vulkan device, or none on the CPU.
-    pub fn context(&self) -> Option<&Arc<Context>> {
-        self.context.as_ref()
+    pub fn device(&self) -> Option<&Device> {
+        self.device.as_ref()
+    }
+
+    fn context(&self) -> Option<&Arc<Context>> {
+        self.device.as_ref().map(Device::inner)
+    }
+
+    fn contexts(&self) -> Vec<Arc<Context>> {
+        self.devices().map(|device| Arc::clone(device.inner())).collect()
     }
 
     /// Returns the kind of processor that the engine runs on.
     pub fn processor(&self) -> Processor {
-        Processor::of(self.context.as_deref())
+        Processor::of(self.context().map(|context| &**context))
     }
 
     /// Returns the device's own name, or the CPU with its number of threads.
     pub fn device_name(&self) -> String {
-        match &self.context {
-            Some(context) => context.info().name.clone(),
+        match &self.device {
+            Some(device) => device.info().name.clone(),
             None => format!("CPU, {} threads", rayon::current_num_threads()),
         }
     }
@@ -158,7 +166,7 @@ impl Engine {
     /// # Errors
     /// The device is lost.
     pub fn methods(&self, world: &World, workload: &Workload) -> Result<Methods, GpuError> {
-        self.request.methods(self.context.as_ref(), world, workload, &self.cache)
+        self.request.methods(self.context(), world, workload, &self.cache)
     }
 
     /// Creates a renderer, which can draw many pictures of one world.
@@ -166,8 +174,7 @@ impl Engine {
     /// # Errors
     /// The scene or a row of the picture is beyond the device's limits or memory.
     pub fn renderer(&self, world: &World, options: &RenderOptions) -> Result<Renderer, GpuError> {
-        let contexts: Vec<_> = self.contexts().cloned().collect();
-        Renderer::new(&contexts, world, options)
+        Renderer::new(&self.contexts(), world, options)
     }
 
     /// Creates renderers that draw the frames of a film, one on each device.
@@ -178,7 +185,7 @@ impl Engine {
     /// # Panics
     /// The engine runs on the CPU.
     pub fn film_renderer(&self, world: &World, options: &RenderOptions) -> Result<FilmRenderer, GpuError> {
-        let contexts: Vec<_> = self.contexts().cloned().collect();
+        let contexts = self.contexts();
         assert!(!contexts.is_empty(), "at least one device");
         FilmRenderer::new(&contexts, world, options)
     }
@@ -188,7 +195,7 @@ impl Engine {
     /// # Errors
     /// The triangles are beyond the device's limits or memory, or too many for [`Traversal::Brute`].
     pub fn caster<'a>(&self, geometry: Geometry<'a>, traversal: Traversal) -> Result<Caster<'a>, GpuError> {
-        Caster::new(self.context.as_ref(), geometry, traversal)
+        Caster::new(self.context(), geometry, traversal)
     }
 
     /// Draws one picture from the scene's own camera with one sample per pixel. The engine's choices of traversal and

@@ -14,7 +14,7 @@ use crate::{
         Drawn, DrawnTiles, Goal, Integrator, NoiseTiles, Pacer, Picture, RangeSums, RenderOptions, SampleRange,
         TileSamples, Watcher,
     },
-    gpu::{Context, DeviceInfo, GivenImage, GpuError, TimelinePoint},
+    gpu::{Context, DeviceInfo, ExternalImage, GpuError, TimelinePoint},
     layout::SAMPLE_BLOCK_LOG2,
     render::BandedRenderer,
     scene::Camera,
@@ -177,7 +177,7 @@ impl Renderer {
     /// device. The image is smaller than the picture. A call fails. In all these cases nothing is signalled.
     pub fn copy_picture_to(
         &self,
-        image: &GivenImage,
+        image: &ExternalImage,
         after: Option<TimelinePoint>,
         then: Option<TimelinePoint>,
     ) -> Result<(), GpuError> {

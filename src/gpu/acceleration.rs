@@ -19,7 +19,7 @@ pub struct DriverAccel {
 /// One level of the structure and its memory.
 struct Level {
     raw: vk::AccelerationStructureKHR,
-    bytes: Buffer<u8>,
+    _bytes: Buffer<u8>,
     context: Arc<Context>,
 }
 
@@ -129,8 +129,8 @@ impl Level {
         // SAFETY: the buffer has the size that the driver requires, and lives as long as the level.
         let raw = unsafe { calls.structures.create_acceleration_structure(&create, None) }
             .map_err(GpuError::call("vkCreateAccelerationStructureKHR", contents.name))?;
-        context.set_name(raw, contents.name);
-        let level = Self { raw, bytes, context: context.clone() };
+        context.device.set_name(raw, contents.name);
+        let level = Self { raw, _bytes: bytes, context: context.clone() };
 
         // The extra bytes leave room to round the address up.
         let alignment = u64::from(calls.scratch_alignment);
@@ -146,8 +146,7 @@ impl Level {
             commands.pass(contents.name, None, || build(commands, calls, &info, contents.n_primitives));
             commands.barrier(Access::StructureBuild, Access::RayTracingUpdate); // this level
         })?;
-        context.submit(&[&buffer])?;
-        context.wait()?;
+        context.wait_for(context.submit(vec![buffer])?)?;
         let ms = timer.rows()?[0].span_ms.map(|(begin, end)| end - begin);
         Ok((level, ms))
     }
@@ -175,9 +174,7 @@ fn build(
 
 impl Drop for Level {
     fn drop(&mut self) {
-        // The field only keeps the memory alive. This use of it silences the lint for fields that are never read.
-        let _ = &self.bytes;
-        // SAFETY: the device has ended all work with the structure.
+        // SAFETY: the device has ended all work with the structure: builds and benchmarks wait for it.
         unsafe { RayTracingCalls::of(&self.context).structures.destroy_acceleration_structure(self.raw, None) };
     }
 }

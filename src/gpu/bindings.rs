@@ -1,10 +1,15 @@
 //! Descriptor set layouts, each shared by several pipelines, and their sets.
 
-use std::sync::{Arc, PoisonError};
+use std::sync::Arc;
 
 use ash::vk;
 
-use super::{AnyBuffer, Constant, ConstantValue, Constants, Context, GivenBuffer, GpuError, Target};
+use super::{
+    AnyBuffer, Constant, ConstantValue, Constants, Context, ExternalBuffer, GpuError, Target,
+    commands::Kept,
+    lock::{Rank, lock},
+    raw_device::RawDevice,
+};
 
 /// Kind of the object at a binding number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,14 +39,14 @@ impl BindingKind {
 #[derive(Clone, Copy)]
 pub enum Binding<'a> {
     /// A uniform or storage buffer.
-    Buffer(&'a AnyBuffer),
+    Buffer(&'a Arc<AnyBuffer>),
     /// The texels of a buffer for [`BufferUse::Texels`](super::BufferUse::Texels) or
     /// [`BufferUse::Address`](super::BufferUse::Address).
-    Texels(&'a AnyBuffer),
+    Texels(&'a Arc<AnyBuffer>),
     /// A storage image.
-    Image(&'a Target),
+    Image(&'a Arc<Target>),
     /// A storage buffer that the library's caller owns.
-    Given(GivenBuffer),
+    External(ExternalBuffer),
 }
 
 /// Layout of a descriptor set. The pipelines that use it also share its specialization constants.
@@ -51,9 +56,11 @@ pub struct BindingLayout {
     pub(super) pipeline_layout: vk::PipelineLayout,
     /// Binding numbers and their kinds.
     kinds: Vec<(u32, BindingKind)>,
+    /// Size of the push constants.
+    pub(super) push_bytes: u32,
     /// Specialization constants that have the same values in all pipelines.
     pub(super) constants: Constants,
-    context: Arc<Context>,
+    device: Arc<RawDevice>,
 }
 
 impl BindingLayout {
@@ -71,14 +78,14 @@ impl BindingLayout {
         push_bytes: u32,
         constants: Constants,
     ) -> Result<Arc<Self>, GpuError> {
-        let Layouts { set_layout, pipeline_layout, .. } = Layouts::of(context, kinds, push_bytes)?;
-        let (kinds, context) = (kinds.to_vec(), context.clone());
-        Ok(Arc::new(Self { set_layout, pipeline_layout, kinds, constants, context }))
+        let Layouts { set_layout, pipeline_layout, .. } = Layouts::of(&context.device, kinds, push_bytes)?;
+        let (kinds, device) = (kinds.to_vec(), Arc::clone(&context.device));
+        Ok(Arc::new(Self { set_layout, pipeline_layout, kinds, push_bytes, constants, device }))
     }
 }
 
-/// Vulkan's layouts of a descriptor set and of the pipelines that use it. A context makes them once and keeps them: a
-/// driver can find a compiled pipeline in the context's cache only by the same layout.
+/// Vulkan's layouts of a descriptor set and of the pipelines that use it. A device makes them once and keeps them: a
+/// driver can find a compiled pipeline in the device's cache only by the same layout.
 #[derive(Clone)]
 pub(super) struct Layouts {
     kinds: Vec<(u32, BindingKind)>,
@@ -88,20 +95,20 @@ pub(super) struct Layouts {
 }
 
 impl Layouts {
-    /// Returns the context's layouts of the bindings. They are created if it has none yet.
-    fn of(context: &Context, kinds: &[(u32, BindingKind)], push_bytes: u32) -> Result<Self, GpuError> {
-        let mut made = context.layouts.lock().unwrap_or_else(PoisonError::into_inner);
+    /// Returns the device's layouts of the bindings. They are created if it has none yet.
+    fn of(device: &RawDevice, kinds: &[(u32, BindingKind)], push_bytes: u32) -> Result<Self, GpuError> {
+        let mut made = lock(Rank::Layouts, &device.layouts)?;
         let known = made.iter().find(|known| known.kinds == kinds && known.push_bytes == push_bytes);
         if let Some(known) = known {
             return Ok(known.clone());
         }
-        let layouts = Self::new(context, kinds, push_bytes)?;
+        let layouts = Self::new(device, kinds, push_bytes)?;
         made.push(layouts.clone());
         Ok(layouts)
     }
 
-    fn new(context: &Context, kinds: &[(u32, BindingKind)], push_bytes: u32) -> Result<Self, GpuError> {
-        let stages = context.stages();
+    fn new(device: &RawDevice, kinds: &[(u32, BindingKind)], push_bytes: u32) -> Result<Self, GpuError> {
+        let stages = device.stages();
         let bindings: Vec<_> = kinds
             .iter()
             .map(|(binding, kind)| {
@@ -115,15 +122,15 @@ impl Layouts {
         let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
         // SAFETY: all that the infos point to lives until the calls return.
         unsafe {
-            let set_layout = (context.device.create_descriptor_set_layout(&info, None))
+            let set_layout = (device.raw.create_descriptor_set_layout(&info, None))
                 .map_err(GpuError::call("vkCreateDescriptorSetLayout", "bindings"))?;
             let set_layouts = [set_layout];
             let push = [vk::PushConstantRange::default().stage_flags(stages).size(push_bytes)];
             let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&set_layouts).push_constant_ranges(&push);
-            match context.device.create_pipeline_layout(&info, None) {
+            match device.raw.create_pipeline_layout(&info, None) {
                 Ok(pipeline_layout) => Ok(Self { kinds: kinds.to_vec(), push_bytes, set_layout, pipeline_layout }),
                 Err(error) => {
-                    context.device.destroy_descriptor_set_layout(set_layout, None);
+                    device.raw.destroy_descriptor_set_layout(set_layout, None);
                     Err(GpuError::call("vkCreatePipelineLayout", "bindings")(error))
                 }
             }
@@ -158,11 +165,18 @@ impl BindingLayout {
     }
 }
 
-/// A complete descriptor set. Its buffers and images must outlive the commands that use it.
+/// A complete descriptor set, which keeps the buffers and images that it binds.
 pub struct BindingSet {
-    pub(super) raw: vk::DescriptorSet,
-    pool: vk::DescriptorPool,
+    pub(super) raw: Arc<RawSet>,
     pub(super) bindings: Arc<BindingLayout>,
+}
+
+/// Vulkan's set, its pool and what it binds.
+pub(super) struct RawSet {
+    pub raw: vk::DescriptorSet,
+    pool: vk::DescriptorPool,
+    _bound: Vec<Kept>,
+    device: Arc<RawDevice>,
 }
 
 impl BindingSet {
@@ -174,38 +188,52 @@ impl BindingSet {
     /// The number of objects is not that of the layout's bindings, or an object has no binding in the layout.
     pub fn new(bindings: &Arc<BindingLayout>, name: &str, objects: &[(u32, Binding)]) -> Result<Self, GpuError> {
         assert_eq!(objects.len(), bindings.kinds.len(), "one object a binding");
-        let context = &bindings.context;
-        context.count_creation("vkCreateDescriptorPool", name)?;
+        let device = &bindings.device;
+        device.count_creation("vkCreateDescriptorPool", name)?;
         let sizes: Vec<_> = bindings
             .kinds
             .iter()
             .map(|(_, kind)| vk::DescriptorPoolSize { ty: kind.descriptor(), descriptor_count: 1 })
             .collect();
         let info = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
+        let _bound = objects.iter().filter_map(|(_, object)| object.kept()).collect();
         // SAFETY: the pool has room for exactly this set, and is destroyed with it.
-        unsafe {
-            let pool = context
-                .device
+        let raw = unsafe {
+            let pool = device
+                .raw
                 .create_descriptor_pool(&info, None)
                 .map_err(GpuError::call("vkCreateDescriptorPool", name))?;
-            let mut set = Self { raw: vk::DescriptorSet::null(), pool, bindings: bindings.clone() };
-            context.count_creation("vkAllocateDescriptorSets", name)?;
+            let mut set = RawSet { raw: vk::DescriptorSet::null(), pool, _bound, device: Arc::clone(device) };
+            device.count_creation("vkAllocateDescriptorSets", name)?;
             let layouts = [bindings.set_layout];
             let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
-            set.raw = context
-                .device
-                .allocate_descriptor_sets(&info)
-                .map_err(GpuError::call("vkAllocateDescriptorSets", name))?[0];
-            context.set_name(set.raw, name);
-            set.write(objects);
-            Ok(set)
+            set.raw =
+                device.raw.allocate_descriptor_sets(&info).map_err(GpuError::call("vkAllocateDescriptorSets", name))?
+                    [0];
+            device.set_name(set.raw, name);
+            set.write(&bindings.kinds, objects);
+            set
+        };
+        Ok(Self { raw: Arc::new(raw), bindings: Arc::clone(bindings) })
+    }
+}
+
+impl Binding<'_> {
+    /// Returns what a set keeps. Who made an external buffer has guaranteed that it lives long enough.
+    fn kept(&self) -> Option<Kept> {
+        match *self {
+            Self::Buffer(buffer) | Self::Texels(buffer) => Some(Arc::clone(buffer) as Kept),
+            Self::Image(target) => Some(Arc::clone(target) as Kept),
+            Self::External(_) => None,
         }
     }
+}
 
-    fn write(&self, objects: &[(u32, Binding)]) {
-        let most_bytes = self.bindings.context.limits().storage_range;
+impl RawSet {
+    fn write(&self, kinds: &[(u32, BindingKind)], objects: &[(u32, Binding)]) {
+        let most_bytes = self.device.limits.storage_range;
         for (binding, object) in objects {
-            let known = self.bindings.kinds.iter().find(|(known, _)| known == binding);
+            let known = kinds.iter().find(|(known, _)| known == binding);
             let (_, kind) = known.unwrap_or_else(|| panic!("the set has no binding {binding}"));
             let write = vk::WriteDescriptorSet::default()
                 .dst_set(self.raw)
@@ -220,7 +248,7 @@ impl BindingSet {
                     buffer_info = [vk::DescriptorBufferInfo::default().buffer(buffer.raw()).range(bytes)];
                     write.buffer_info(&buffer_info)
                 }
-                Binding::Given(GivenBuffer { raw, offset, bytes }) => {
+                Binding::External(ExternalBuffer { raw, offset, bytes }) => {
                     buffer_info = [vk::DescriptorBufferInfo::default().buffer(*raw).offset(*offset).range(*bytes)];
                     write.buffer_info(&buffer_info)
                 }
@@ -236,15 +264,16 @@ impl BindingSet {
                 }
             };
             // SAFETY: the set is not in use yet, and the object is of the binding's kind.
-            unsafe { self.bindings.context.device.update_descriptor_sets(&[write], &[]) };
+            unsafe { self.device.raw.update_descriptor_sets(&[write], &[]) };
         }
     }
 }
 
-impl Drop for BindingSet {
+impl Drop for RawSet {
     fn drop(&mut self) {
-        // SAFETY: the device has ended all work with the set, which is freed with its pool.
-        unsafe { self.bindings.context.device.destroy_descriptor_pool(self.pool, None) };
+        // SAFETY: the device has ended all work with the set, since commands that bind it keep it. It is freed with its
+        // pool.
+        unsafe { self.device.raw.destroy_descriptor_pool(self.pool, None) };
     }
 }
 

@@ -1,13 +1,13 @@
 //! Typed buffers in the device's memory, with uploads and downloads.
 
-use std::{marker::PhantomData, mem::ManuallyDrop, sync::Arc};
+use std::{marker::PhantomData, mem::ManuallyDrop, ptr::NonNull, slice, sync::Arc};
 
 use ash::vk;
 use bytemuck::Pod;
 use gpu_allocator::{MemoryLocation, vulkan::Allocation};
 use rayon::prelude::*;
 
-use super::{Access, Context, GpuError};
+use super::{Access, Context, GpuError, memory::Object, raw_device::RawDevice};
 
 /// Greatest size of one part of an upload or download, bytes. Staging buffers of this size are cut from a block of
 /// memory that the allocator keeps. Memory for larger ones would be mapped and pinned for each copy, which takes longer
@@ -54,6 +54,7 @@ pub struct Buffer<T> {
     any: Arc<AnyBuffer>,
     len: usize,
     element: PhantomData<T>,
+    context: Arc<Context>,
 }
 
 /// A buffer without its element type, as descriptors and copies take it.
@@ -64,7 +65,7 @@ pub struct AnyBuffer {
     /// Texel view of the buffer. Null if its use includes no texels.
     texels: vk::BufferView,
     name: String,
-    context: Arc<Context>,
+    device: Arc<RawDevice>,
 }
 
 impl<T: Pod> Buffer<T> {
@@ -101,11 +102,11 @@ impl<T: Pod> Buffer<T> {
             }
         } | vk::BufferUsageFlags::TRANSFER_SRC
             | vk::BufferUsageFlags::TRANSFER_DST;
-        let mut any = AnyBuffer::new(context, name, bytes, usage, MemoryLocation::GpuOnly)?;
+        let mut any = AnyBuffer::new(&context.device, name, bytes, usage, MemoryLocation::GpuOnly)?;
         if has_texels {
             any.add_texels(texel_bytes::<T>())?;
         }
-        Ok(Self { any: Arc::new(any), len, element: PhantomData })
+        Ok(Self { any: Arc::new(any), len, element: PhantomData, context: Arc::clone(context) })
     }
 
     /// Creates a buffer that holds `data`.
@@ -161,16 +162,16 @@ impl<T: Pod> Buffer<T> {
         if len == 0 {
             return Ok(());
         }
-        let context = &self.any.context;
+        let context = &self.context;
         let most = (MOST_STAGING_BYTES / size_of::<T>()).min(len);
         let staging_bytes = (most * size_of::<T>()) as u64;
-        let mut staging = AnyBuffer::staging(context, &self.any.name, staging_bytes, MemoryLocation::CpuToGpu)?;
+        let mut staging = Staging::new(context, &self.any.name, staging_bytes, MemoryLocation::CpuToGpu)?;
         for first in (0..len).step_by(most) {
             let bytes = most.min(len - first) * size_of::<T>();
-            write(first, bytemuck::cast_slice_mut(&mut staging.mapped()[..bytes]));
+            write(first, bytemuck::cast_slice_mut(&mut staging.bytes()[..bytes]));
             let begin = (first * size_of::<T>()) as u64;
             context.run("upload", |commands| {
-                commands.copy_buffer_to((&self.any, begin), &staging, bytes as u64);
+                commands.copy_buffer_to((&self.any, begin), &staging.buffer, bytes as u64);
                 commands.barrier(Access::TransferWrite, Access::AnyUse); // the buffer
             })?;
         }
@@ -211,21 +212,21 @@ impl<T: Pod> Buffer<T> {
         if to.is_empty() {
             return Ok(());
         }
-        let context = &self.any.context;
+        let context = &self.context;
         let staging_bytes = MOST_STAGING_BYTES.min(to.len());
         let location = MemoryLocation::GpuToCpu;
-        let mut staging = AnyBuffer::staging(context, &self.any.name, staging_bytes as u64, location)?;
+        let mut staging = Staging::new(context, &self.any.name, staging_bytes as u64, location)?;
         let mut begin = first as u64;
         for part in to.chunks_mut(staging_bytes) {
             let n_bytes = part.len() as u64;
             context.run("download", |commands| {
                 commands.barrier(Access::ComputeWrite, Access::TransferRead); // the buffer
-                commands.copy_buffer_part((&self.any, begin), (&staging, 0), n_bytes);
+                commands.copy_buffer_part((&self.any, begin), (&staging.buffer, 0), n_bytes);
                 commands.barrier(Access::TransferWrite, Access::HostRead); // staging
             })?;
             begin += n_bytes;
             // Fresh pages are mapped one by one when they are first written, which several threads do faster.
-            let from = &staging.mapped()[..part.len()];
+            let from = &staging.bytes()[..part.len()];
             let copied = part.par_chunks_mut(COPIED_BYTES).zip(from.par_chunks(COPIED_BYTES));
             copied.for_each(|(to, from)| to.copy_from_slice(from));
         }
@@ -233,7 +234,7 @@ impl<T: Pod> Buffer<T> {
     }
 
     /// Returns the buffer without its element type.
-    pub fn any(&self) -> &AnyBuffer {
+    pub fn any(&self) -> &Arc<AnyBuffer> {
         &self.any
     }
 
@@ -247,25 +248,24 @@ impl<T: Pod> Buffer<T> {
 
 impl AnyBuffer {
     fn new(
-        context: &Arc<Context>,
+        device: &Arc<RawDevice>,
         name: &str,
         bytes: u64,
         usage: vk::BufferUsageFlags,
         location: MemoryLocation,
     ) -> Result<Self, GpuError> {
-        context.count_creation("vkCreateBuffer", name)?;
-        let device = &context.device;
+        device.count_creation("vkCreateBuffer", name)?;
         let info = vk::BufferCreateInfo::default().size(bytes).usage(usage);
         // SAFETY: the raw buffer is destroyed on every path that does not hand it to an owner.
         unsafe {
-            let raw = device.create_buffer(&info, None).map_err(GpuError::call("vkCreateBuffer", name))?;
-            let mut requirements = device.get_buffer_memory_requirements(raw);
+            let raw = device.raw.create_buffer(&info, None).map_err(GpuError::call("vkCreateBuffer", name))?;
+            let mut requirements = device.raw.get_buffer_memory_requirements(raw);
             // Kernels that read by address read four aligned words at once.
             requirements.alignment = requirements.alignment.max(ROW_BYTES);
-            let allocation = match context.allocate(name, requirements, location, true) {
+            let allocation = match device.allocate(name, requirements, location, Object::Buffer(raw)) {
                 Ok(allocation) => ManuallyDrop::new(allocation),
                 Err(error) => {
-                    device.destroy_buffer(raw, None);
+                    device.raw.destroy_buffer(raw, None);
                     return Err(error);
                 }
             };
@@ -275,12 +275,12 @@ impl AnyBuffer {
                 bytes,
                 texels: vk::BufferView::null(),
                 name: name.to_owned(),
-                context: context.clone(),
+                device: Arc::clone(device),
             };
-            device
+            (device.raw)
                 .bind_buffer_memory(raw, buffer.allocation.memory(), buffer.allocation.offset())
                 .map_err(GpuError::call("vkBindBufferMemory", name))?;
-            context.set_name(raw, name);
+            device.set_name(raw, name);
             Ok(buffer)
         }
     }
@@ -288,29 +288,18 @@ impl AnyBuffer {
     /// Adds a texel view of the buffer. If the buffer has more texels than the device allows in one view, the view
     /// covers only the first texels.
     fn add_texels(&mut self, texel_bytes: u64) -> Result<(), GpuError> {
-        self.context.count_creation("vkCreateBufferView", &self.name)?;
+        self.device.count_creation("vkCreateBufferView", &self.name)?;
         let format = match texel_bytes {
             16 => vk::Format::R32G32B32A32_UINT,
             8 => vk::Format::R32G32_UINT,
             _ => vk::Format::R32_UINT,
         };
-        let range = self.bytes.min(u64::from(self.context.limits().n_texels) * texel_bytes);
+        let range = self.bytes.min(u64::from(self.device.limits.n_texels) * texel_bytes);
         let info = vk::BufferViewCreateInfo::default().buffer(self.raw).format(format).range(range);
         // SAFETY: the buffer was created with the usage that allows texel views, and all devices have these formats.
-        self.texels = unsafe { self.context.device.create_buffer_view(&info, None) }
+        self.texels = unsafe { self.device.raw.create_buffer_view(&info, None) }
             .map_err(GpuError::call("vkCreateBufferView", &self.name))?;
         Ok(())
-    }
-
-    /// Creates a host-visible buffer for an upload or a download.
-    fn staging(context: &Arc<Context>, name: &str, bytes: u64, location: MemoryLocation) -> Result<Self, GpuError> {
-        let usage = vk::BufferUsageFlags::TRANSFER_SRC | vk::BufferUsageFlags::TRANSFER_DST;
-        Self::new(context, &format!("{name} staging"), bytes, usage, location)
-    }
-
-    /// Returns the bytes of a host-visible buffer.
-    fn mapped(&mut self) -> &mut [u8] {
-        self.allocation.mapped_slice_mut().expect("host-visible memory stays mapped")
     }
 
     pub(super) fn raw(&self) -> vk::Buffer {
@@ -326,7 +315,7 @@ impl AnyBuffer {
     pub(super) fn address(&self) -> vk::DeviceAddress {
         let info = vk::BufferDeviceAddressInfo::default().buffer(self.raw);
         // SAFETY: the buffer was created with the usage that allows addresses.
-        unsafe { self.context.device.get_buffer_device_address(&info) }
+        unsafe { self.device.raw.get_buffer_device_address(&info) }
     }
 
     /// Returns the buffer's debug label.
@@ -342,12 +331,33 @@ impl AnyBuffer {
 
 impl Drop for AnyBuffer {
     fn drop(&mut self) {
-        // SAFETY: the device has ended all work on the buffer. `Context::run` waits for that work, and so does
-        // whoever submits a frame.
+        // SAFETY: the device has ended all work on the buffer, since commands that use it keep it.
         unsafe {
-            self.context.device.destroy_buffer_view(self.texels, None);
-            self.context.device.destroy_buffer(self.raw, None);
-            self.context.free(ManuallyDrop::take(&mut self.allocation));
+            self.device.raw.destroy_buffer_view(self.texels, None);
+            self.device.raw.destroy_buffer(self.raw, None);
+            self.device.free(ManuallyDrop::take(&mut self.allocation));
         }
+    }
+}
+
+/// A host-visible buffer for an upload or a download.
+struct Staging {
+    buffer: Arc<AnyBuffer>,
+    /// The buffer's memory, which stays mapped.
+    mapped: NonNull<u8>,
+}
+
+impl Staging {
+    fn new(context: &Arc<Context>, name: &str, bytes: u64, location: MemoryLocation) -> Result<Self, GpuError> {
+        let usage = vk::BufferUsageFlags::TRANSFER_SRC | vk::BufferUsageFlags::TRANSFER_DST;
+        let buffer = AnyBuffer::new(&context.device, &format!("{name} staging"), bytes, usage, location)?;
+        let mapped = buffer.allocation.mapped_ptr().expect("host-visible memory stays mapped").cast();
+        Ok(Self { buffer: Arc::new(buffer), mapped })
+    }
+
+    /// Returns the buffer's bytes. The device must not work on the buffer meanwhile: its owner waits for each copy.
+    fn bytes(&mut self) -> &mut [u8] {
+        // SAFETY: the buffer is as long, and nobody else reads or writes its memory.
+        unsafe { slice::from_raw_parts_mut(self.mapped.as_ptr(), self.buffer.bytes as usize) }
     }
 }

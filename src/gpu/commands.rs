@@ -1,29 +1,41 @@
 //! Command buffers, and the commands that are recorded in them.
 
-use std::{cell::Cell, ffi::CString, sync::Arc};
+use std::{
+    any::Any,
+    cell::{Cell, RefCell},
+    ffi::CString,
+    sync::Arc,
+};
 
 use ash::vk;
 use bytemuck::Pod;
 
 use super::{
-    Access, AnyBuffer, BindingSet, Buffer, ComputePipeline, Context, GivenImage, GpuError, RasterPipeline, Target,
-    Timer,
+    Access, AnyBuffer, BindingLayout, BindingSet, Buffer, ComputePipeline, Context, ExternalImage, GpuError,
+    RasterPipeline, Target, Timer,
+    raw_device::{CommandPool, RawDevice},
 };
 
-/// A recorded command buffer.
+/// An object that must not be released before the device has ended the commands that use it.
+pub(super) type Kept = Arc<dyn Any + Send + Sync>;
+
+/// A recorded command buffer, with all that its commands use.
 pub struct CommandBuffer {
-    raw: vk::CommandBuffer,
+    pool: CommandPool,
     name: String,
-    context: Arc<Context>,
+    _kept: Vec<Kept>,
+    device: Arc<RawDevice>,
 }
 
 /// A command buffer that is being recorded. [`CommandBuffer::record`] passes it to the closure that records commands.
 pub struct Commands<'a> {
     pub(super) raw: vk::CommandBuffer,
-    pub(super) context: &'a Context,
+    pub(super) device: &'a RawDevice,
     timer: Option<&'a Timer>,
     /// Whether a pass has been recorded. The timer needs to know the first pass of a command buffer.
     has_passes: Cell<bool>,
+    /// What the commands use.
+    kept: RefCell<Vec<Kept>>,
 }
 
 /// The grid of a dispatch.
@@ -34,7 +46,7 @@ pub enum Dispatch<'a> {
     /// the kernel declares.
     Threads([u32; 3], [u32; 3]),
     /// A buffer and the byte offset at which it holds the numbers of workgroups along x, y and z.
-    Indirect(&'a AnyBuffer, u64),
+    Indirect(&'a Arc<AnyBuffer>, u64),
 }
 
 /// A rectangle of pixels. Rows and columns count from the upper left corner.
@@ -53,9 +65,9 @@ pub struct Area {
 /// Description of a draw: its triangles and its targets.
 pub struct DrawDesc<'a> {
     /// Takes the index of each pixel's triangle.
-    pub ids: &'a Target,
+    pub ids: &'a Arc<Target>,
     /// Takes the depth of each pixel during the draw. The depths are undefined afterwards.
-    pub depth: &'a Target,
+    pub depth: &'a Arc<Target>,
     /// Width and height of the picture that clip space spans, pixels. The targets must be at least as large.
     pub picture: (u32, u32),
     /// The part of the picture to draw. Its pixels are the same, bit for bit, as if the whole picture were drawn. The
@@ -78,21 +90,24 @@ impl CommandBuffer {
         timer: Option<&Timer>,
         body: impl FnOnce(&Commands),
     ) -> Result<Self, GpuError> {
-        context.count_creation("vkAllocateCommandBuffers", name)?;
         let device = &context.device;
-        let info = vk::CommandBufferAllocateInfo::default().command_pool(context.command_pool).command_buffer_count(1);
-        // SAFETY: only one thread uses the pool at a time.
-        let raw = unsafe { device.allocate_command_buffers(&info) }
-            .map_err(GpuError::call("vkAllocateCommandBuffers", name))?[0];
-        let buffer = Self { raw, name: name.to_owned(), context: context.clone() };
-        context.set_name(raw, name);
+        device.count_creation("vkAllocateCommandBuffers", name)?;
+        let pool = device.take_pool(name)?;
+        let mut buffer = Self { pool, name: name.to_owned(), _kept: Vec::new(), device: Arc::clone(device) };
+        let raw = pool.buffer;
+        device.set_name(raw, name);
         let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
-        // SAFETY: the buffer is new, so nothing else uses it.
-        unsafe { device.begin_command_buffer(raw, &begin) }.map_err(GpuError::call("vkBeginCommandBuffer", name))?;
-        let commands = Commands { raw, context, timer, has_passes: Cell::new(false) };
+        // SAFETY: the pool and its buffer are this recorder's alone, and the device does not use them.
+        unsafe {
+            (device.raw.reset_command_pool(pool.raw, vk::CommandPoolResetFlags::empty()))
+                .map_err(GpuError::call("vkResetCommandPool", name))?;
+            device.raw.begin_command_buffer(raw, &begin).map_err(GpuError::call("vkBeginCommandBuffer", name))?;
+        }
+        let commands = Commands { timer, ..Commands::new(device, raw) };
         commands.labelled(name, || body(&commands));
+        buffer._kept = commands.kept.into_inner();
         // SAFETY: the buffer is being recorded.
-        unsafe { device.end_command_buffer(raw) }.map_err(GpuError::call("vkEndCommandBuffer", name))?;
+        unsafe { device.raw.end_command_buffer(raw) }.map_err(GpuError::call("vkEndCommandBuffer", name))?;
         Ok(buffer)
     }
 
@@ -102,27 +117,33 @@ impl CommandBuffer {
     }
 
     pub(super) fn raw(&self) -> vk::CommandBuffer {
-        self.raw
-    }
-
-    /// Leaves the buffer to the context, which frees it when the device has ended all work.
-    pub(super) fn leave(mut self) {
-        self.context.leave_commands(std::mem::take(&mut self.raw));
+        self.pool.buffer
     }
 }
 
 impl Drop for CommandBuffer {
     fn drop(&mut self) {
-        // SAFETY: the buffer's owner has waited for the device, or has left the buffer to the context. In the second
-        // case the handle is null, which Vulkan ignores.
-        unsafe { self.context.device.free_command_buffers(self.context.command_pool, &[self.raw]) };
+        // SAFETY: the buffer was not submitted, or the queue has kept it until the device has ended its commands.
+        unsafe { self.device.give_pool(self.pool) };
     }
 }
 
 impl<'a> Commands<'a> {
-    /// Wraps a command buffer that the caller records and submits. Its passes are not timed.
-    pub(super) fn to_given(context: &'a Context, raw: vk::CommandBuffer) -> Self {
-        Self { raw, context, timer: None, has_passes: Cell::new(false) }
+    fn new(device: &'a RawDevice, raw: vk::CommandBuffer) -> Self {
+        Self { raw, device, timer: None, has_passes: Cell::new(false), kept: RefCell::default() }
+    }
+
+    /// Wraps a command buffer that the caller records and submits. Its passes are not timed, and its caller keeps what
+    /// the commands use.
+    pub(super) fn to_external(context: &'a Context, raw: vk::CommandBuffer) -> Self {
+        Self::new(&context.device, raw)
+    }
+}
+
+impl Commands<'_> {
+    /// Keeps an object until the device has ended the commands.
+    pub(super) fn keep<T: Any + Send + Sync>(&self, object: &Arc<T>) {
+        self.kept.borrow_mut().push(Arc::clone(object) as Kept);
     }
 }
 
@@ -131,18 +152,18 @@ impl Commands<'_> {
     /// and `number`.
     pub(super) fn pass(&self, name: &'static str, number: Option<u32>, body: impl FnOnce()) {
         if let Some(timer) = self.timer {
-            timer.begin(self.raw, name, number, !self.has_passes.replace(true));
+            timer.begin(self, name, number, !self.has_passes.replace(true));
         }
         self.labelled(name, body);
         if let Some(timer) = self.timer {
-            timer.end(self.raw);
+            timer.end(self);
         }
     }
 
     /// Records `body` under a debug label, if commands get labels.
     fn labelled(&self, name: &str, body: impl FnOnce()) {
         let label = CString::new(name).unwrap_or_default();
-        let debug_utils = self.context.debug_utils.as_ref().filter(|_| self.context.has_labels);
+        let debug_utils = self.device.debug_utils.as_ref().filter(|_| self.device.has_labels);
         // SAFETY: the commands are being recorded, and each label that begins also ends.
         unsafe {
             if let Some(debug_utils) = debug_utils {
@@ -159,19 +180,20 @@ impl Commands<'_> {
     /// Resets the timer, if there is one: its rows are then those of the passes that follow.
     pub fn reset_timer(&self) {
         if let Some(timer) = self.timer {
-            timer.reset(self.raw);
+            timer.reset(self);
         }
     }
 
     /// Binds the set for all pipelines of this command buffer.
     pub fn bind(&self, set: &BindingSet) {
+        self.keep(&set.raw);
         // SAFETY: the set is complete, and all pipelines have its layout.
         unsafe {
-            let ray_tracing = self.context.ray_tracing.as_ref().map(|_| vk::PipelineBindPoint::RAY_TRACING_KHR);
+            let ray_tracing = self.device.ray_tracing.as_ref().map(|_| vk::PipelineBindPoint::RAY_TRACING_KHR);
             let points = [vk::PipelineBindPoint::COMPUTE, vk::PipelineBindPoint::GRAPHICS];
             for point in points.into_iter().chain(ray_tracing) {
                 let layout = set.bindings.pipeline_layout;
-                self.context.device.cmd_bind_descriptor_sets(self.raw, point, layout, 0, &[set.raw], &[]);
+                self.device.raw.cmd_bind_descriptor_sets(self.raw, point, layout, 0, &[set.raw.raw], &[]);
             }
         }
     }
@@ -199,19 +221,37 @@ impl Commands<'_> {
     }
 
     fn launch(&self, pipeline: &ComputePipeline, push: &impl Pod, dispatch: Dispatch) {
-        let device = &self.context.device;
-        let stages = self.context.stages();
-        // SAFETY: the set is bound, and the push constants fit the layout's range.
+        let device = &self.device.raw;
+        self.keep(&pipeline.raw);
+        // SAFETY: the set is bound, and the buffer of workgroup counts holds them.
         unsafe {
-            device.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::COMPUTE, pipeline.raw);
-            let layout = pipeline.bindings.pipeline_layout;
-            device.cmd_push_constants(self.raw, layout, stages, 0, bytemuck::bytes_of(push));
+            device.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::COMPUTE, pipeline.raw.raw);
+            self.push(&pipeline.bindings, push);
             match dispatch {
                 Dispatch::Threads([nx, ny, nz], [x, y, z]) => {
                     device.cmd_dispatch(self.raw, nx.div_ceil(x), ny.div_ceil(y), nz.div_ceil(z));
                 }
-                Dispatch::Indirect(buffer, offset) => device.cmd_dispatch_indirect(self.raw, buffer.raw(), offset),
+                Dispatch::Indirect(buffer, offset) => {
+                    let end = offset + size_of::<[u32; 3]>() as u64;
+                    assert!(end <= buffer.bytes() && offset.is_multiple_of(4), "workgroup counts in the buffer");
+                    self.keep(buffer);
+                    device.cmd_dispatch_indirect(self.raw, buffer.raw(), offset);
+                }
             }
+        }
+    }
+
+    /// Sets push constants for pipelines of a layout.
+    ///
+    /// # Panics
+    /// The layout has room for fewer.
+    pub(super) fn push(&self, bindings: &BindingLayout, push: &impl Pod) {
+        let bytes = bytemuck::bytes_of(push);
+        assert!(bytes.len() as u32 <= bindings.push_bytes, "push constants of at most {} bytes", bindings.push_bytes);
+        // SAFETY: the layout has room for the constants, and all its stages are named.
+        unsafe {
+            let (layout, stages) = (bindings.pipeline_layout, self.device.stages());
+            self.device.raw.cmd_push_constants(self.raw, layout, stages, 0, bytes);
         }
     }
 
@@ -221,8 +261,14 @@ impl Commands<'_> {
     }
 
     fn rasterize(&self, pipeline: &RasterPipeline, desc: &DrawDesc) {
-        let device = &self.context.device;
+        let device = &self.device.raw;
         let Area { x, y, width, height } = desc.area;
+        let size = [desc.ids, desc.depth].map(|target| target.size());
+        assert!(size.iter().all(|size| x + width <= size.0 && y + height <= size.1), "an area of the targets");
+        self.keep(&pipeline.raw);
+        self.keep(desc.indices.any());
+        self.keep(desc.ids);
+        self.keep(desc.depth);
         let area =
             vk::Rect2D { offset: vk::Offset2D { x: x as i32, y: y as i32 }, extent: vk::Extent2D { width, height } };
         let attachment = |target: &Target, layout, clear, store| {
@@ -252,7 +298,7 @@ impl Commands<'_> {
         // SAFETY: `begin_targets` has put the targets into the named layouts, and the set is bound.
         unsafe {
             device.cmd_begin_rendering(self.raw, &rendering);
-            device.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::GRAPHICS, pipeline.raw);
+            device.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::GRAPHICS, pipeline.raw.raw);
             device.cmd_set_viewport(self.raw, 0, &[viewport]);
             device.cmd_set_scissor(self.raw, 0, &[area]);
             if desc.indices.is_empty() {
@@ -275,11 +321,11 @@ impl Commands<'_> {
             .dst_access_mask(destination.accesses())];
         let info = vk::DependencyInfo::default().memory_barriers(&barrier);
         // SAFETY: the commands are being recorded, and no rendering is open.
-        unsafe { self.context.device.cmd_pipeline_barrier2(self.raw, &info) };
+        unsafe { self.device.raw.cmd_pipeline_barrier2(self.raw, &info) };
     }
 
     /// Prepares the targets for drawing and discards their contents.
-    pub fn begin_targets(&self, ids: &Target, depth: &Target) {
+    pub fn begin_targets(&self, ids: &Arc<Target>, depth: &Arc<Target>) {
         let tests = vk::PipelineStageFlags2::EARLY_FRAGMENT_TESTS | vk::PipelineStageFlags2::LATE_FRAGMENT_TESTS;
         // Kernels of the previous frame may still read the IDs, and its depth tests may still write the depth.
         self.transition(
@@ -301,7 +347,7 @@ impl Commands<'_> {
     }
 
     /// Makes drawn IDs visible to kernels.
-    pub fn color_to_compute(&self, ids: &Target) {
+    pub fn color_to_compute(&self, ids: &Arc<Target>) {
         self.transition(
             ids,
             (
@@ -314,7 +360,7 @@ impl Commands<'_> {
     }
 
     /// Prepares an ID target for kernels and discards its contents.
-    pub fn discard_for_compute(&self, ids: &Target) {
+    pub fn discard_for_compute(&self, ids: &Arc<Target>) {
         self.transition(
             ids,
             (vk::PipelineStageFlags2::NONE, vk::AccessFlags2::NONE, vk::ImageLayout::UNDEFINED),
@@ -322,7 +368,8 @@ impl Commands<'_> {
         );
     }
 
-    fn transition(&self, target: &Target, from: LayoutState, to: LayoutState) {
+    fn transition(&self, target: &Arc<Target>, from: LayoutState, to: LayoutState) {
+        self.keep(target);
         self.transition_image(target.raw, target.range(), from, to);
     }
 
@@ -339,51 +386,62 @@ impl Commands<'_> {
             .new_layout(to.2)];
         let info = vk::DependencyInfo::default().image_memory_barriers(&barrier);
         // SAFETY: the commands are being recorded, and no rendering is open.
-        unsafe { self.context.device.cmd_pipeline_barrier2(self.raw, &info) };
+        unsafe { self.device.raw.cmd_pipeline_barrier2(self.raw, &info) };
     }
 
     /// Overwrites the first bytes of a buffer with data that is stored in the command buffer.
     ///
     /// # Panics
     /// The data exceeds 64 KiB or the buffer, or is not a multiple of 4 bytes.
-    pub fn update_buffer(&self, destination: &AnyBuffer, data: &[impl Pod]) {
+    pub fn update_buffer(&self, destination: &Arc<AnyBuffer>, data: &[impl Pod]) {
         let bytes = bytemuck::cast_slice(data);
         assert!(bytes.len() as u64 <= destination.bytes() && bytes.len() <= 1 << 16 && bytes.len().is_multiple_of(4));
+        self.keep(destination);
         // SAFETY: the commands are being recorded, no rendering is open, and the buffer holds that many bytes.
-        unsafe { self.context.device.cmd_update_buffer(self.raw, destination.raw(), 0, bytes) };
+        unsafe { self.device.raw.cmd_update_buffer(self.raw, destination.raw(), 0, bytes) };
     }
 
     /// Fills a buffer with zeros.
-    pub fn clear_buffer(&self, buffer: &AnyBuffer) {
+    pub fn clear_buffer(&self, buffer: &Arc<AnyBuffer>) {
         self.fill_buffer(buffer, 0);
     }
 
     /// Fills a buffer with copies of a word.
-    pub fn fill_buffer(&self, buffer: &AnyBuffer, word: u32) {
+    pub fn fill_buffer(&self, buffer: &Arc<AnyBuffer>, word: u32) {
+        self.keep(buffer);
         // SAFETY: the commands are being recorded, and no rendering is open.
-        unsafe { self.context.device.cmd_fill_buffer(self.raw, buffer.raw(), 0, vk::WHOLE_SIZE, word) };
+        unsafe { self.device.raw.cmd_fill_buffer(self.raw, buffer.raw(), 0, vk::WHOLE_SIZE, word) };
     }
 
     /// Copies the source's first `bytes` bytes to the beginning of the destination.
-    pub fn copy_buffer(&self, source: &AnyBuffer, destination: &AnyBuffer, bytes: u64) {
+    pub fn copy_buffer(&self, source: &Arc<AnyBuffer>, destination: &Arc<AnyBuffer>, bytes: u64) {
         self.copy_buffer_to((destination, 0), source, bytes);
     }
 
     /// Copies the source's first `bytes` bytes to the destination, from its byte `begin` on.
-    pub fn copy_buffer_to(&self, destination: (&AnyBuffer, u64), source: &AnyBuffer, bytes: u64) {
+    pub fn copy_buffer_to(&self, destination: (&Arc<AnyBuffer>, u64), source: &Arc<AnyBuffer>, bytes: u64) {
         self.copy_buffer_part((source, 0), destination, bytes);
     }
 
     /// Copies `bytes` bytes. Both buffers come with the byte at which the copy begins.
+    ///
+    /// # Panics
+    /// A buffer does not hold the bytes.
     pub fn copy_buffer_part(
         &self,
-        (source, source_begin): (&AnyBuffer, u64),
-        (destination, begin): (&AnyBuffer, u64),
+        (source, source_begin): (&Arc<AnyBuffer>, u64),
+        (destination, begin): (&Arc<AnyBuffer>, u64),
         bytes: u64,
     ) {
         let region = [vk::BufferCopy::default().src_offset(source_begin).dst_offset(begin).size(bytes)];
-        // SAFETY: both buffers hold that many bytes, as their owners have checked.
-        unsafe { self.context.device.cmd_copy_buffer(self.raw, source.raw(), destination.raw(), &region) };
+        assert!(
+            source_begin + bytes <= source.bytes() && begin + bytes <= destination.bytes(),
+            "bytes of both buffers"
+        );
+        self.keep(source);
+        self.keep(destination);
+        // SAFETY: both buffers hold that many bytes.
+        unsafe { self.device.raw.cmd_copy_buffer(self.raw, source.raw(), destination.raw(), &region) };
     }
 }
 
@@ -401,11 +459,11 @@ pub struct PixelRows {
 impl Commands<'_> {
     /// Copies pixels to the upper left corner of an image that the caller owns. Before, a barrier to
     /// [`Access::TransferRead`] has to make the buffer's contents visible. Afterwards, the image is in the second
-    /// layout of [`GivenImage::new`]. Whoever waits for the end of the commands sees the pixels.
+    /// layout of [`ExternalImage::new`]. Whoever waits for the end of the commands sees the pixels.
     ///
     /// # Panics
     /// The image is smaller than the rectangle.
-    pub fn copy_to_given(&self, source: &AnyBuffer, rows: &PixelRows, image: &GivenImage) {
+    pub fn copy_to_external(&self, source: &Arc<AnyBuffer>, rows: &PixelRows, image: &ExternalImage) {
         let (width, height) = rows.size;
         assert!(width <= image.size.0 && height <= image.size.1, "the image has room for the pixels");
         let layers = vk::ImageSubresourceLayers::default().aspect_mask(vk::ImageAspectFlags::COLOR).layer_count(1);
@@ -417,14 +475,17 @@ impl Commands<'_> {
         let [before, after] = image.layouts;
         let (copy, written) = (vk::PipelineStageFlags2::COPY, vk::AccessFlags2::TRANSFER_WRITE);
         let copying = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
-        self.transition_given(image, (copy, vk::AccessFlags2::NONE, before), (copy, written, copying));
-        // SAFETY: the buffer holds the rows, as its owner has checked, and the image is in this layout.
-        unsafe { self.context.device.cmd_copy_buffer_to_image(self.raw, source.raw(), image.raw, copying, &region) };
+        self.transition_external(image, (copy, vk::AccessFlags2::NONE, before), (copy, written, copying));
+        let n_pixels = u64::from(rows.stride) * u64::from(height.saturating_sub(1)) + u64::from(width);
+        assert!(width <= rows.stride && rows.offset + 4 * n_pixels <= source.bytes(), "the buffer holds the rows");
+        self.keep(source);
+        // SAFETY: the buffer holds the rows, and the image is in this layout.
+        unsafe { self.device.raw.cmd_copy_buffer_to_image(self.raw, source.raw(), image.raw, copying, &region) };
         // `Context::submit_copies` signals its semaphore at the stage COPY, so the transition ends at this stage.
-        self.transition_given(image, (copy, written, copying), (copy, vk::AccessFlags2::NONE, after));
+        self.transition_external(image, (copy, written, copying), (copy, vk::AccessFlags2::NONE, after));
     }
 
-    fn transition_given(&self, image: &GivenImage, from: LayoutState, to: LayoutState) {
+    fn transition_external(&self, image: &ExternalImage, from: LayoutState, to: LayoutState) {
         let range =
             vk::ImageSubresourceRange::default().aspect_mask(vk::ImageAspectFlags::COLOR).level_count(1).layer_count(1);
         self.transition_image(image.raw, range, from, to);

@@ -1,112 +1,106 @@
-//! The logical device: its queue, its extensions and its features.
+//! The handle of a device, by which the library's callers name it.
 
-use std::ffi::{CStr, c_char};
+use std::sync::Arc;
 
-use ash::{khr, prelude::VkResult, vk};
+use super::{Context, ContextOptions, DeviceInfo, DeviceOverrides, ExternalDevice, GpuError, MemoryUse};
 
-use super::{
-    RequiredFeatures, instance::Instance, ray_tracing::RayTracingCalls, robustness, statistics::StatisticsCalls,
-};
+/// An open Vulkan device. A clone is a second handle to the same device, and any number of threads may use it at once.
+/// The device stays open as long as there is a handle, or an engine, renderer or caster that works on it.
+#[derive(Clone)]
+pub struct Device(Arc<Context>);
 
-/// Purpose for which a device is opened.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Purpose {
-    /// The device computes pictures and other results in memory.
-    Compute,
-    /// The device also runs the driver's own ray tracing, for comparison.
-    RayTracing,
-    /// The device also shows pictures in a window.
-    Window,
-}
-
-/// Extensions and optional features with which a device is created.
-#[derive(Clone, Copy)]
-pub(super) struct DeviceExtras {
-    /// Whether `VK_KHR_portability_subset` is enabled, as a driver that is not fully conformant requires.
-    portability: bool,
-    /// Whether the driver reports statistics of kernels.
-    pub statistics: bool,
-    /// Whether pipelines can be made without bounds checks.
-    pub unchecked: bool,
-    /// Whether kernels have 64-bit atomics on buffers.
-    pub int64_atomics: bool,
-    purpose: Purpose,
-}
-
-impl DeviceExtras {
-    /// Returns all extras that the device has and kdray can use. The extensions and features that `purpose` requires
-    /// are included without a test: the caller has chosen a device that has them.
-    pub fn of(instance: &Instance, physical: vk::PhysicalDevice, purpose: Purpose) -> VkResult<Self> {
-        // SAFETY: the physical device belongs to the instance.
-        let available = unsafe { instance.raw.enumerate_device_extension_properties(physical) }?;
-        let has = |name: &CStr| available.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
-        Ok(Self {
-            portability: has(khr::portability_subset::NAME),
-            statistics: has(StatisticsCalls::EXTENSION) && StatisticsCalls::has_feature(instance, physical),
-            unchecked: has(robustness::EXTENSION) && robustness::has_feature(instance, physical),
-            int64_atomics: has_int64_atomics(instance, physical),
-            purpose,
-        })
+impl Device {
+    /// Opens the device that the options name, or the best one.
+    ///
+    /// # Errors
+    /// There is no loader, driver, device of that name or validation layer; the device lacks a feature; or a call
+    /// fails.
+    pub fn open(options: &ContextOptions) -> Result<Self, GpuError> {
+        Context::new(options).map(Self)
     }
 
-    /// Returns the extras of a device that the library's caller has created: at most 64-bit atomics.
-    pub fn of_given(int64_atomics: bool) -> Self {
-        Self { portability: false, statistics: false, unchecked: false, int64_atomics, purpose: Purpose::Compute }
+    /// Opens a device with the driver's own ray tracing, with which `kdray bench` compares kdray.
+    ///
+    /// # Errors
+    /// Fails as [`Device::open`] does, or if the device lacks a ray tracing extension.
+    #[doc(hidden)]
+    pub fn with_ray_tracing(options: &ContextOptions) -> Result<Self, GpuError> {
+        Context::with_ray_tracing(options).map(Self)
     }
 
-    fn extensions(self) -> Vec<*const c_char> {
-        let mut names = Vec::new();
-        names.extend(self.portability.then_some(khr::portability_subset::NAME));
-        names.extend(self.statistics.then_some(StatisticsCalls::EXTENSION));
-        names.extend(self.unchecked.then_some(robustness::EXTENSION));
-        match self.purpose {
-            Purpose::Compute => {}
-            Purpose::RayTracing => names.extend(RayTracingCalls::EXTENSIONS),
-            Purpose::Window => names.push(khr::swapchain::NAME),
-        }
-        names.into_iter().map(CStr::as_ptr).collect()
+    /// Uses a device that the caller has opened. The caller keeps the device, and destroys it after the last handle and
+    /// all that works on it.
+    ///
+    /// # Errors
+    /// The device lacks something that kdray needs, or a call fails.
+    ///
+    /// # Safety
+    /// The handles belong together and live longer than the last handle. The device was created with
+    /// [`RequiredFeatures`](super::RequiredFeatures), and with 64-bit atomics if `int64_atomics` says so. Whoever else
+    /// uses the queue holds `queue_lock` meanwhile.
+    pub unsafe fn external(device: ExternalDevice) -> Result<Self, GpuError> {
+        // SAFETY: the caller guarantees it.
+        unsafe { Context::on_external(device, &DeviceOverrides::default()) }.map(Self)
     }
 
-    /// Creates a device with one queue of the family.
-    pub fn create_device(
-        self,
-        instance: &Instance,
-        physical: vk::PhysicalDevice,
-        family: u32,
-    ) -> VkResult<ash::Device> {
-        let extensions = self.extensions();
-        let priorities = [1.0];
-        let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&priorities)];
-        let RequiredFeatures { of_1_0, mut of_1_2, mut of_1_3 } = RequiredFeatures::new(self.int64_atomics);
-        let mut executables =
-            vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default().pipeline_executable_info(true);
-        let mut unchecked = vk::PhysicalDevicePipelineRobustnessFeaturesEXT::default().pipeline_robustness(true);
-        let mut structures = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
-        let mut pipelines = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default().ray_tracing_pipeline(true);
-        let mut create = vk::DeviceCreateInfo::default()
-            .queue_create_infos(&queues)
-            .enabled_extension_names(&extensions)
-            .push_next(&mut of_1_3)
-            .enabled_features(&of_1_0)
-            .push_next(&mut of_1_2);
-        if self.statistics {
-            create = create.push_next(&mut executables);
-        }
-        if self.unchecked {
-            create = create.push_next(&mut unchecked);
-        }
-        if self.purpose == Purpose::RayTracing {
-            create = create.push_next(&mut structures).push_next(&mut pipelines);
-        }
-        // SAFETY: all that `create` points to lives until the call returns.
-        unsafe { instance.raw.create_device(physical, &create, None) }
+    /// Describes the device.
+    pub fn info(&self) -> &DeviceInfo {
+        self.0.info()
+    }
+
+    /// Whether the driver computes on the CPU.
+    pub fn is_software(&self) -> bool {
+        self.0.is_software()
+    }
+
+    /// Whether a call has found the device lost, by any handle. All later work on it fails: it has to be opened again.
+    pub fn is_lost(&self) -> bool {
+        self.0.is_lost()
+    }
+
+    /// Lists the uses of the device's memory, the largest first. Objects of one name share an entry.
+    pub fn memory(&self) -> Vec<MemoryUse> {
+        self.0.memory()
+    }
+
+    /// Returns the validation layer's messages so far. There are none without validation.
+    pub fn validation_messages(&self) -> Vec<String> {
+        self.0.validation_messages()
+    }
+
+    /// Returns what the passes, buffers and renderers of kdray's hidden modules are made from.
+    ///
+    /// # Safety
+    /// Kernels read without bounds checks. Whoever makes buffers and commands has to keep to what the hidden modules
+    /// state of their contents, sizes and order.
+    #[doc(hidden)]
+    pub unsafe fn context(&self) -> &Arc<Context> {
+        &self.0
+    }
+
+    /// Returns the context for safe code of kdray.
+    pub(crate) fn inner(&self) -> &Arc<Context> {
+        &self.0
     }
 }
 
-fn has_int64_atomics(instance: &Instance, physical: vk::PhysicalDevice) -> bool {
-    let mut of_1_2 = vk::PhysicalDeviceVulkan12Features::default();
-    let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut of_1_2);
-    // SAFETY: the device supports Vulkan 1.3, which defines the struct.
-    unsafe { instance.raw.get_physical_device_features2(physical, &mut all) };
-    all.features.shader_int64 == vk::TRUE && of_1_2.shader_buffer_int64_atomics == vk::TRUE
+impl From<&Device> for Device {
+    fn from(device: &Device) -> Self {
+        device.clone()
+    }
+}
+
+/// Whoever has a context has promised what [`Device::context`] demands.
+#[doc(hidden)]
+impl From<Arc<Context>> for Device {
+    fn from(context: Arc<Context>) -> Self {
+        Self(context)
+    }
+}
+
+#[doc(hidden)]
+impl From<&Arc<Context>> for Device {
+    fn from(context: &Arc<Context>) -> Self {
+        Self(Arc::clone(context))
+    }
 }

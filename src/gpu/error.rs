@@ -82,6 +82,9 @@ pub enum GpuError {
         /// The greatest size that the device allows, bytes.
         limit: u64,
     },
+    /// Another thread has panicked while it held a lock, so the device's objects may be incomplete.
+    #[error("another thread has panicked while it held the lock of the {0}")]
+    Panicked(String),
     /// A scene and its acceleration structure do not match. The text describes the
     /// [`Mismatch`](crate::world::Mismatch).
     #[error("{0}")]

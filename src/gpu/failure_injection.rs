@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use ash::vk;
 
-use super::{Context, GpuError};
+use super::{Context, GpuError, raw_device::RawDevice};
 
 /// A countdown of the creations that succeed before one fails.
 pub(super) struct FailureInjection {
@@ -27,14 +27,16 @@ impl Context {
     /// descriptor pools, descriptor sets, query pools and command buffers.
     #[doc(hidden)]
     pub fn fail_creations_after(&self, n_creations: Option<u32>) {
-        self.failure_injection.n_left.store(n_creations.unwrap_or(FailureInjection::NEVER), Ordering::Relaxed);
+        self.device.failure_injection.n_left.store(n_creations.unwrap_or(FailureInjection::NEVER), Ordering::Relaxed);
     }
+}
 
+impl RawDevice {
     /// Counts a creation that `call` is about to make, and fails if the creation is to fail.
     ///
     /// # Errors
     /// The creation is one of those that [`Context::fail_creations_after`] lets fail.
-    pub(super) fn count_creation(&self, call: &'static str, object: &str) -> Result<(), GpuError> {
+    pub fn count_creation(&self, call: &'static str, object: &str) -> Result<(), GpuError> {
         let count_down = |n_left| match n_left {
             FailureInjection::NEVER => Some(n_left),
             _ => u32::checked_sub(n_left, 1),

@@ -5,7 +5,7 @@ use std::{mem::ManuallyDrop, sync::Arc};
 use ash::vk;
 use gpu_allocator::{MemoryLocation, vulkan::Allocation};
 
-use super::{Context, GpuError};
+use super::{Context, GpuError, memory::Object, raw_device::RawDevice};
 
 /// Kind of a target's pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,7 +48,7 @@ pub struct Target {
     pub(super) width: u32,
     pub(super) height: u32,
     allocation: ManuallyDrop<Allocation>,
-    context: Arc<Context>,
+    device: Arc<RawDevice>,
 }
 
 impl Target {
@@ -63,8 +63,8 @@ impl Target {
             let value = u64::from(width.max(height));
             return Err(GpuError::Limit { what: "picture size in pixels", value, limit: u64::from(limit) });
         }
-        context.count_creation("vkCreateImage", name)?;
         let device = &context.device;
+        device.count_creation("vkCreateImage", name)?;
         let info = vk::ImageCreateInfo::default()
             .image_type(vk::ImageType::TYPE_2D)
             .format(kind.format())
@@ -76,23 +76,23 @@ impl Target {
             .usage(kind.usage());
         // SAFETY: the raw image is destroyed on every path that does not hand it to an owner.
         unsafe {
-            let raw = device.create_image(&info, None).map_err(GpuError::call("vkCreateImage", name))?;
-            let requirements = device.get_image_memory_requirements(raw);
-            let allocation = match context.allocate(name, requirements, MemoryLocation::GpuOnly, false) {
+            let raw = device.raw.create_image(&info, None).map_err(GpuError::call("vkCreateImage", name))?;
+            let requirements = device.raw.get_image_memory_requirements(raw);
+            let allocation = match device.allocate(name, requirements, MemoryLocation::GpuOnly, Object::Image) {
                 Ok(allocation) => ManuallyDrop::new(allocation),
                 Err(error) => {
-                    device.destroy_image(raw, None);
+                    device.raw.destroy_image(raw, None);
                     return Err(error);
                 }
             };
             let view = vk::ImageView::null();
-            let mut target = Self { raw, view, kind, width, height, allocation, context: context.clone() };
-            device
+            let mut target = Self { raw, view, kind, width, height, allocation, device: Arc::clone(device) };
+            (device.raw)
                 .bind_image_memory(raw, target.allocation.memory(), target.allocation.offset())
                 .map_err(GpuError::call("vkBindImageMemory", name))?;
             target.view = target.create_view(name)?;
-            context.set_name(raw, name);
-            context.set_name(target.view, name);
+            device.set_name(raw, name);
+            device.set_name(target.view, name);
             Ok(target)
         }
     }
@@ -102,8 +102,8 @@ impl Target {
     ///
     /// # Errors
     /// Memory is exhausted.
-    pub fn unread(context: &Arc<Context>, name: &str) -> Result<Self, GpuError> {
-        let target = Self::new(context, name, TargetKind::Uint, (1, 1))?;
+    pub fn unread(context: &Arc<Context>, name: &str) -> Result<Arc<Self>, GpuError> {
+        let target = Arc::new(Self::new(context, name, TargetKind::Uint, (1, 1))?);
         context.run(name, |commands| commands.discard_for_compute(&target))?;
         Ok(target)
     }
@@ -114,14 +114,14 @@ impl Target {
     }
 
     fn create_view(&self, name: &str) -> Result<vk::ImageView, GpuError> {
-        self.context.count_creation("vkCreateImageView", name)?;
+        self.device.count_creation("vkCreateImageView", name)?;
         let info = vk::ImageViewCreateInfo::default()
             .image(self.raw)
             .view_type(vk::ImageViewType::TYPE_2D)
             .format(self.kind.format())
             .subresource_range(self.range());
         // SAFETY: the image is bound to memory.
-        unsafe { self.context.device.create_image_view(&info, None) }.map_err(GpuError::call("vkCreateImageView", name))
+        unsafe { self.device.raw.create_image_view(&info, None) }.map_err(GpuError::call("vkCreateImageView", name))
     }
 
     pub(super) fn range(&self) -> vk::ImageSubresourceRange {
@@ -131,11 +131,12 @@ impl Target {
 
 impl Drop for Target {
     fn drop(&mut self) {
-        // SAFETY: the device has ended all work on the image, and Vulkan ignores a null view.
+        // SAFETY: the device has ended all work on the image, since commands that use it keep it. Vulkan ignores a null
+        // view.
         unsafe {
-            self.context.device.destroy_image_view(self.view, None);
-            self.context.device.destroy_image(self.raw, None);
-            self.context.free(ManuallyDrop::take(&mut self.allocation));
+            self.device.raw.destroy_image_view(self.view, None);
+            self.device.raw.destroy_image(self.raw, None);
+            self.device.free(ManuallyDrop::take(&mut self.allocation));
         }
     }
 }

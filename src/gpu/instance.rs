@@ -2,12 +2,15 @@
 
 use std::{
     ffi::{CStr, c_void},
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Arc, Mutex},
 };
 
 use ash::{ext, vk};
 
-use super::GpuError;
+use super::{
+    GpuError,
+    lock::{Rank, lock_anyway},
+};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
@@ -22,7 +25,7 @@ pub(super) struct Instance {
     // The messages are boxed, so that the messenger's pointer to them stays valid when the instance moves.
     messages: Box<Messages>,
     /// Whether the caller of the library owns the instance and destroys it.
-    is_given: bool,
+    is_external: bool,
 }
 
 impl Instance {
@@ -47,7 +50,7 @@ impl Instance {
         }
         let messages = Box::<Messages>::default();
         let raw = create(&entry, validate, has_debug_utils, window)?;
-        let mut instance = Self { entry, raw, has_debug_utils, messenger: None, messages, is_given: false };
+        let mut instance = Self { entry, raw, has_debug_utils, messenger: None, messages, is_external: false };
         if validate && has_debug_utils {
             instance.listen()?;
         }
@@ -55,9 +58,9 @@ impl Instance {
     }
 
     /// Wraps an instance that the library's caller owns.
-    pub fn given(entry: ash::Entry, raw: ash::Instance) -> Arc<Self> {
+    pub fn external(entry: ash::Entry, raw: ash::Instance) -> Arc<Self> {
         let messages = Box::default();
-        Arc::new(Self { entry, raw, has_debug_utils: false, messenger: None, messages, is_given: true })
+        Arc::new(Self { entry, raw, has_debug_utils: false, messenger: None, messages, is_external: true })
     }
 
     /// Whether the validation layer reports to this instance.
@@ -66,7 +69,7 @@ impl Instance {
     }
 
     pub fn messages(&self) -> Vec<String> {
-        self.messages.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        lock_anyway(Rank::Messages, &self.messages).clone()
     }
 
     /// Creates the messenger, which keeps the validation layer's messages.
@@ -89,7 +92,7 @@ impl Drop for Instance {
             if let Some((debug_utils, messenger)) = self.messenger.take() {
                 debug_utils.destroy_debug_utils_messenger(messenger, None);
             }
-            if !self.is_given {
+            if !self.is_external {
                 self.raw.destroy_instance(None);
             }
         }
@@ -172,7 +175,7 @@ unsafe extern "system" fn keep_message(
     unsafe {
         let messages = &*user_data.cast::<Messages>();
         let text = (*data).message_as_c_str().map_or_else(|| "(no text)".into(), CStr::to_string_lossy);
-        messages.lock().unwrap_or_else(PoisonError::into_inner).push(text.into_owned());
+        lock_anyway(Rank::Messages, messages).push(text.into_owned());
     }
     vk::FALSE
 }

@@ -1,14 +1,20 @@
 //! Allocation of a device's memory, and a report of its uses.
 
-use std::sync::PoisonError;
-
 use ash::vk;
 use gpu_allocator::{
     AllocationSizes, AllocatorDebugSettings, MemoryLocation,
     vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc},
 };
 
-use super::{Context, GpuError, instance::Instance};
+use super::{
+    Context, GpuError,
+    instance::Instance,
+    lock::{Rank, lock, lock_anyway},
+    raw_device::RawDevice,
+};
+
+/// What released memory holds if a test asks for it: as an index or an address, it is far beyond everything.
+const RELEASED: u8 = 0xa5;
 
 /// Memory that the buffers and images of one name take.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -19,30 +25,58 @@ pub struct MemoryUse {
     pub bytes: u64,
 }
 
-impl Context {
-    /// Allocates memory for the object `name`. `linear` is true for buffers and false for images with optimal tiling.
-    pub(super) fn allocate(
+/// An object that memory is allocated for.
+#[derive(Clone, Copy)]
+pub(super) enum Object {
+    Buffer(vk::Buffer),
+    /// An image with optimal tiling.
+    Image,
+}
+
+impl RawDevice {
+    /// Allocates memory for the object `name`.
+    pub fn allocate(
         &self,
         name: &str,
         requirements: vk::MemoryRequirements,
         location: MemoryLocation,
-        linear: bool,
+        object: Object,
     ) -> Result<Allocation, GpuError> {
-        let desc = AllocationCreateDesc {
-            name,
-            requirements,
-            location,
-            linear,
-            allocation_scheme: AllocationScheme::GpuAllocatorManaged,
+        let shared = AllocationScheme::GpuAllocatorManaged;
+        let (linear, allocation_scheme, location) = match object {
+            Object::Image => (false, shared, location),
+            // The host overwrites the memory when it is released, so it has to see it.
+            Object::Buffer(raw) if self.overrides.marks_released => {
+                let visible = if location == MemoryLocation::GpuOnly { MemoryLocation::CpuToGpu } else { location };
+                (true, AllocationScheme::DedicatedBuffer(raw), visible)
+            }
+            Object::Buffer(_) => (true, shared, location),
         };
-        self.allocator.lock().unwrap_or_else(PoisonError::into_inner).allocate(&desc).map_err(|source| {
-            GpuError::Memory { object: name.to_owned(), bytes: requirements.size, source: source.into() }
+        let desc = AllocationCreateDesc { name, requirements, location, linear, allocation_scheme };
+        lock(Rank::Allocator, &self.allocator)?.allocate(&desc).map_err(|source| GpuError::Memory {
+            object: name.to_owned(),
+            bytes: requirements.size,
+            source: source.into(),
         })
     }
 
+    /// Releases memory. It is lost if a thread has panicked within the allocator.
+    pub fn free(&self, mut allocation: Allocation) {
+        if self.overrides.marks_released
+            && let Some(bytes) = allocation.mapped_slice_mut()
+        {
+            bytes.fill(RELEASED);
+        }
+        if let Ok(mut allocator) = lock(Rank::Allocator, &self.allocator) {
+            allocator.free(allocation).expect("an allocation is freed once, by its owner");
+        }
+    }
+}
+
+impl Context {
     /// Lists the uses of memory, the largest first. Objects of one name share an entry.
     pub fn memory(&self) -> Vec<MemoryUse> {
-        let report = self.allocator.lock().unwrap_or_else(PoisonError::into_inner).generate_report();
+        let report = lock_anyway(Rank::Allocator, &self.device.allocator).generate_report();
         let mut uses: Vec<MemoryUse> = Vec::new();
         for allocation in report.allocations {
             // egui's renderer gives its allocations no names.
@@ -54,11 +88,6 @@ impl Context {
         }
         uses.sort_by(|a, b| b.bytes.cmp(&a.bytes).then_with(|| a.name.cmp(&b.name)));
         uses
-    }
-
-    pub(super) fn free(&self, allocation: Allocation) {
-        let freed = self.allocator.lock().unwrap_or_else(PoisonError::into_inner).free(allocation);
-        freed.expect("an allocation is freed once, by its owner");
     }
 }
 

@@ -15,6 +15,9 @@ pub struct DeviceOverrides {
     pub no_int64_atomics: bool,
     /// Number of turns (iterations) of a kernel's loops after which the driver ends the kernel.
     pub loop_limit: Option<u32>,
+    /// Whether each buffer has memory of its own, which is overwritten before it is released. In a block that buffers
+    /// share, a kernel that reads a released buffer finds what was there, and nobody notices.
+    pub marks_released: bool,
     /// Number of rays whose state can be stored at a time, if kernels have to stop before the loop limit.
     pub n_stall_slots: Option<usize>,
 }

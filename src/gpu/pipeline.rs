@@ -5,11 +5,32 @@ use std::{ffi::CStr, sync::Arc};
 use ash::vk;
 
 use super::{
-    BindingLayout, Constants, Context, GpuError, Shader, TargetKind, robustness::without_checks, shader::ShaderModule,
-    specialization::Specialization, statistics::capture_flags,
+    BindingLayout, Constants, Context, GpuError, Shader, TargetKind, raw_device::RawDevice, robustness::without_checks,
+    shader::ShaderModule, specialization::Specialization, statistics::capture_flags,
 };
 
 pub(super) const ENTRY_POINT: &CStr = c"main";
+
+/// Vulkan's pipeline of any kind.
+pub(super) struct RawPipeline {
+    pub raw: vk::Pipeline,
+    pub device: Arc<RawDevice>,
+}
+
+impl RawPipeline {
+    /// Takes over a pipeline, and names it.
+    pub fn new(context: &Context, raw: vk::Pipeline, name: &str) -> Arc<Self> {
+        context.device.set_name(raw, name);
+        Arc::new(Self { raw, device: Arc::clone(&context.device) })
+    }
+}
+
+impl Drop for RawPipeline {
+    fn drop(&mut self) {
+        // SAFETY: the device has ended all work with the pipeline, since commands that bind it keep it.
+        unsafe { self.device.raw.destroy_pipeline(self.raw, None) };
+    }
+}
 
 /// Description of a compute pipeline: a kernel and its variant.
 pub struct ComputeDesc<'a> {
@@ -26,10 +47,9 @@ pub struct ComputeDesc<'a> {
 
 /// A compute pipeline: a kernel that is ready to run.
 pub struct ComputePipeline {
-    pub(super) raw: vk::Pipeline,
+    pub(super) raw: Arc<RawPipeline>,
     pub(super) bindings: Arc<BindingLayout>,
     pub(super) name: &'static str,
-    pub(super) context: Arc<Context>,
 }
 
 impl ComputePipeline {
@@ -38,8 +58,9 @@ impl ComputePipeline {
     /// # Errors
     /// The driver refuses the module or is out of memory.
     pub fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>, desc: &ComputeDesc) -> Result<Self, GpuError> {
-        context.count_creation("vkCreateComputePipelines", desc.name)?;
-        let module = ShaderModule::new(context, desc.shader)?;
+        let device = &context.device;
+        device.count_creation("vkCreateComputePipelines", desc.name)?;
+        let module = ShaderModule::new(device, desc.shader)?;
         let constants = Specialization::new(desc.constants, bindings);
         let constants = constants.info();
         let flags = if desc.full_subgroups {
@@ -54,25 +75,17 @@ impl ComputePipeline {
             .flags(flags)
             .specialization_info(&constants);
         let mut info = vk::ComputePipelineCreateInfo::default()
-            .flags(capture_flags(context))
+            .flags(capture_flags(device))
             .stage(stage)
             .layout(bindings.pipeline_layout);
         let mut without_checks = without_checks();
-        if context.unchecked {
+        if device.unchecked {
             info = info.push_next(&mut without_checks);
         }
         // SAFETY: all that `info` points to lives until the call returns.
-        let raw = unsafe { context.device.create_compute_pipelines(context.pipeline_cache, &[info], None) }
+        let raw = unsafe { device.raw.create_compute_pipelines(device.pipeline_cache, &[info], None) }
             .map_err(|(_, result)| GpuError::call("vkCreateComputePipelines", desc.name)(result))?[0];
-        context.set_name(raw, desc.name);
-        Ok(Self { raw, bindings: bindings.clone(), name: desc.name, context: context.clone() })
-    }
-}
-
-impl Drop for ComputePipeline {
-    fn drop(&mut self) {
-        // SAFETY: the device has ended all work with the pipeline.
-        unsafe { self.context.device.destroy_pipeline(self.raw, None) };
+        Ok(Self { raw: RawPipeline::new(context, raw, desc.name), bindings: bindings.clone(), name: desc.name })
     }
 }
 
@@ -115,10 +128,9 @@ pub struct RasterDesc {
 
 /// A raster pipeline for triangle lists, two-sided and without vertex buffers.
 pub struct RasterPipeline {
-    pub(super) raw: vk::Pipeline,
-    _bindings: Arc<BindingLayout>,
+    pub(super) raw: Arc<RawPipeline>,
+    pub(super) bindings: Arc<BindingLayout>,
     pub(super) name: &'static str,
-    context: Arc<Context>,
 }
 
 impl RasterPipeline {
@@ -127,9 +139,10 @@ impl RasterPipeline {
     /// # Errors
     /// The driver refuses a module or is out of memory.
     pub fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>, desc: &RasterDesc) -> Result<Self, GpuError> {
-        context.count_creation("vkCreateGraphicsPipelines", desc.name)?;
-        let vertex = ShaderModule::new(context, desc.vertex)?;
-        let fragment = ShaderModule::new(context, desc.fragment)?;
+        let device = &context.device;
+        device.count_creation("vkCreateGraphicsPipelines", desc.name)?;
+        let vertex = ShaderModule::new(device, desc.vertex)?;
+        let fragment = ShaderModule::new(device, desc.fragment)?;
         let constants = Specialization::new(&Constants::new(), bindings);
         let constants = constants.info();
         let stages = [(vk::ShaderStageFlags::VERTEX, vertex.raw), (vk::ShaderStageFlags::FRAGMENT, fragment.raw)].map(
@@ -177,16 +190,8 @@ impl RasterPipeline {
             .layout(bindings.pipeline_layout)
             .push_next(&mut rendering)];
         // SAFETY: all that `info` points to lives until the call returns.
-        let raw = unsafe { context.device.create_graphics_pipelines(context.pipeline_cache, &info, None) }
+        let raw = unsafe { device.raw.create_graphics_pipelines(device.pipeline_cache, &info, None) }
             .map_err(|(_, result)| GpuError::call("vkCreateGraphicsPipelines", desc.name)(result))?[0];
-        context.set_name(raw, desc.name);
-        Ok(Self { raw, _bindings: bindings.clone(), name: desc.name, context: context.clone() })
-    }
-}
-
-impl Drop for RasterPipeline {
-    fn drop(&mut self) {
-        // SAFETY: the device has ended all work with the pipeline.
-        unsafe { self.context.device.destroy_pipeline(self.raw, None) };
+        Ok(Self { raw: RawPipeline::new(context, raw, desc.name), bindings: bindings.clone(), name: desc.name })
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::{
-    Access, CommandBuffer, Commands, Context, GpuError, WindowSurface,
+    Access, CommandBuffer, Commands, Context, GpuError, Submission, WindowSurface,
     swapchain::{Outcome, Swapchain, SwapchainImage, format},
 };
 
@@ -90,19 +90,16 @@ impl Presenter {
             self.renew(size)?;
         }
         let slot = &mut self.slots[self.next_slot];
-        slot.wait()?;
+        slot.prepare()?;
         let Some(swapchain) = &self.swapchain else { return Ok(false) };
-        let image_ix = match swapchain.acquire(slot.acquired)? {
-            Outcome::Good(image_ix) => image_ix,
-            Outcome::Suboptimal(image_ix) => {
-                self.stale = true;
-                image_ix
-            }
-            Outcome::OutOfDate => {
-                self.stale = true;
-                return Ok(false);
-            }
+        // A frame that fails before its image is shown leaves the image to the swapchain, which is then made anew.
+        let was_stale = std::mem::replace(&mut self.stale, true);
+        let (image_ix, is_suboptimal) = match swapchain.acquire(slot.acquired)? {
+            Outcome::Good(image_ix) => (image_ix, false),
+            Outcome::Suboptimal(image_ix) => (image_ix, true),
+            Outcome::OutOfDate => return Ok(false),
         };
+        slot.has_acquired = true;
         let image = &swapchain.images[image_ix];
         let shown = WindowImage { extent: swapchain.extent };
         let mut drawn = Ok(());
@@ -115,9 +112,10 @@ impl Presenter {
         })?;
         // An acquired image has to be shown, or else it is never released. So the frame is submitted even if `body`
         // has failed.
-        slot.submit(&self.context, commands, image)?;
+        slot.submit(commands, image)?;
         self.next_slot = (self.next_slot + 1) % FRAMES_IN_FLIGHT;
-        self.stale |= !matches!(swapchain.present(image_ix)?, Outcome::Good(()));
+        let is_good = matches!(swapchain.present(image_ix)?, Outcome::Good(()));
+        self.stale = was_stale || is_suboptimal || !is_good;
         drawn.map(|()| true)
     }
 
@@ -132,8 +130,8 @@ impl Presenter {
 
 impl Drop for Presenter {
     fn drop(&mut self) {
-        // SAFETY: nothing is submitted meanwhile. An error is ignored, since work that has failed has ended, too.
-        let _ = unsafe { self.context.device.device_wait_idle() };
+        // An error is ignored, since work that has failed has ended, too.
+        let _ = self.context.queue.wait_for_presentation();
     }
 }
 
@@ -141,57 +139,56 @@ impl Drop for Presenter {
 struct Slot {
     /// Signalled when the frame's image can be drawn.
     acquired: vk::Semaphore,
-    /// Signalled when the frame is drawn.
-    done: vk::Fence,
-    commands: Option<CommandBuffer>,
+    /// Whether `acquired` is signalled, or will be, and no submission waits for it yet.
+    has_acquired: bool,
+    /// The frame that is being drawn, if any.
+    drawing: Option<Submission>,
     context: Arc<Context>,
 }
 
 impl Slot {
     fn new(context: &Arc<Context>) -> Result<Self, GpuError> {
-        let mut slot =
-            Self { acquired: vk::Semaphore::null(), done: vk::Fence::null(), commands: None, context: context.clone() };
-        let signalled = vk::FenceCreateInfo::default().flags(vk::FenceCreateFlags::SIGNALED);
-        // SAFETY: the calls only create objects, which `Drop` releases.
-        unsafe {
-            slot.acquired = (context.device.create_semaphore(&Default::default(), None))
-                .map_err(GpuError::call("vkCreateSemaphore", "acquired"))?;
-            slot.done =
-                context.device.create_fence(&signalled, None).map_err(GpuError::call("vkCreateFence", "frame"))?;
+        // SAFETY: the call only creates a semaphore, which `Drop` releases.
+        let acquired = unsafe { context.device.raw.create_semaphore(&Default::default(), None) }
+            .map_err(GpuError::call("vkCreateSemaphore", "acquired"))?;
+        Ok(Self { acquired, has_acquired: false, drawing: None, context: context.clone() })
+    }
+
+    /// Waits until the slot's frame is drawn, and makes sure that `acquired` can be signalled again.
+    fn prepare(&mut self) -> Result<(), GpuError> {
+        if self.has_acquired {
+            // The last frame of the slot has failed after the acquire.
+            self.submit_after_acquire(&[], &[], Vec::new())?;
         }
-        Ok(slot)
+        self.drawing.take().map_or(Ok(()), |drawing| self.context.wait_for(drawing))
     }
 
-    /// Waits until the slot's frame is drawn.
-    fn wait(&mut self) -> Result<(), GpuError> {
-        // SAFETY: the fence is alive.
-        unsafe { self.context.device.wait_for_fences(&[self.done], true, u64::MAX) }
-            .map_err(GpuError::call("vkWaitForFences", "frame"))?;
-        self.commands = None;
-        Ok(())
-    }
-
-    /// Submits the frame's commands. [`Slot::wait`] must have returned since the slot's last frame.
-    fn submit(&mut self, context: &Context, commands: CommandBuffer, image: &SwapchainImage) -> Result<(), GpuError> {
-        let stage = vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT;
-        let wait = [vk::SemaphoreSubmitInfo::default().semaphore(self.acquired).stage_mask(stage)];
+    /// Submits the frame's commands. [`Slot::prepare`] must have returned since the slot's last frame.
+    fn submit(&mut self, commands: CommandBuffer, image: &SwapchainImage) -> Result<(), GpuError> {
         // The drawing ends with the image's transition to the presentation layout, so the signal waits for all
         // graphics stages.
-        let signal = [vk::SemaphoreSubmitInfo::default()
+        let drawn = [vk::SemaphoreSubmitInfo::default()
             .semaphore(image.drawn)
             .stage_mask(vk::PipelineStageFlags2::ALL_GRAPHICS)];
         let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(commands.raw())];
-        let submit = [vk::SubmitInfo2::default()
-            .wait_semaphore_infos(&wait)
-            .command_buffer_infos(&buffers)
-            .signal_semaphore_infos(&signal)];
-        // SAFETY: nothing else uses the fence, and the slot keeps the commands until it is signalled.
-        unsafe {
-            context.device.reset_fences(&[self.done]).map_err(GpuError::call("vkResetFences", "frame"))?;
-            (context.device.queue_submit2(context.queue, &submit, self.done))
-                .map_err(GpuError::call("vkQueueSubmit2", "window"))?;
-        }
-        self.commands = Some(commands);
+        self.submit_after_acquire(&buffers, &drawn, vec![commands])
+    }
+
+    fn submit_after_acquire(
+        &mut self,
+        buffers: &[vk::CommandBufferSubmitInfo],
+        drawn: &[vk::SemaphoreSubmitInfo],
+        commands: Vec<CommandBuffer>,
+    ) -> Result<(), GpuError> {
+        let acquired = [vk::SemaphoreSubmitInfo::default()
+            .semaphore(self.acquired)
+            .stage_mask(vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT)];
+        let batch = [vk::SubmitInfo2::default()
+            .wait_semaphore_infos(&acquired)
+            .command_buffer_infos(buffers)
+            .signal_semaphore_infos(drawn)];
+        self.drawing = Some(self.context.queue.submit(&batch, commands)?);
+        self.has_acquired = false;
         Ok(())
     }
 }
@@ -199,9 +196,6 @@ impl Slot {
 impl Drop for Slot {
     fn drop(&mut self) {
         // SAFETY: the presenter has waited for the device, and Vulkan ignores null handles.
-        unsafe {
-            self.context.device.destroy_semaphore(self.acquired, None);
-            self.context.device.destroy_fence(self.done, None);
-        }
+        unsafe { self.context.device.raw.destroy_semaphore(self.acquired, None) };
     }
 }

@@ -5,27 +5,30 @@ use std::sync::{Arc, Mutex};
 use ash::vk;
 use gpu_allocator::vulkan::Allocator;
 
-use super::{Commands, Context, WindowImage};
+use super::{Commands, Context, GpuError, WindowImage};
 
 impl Context {
     /// Returns the allocator of the device's memory.
     pub(crate) fn allocator(&self) -> Arc<Mutex<Allocator>> {
-        Arc::clone(&self.allocator)
+        Arc::clone(&self.device.allocator)
     }
 
     /// Returns the device, which must not be destroyed.
     pub(crate) fn device(&self) -> &ash::Device {
-        &self.device
+        &self.device.raw
     }
 
-    /// Returns the queue to which all commands are submitted.
-    pub(crate) fn queue(&self) -> vk::Queue {
-        self.queue
-    }
-
-    /// Returns the pool of the device's command buffers.
-    pub(crate) fn command_pool(&self) -> vk::CommandPool {
-        self.command_pool
+    /// Calls `submit` with the queue, which no other thread uses meanwhile, and with a command pool. All that `submit`
+    /// submits must have ended when it returns, and the command buffers that it makes must be freed.
+    ///
+    /// # Errors
+    /// Memory is exhausted.
+    pub(crate) fn with_queue<T>(&self, submit: impl FnOnce(vk::Queue, vk::CommandPool) -> T) -> Result<T, GpuError> {
+        let pool = self.device.take_pool("overlay")?;
+        let result = self.queue.with_raw(|queue| submit(queue, pool.raw));
+        // SAFETY: the caller guarantees it.
+        unsafe { self.device.give_pool(pool) };
+        Ok(result)
     }
 }
 

@@ -6,8 +6,12 @@ use ash::{khr, vk};
 use bytemuck::Pod;
 
 use super::{
-    BindingLayout, Buffer, BufferUse, Commands, Constants, Context, GpuError, Shader, devices::text,
-    instance::Instance, pipeline::ENTRY_POINT, shader::ShaderModule, specialization::Specialization,
+    BindingLayout, Buffer, BufferUse, Commands, Constants, Context, GpuError, Shader,
+    devices::text,
+    instance::Instance,
+    pipeline::{ENTRY_POINT, RawPipeline},
+    shader::ShaderModule,
+    specialization::Specialization,
 };
 
 /// Functions and limits of the ray tracing extensions.
@@ -51,7 +55,7 @@ impl RayTracingCalls {
     }
 
     pub fn of(context: &Context) -> &Self {
-        context.ray_tracing.as_ref().expect("a context with ray tracing")
+        context.device.ray_tracing.as_ref().expect("a context with ray tracing")
     }
 }
 
@@ -71,7 +75,7 @@ pub struct RayTracingDesc {
 
 /// A ray tracing pipeline with one group for each shader, and its shader binding table.
 pub struct RayTracingPipeline {
-    raw: vk::Pipeline,
+    raw: Arc<RawPipeline>,
     table: Buffer<u8>,
     bindings: Arc<BindingLayout>,
     name: &'static str,
@@ -93,8 +97,10 @@ impl RayTracingPipeline {
             (vk::ShaderStageFlags::MISS_KHR, desc.miss),
             (vk::ShaderStageFlags::CLOSEST_HIT_KHR, desc.closest_hit),
         ];
-        let modules =
-            stages.iter().map(|(_, shader)| ShaderModule::new(context, *shader)).collect::<Result<Vec<_>, _>>()?;
+        let modules = stages
+            .iter()
+            .map(|(_, shader)| ShaderModule::new(&context.device, *shader))
+            .collect::<Result<Vec<_>, _>>()?;
         let constants = Specialization::new(&desc.constants, bindings);
         let constants = constants.info();
         let stages: Vec<_> = (stages.iter().zip(&modules))
@@ -110,19 +116,12 @@ impl RayTracingPipeline {
             .groups(&groups)
             .max_pipeline_ray_recursion_depth(1)
             .layout(bindings.pipeline_layout)];
-        let (deferred, cache) = (vk::DeferredOperationKHR::null(), context.pipeline_cache);
+        let (deferred, cache) = (vk::DeferredOperationKHR::null(), context.device.pipeline_cache);
         // SAFETY: all that `info` points to lives until the call returns.
         let raw = unsafe { calls.pipelines.create_ray_tracing_pipelines(deferred, cache, &info, None) }
             .map_err(|(_, result)| GpuError::call("vkCreateRayTracingPipelinesKHR", desc.name)(result))?[0];
-        context.set_name(raw, desc.name);
-        let table = match table(context, calls, raw, groups.len()) {
-            Ok(table) => table,
-            Err(error) => {
-                // SAFETY: nothing uses the pipeline yet.
-                unsafe { context.device.destroy_pipeline(raw, None) };
-                return Err(error);
-            }
-        };
+        let raw = RawPipeline::new(context, raw, desc.name);
+        let table = table(context, calls, raw.raw, groups.len())?;
         Ok(Self { raw, table, bindings: bindings.clone(), name: desc.name, context: context.clone() })
     }
 
@@ -172,26 +171,21 @@ fn table(
     Ok(table)
 }
 
-impl Drop for RayTracingPipeline {
-    fn drop(&mut self) {
-        // SAFETY: the device has ended all work with the pipeline.
-        unsafe { self.context.device.destroy_pipeline(self.raw, None) };
-    }
-}
-
 impl Commands<'_> {
     /// Runs `n_rays` invocations of the ray generation shader with the bound set, as a pass of the pipeline's name.
     pub fn trace_rays(&self, pipeline: &RayTracingPipeline, push: &impl Pod, n_rays: u32) {
-        let calls = RayTracingCalls::of(self.context);
-        let device = &self.context.device;
+        let calls = self.device.ray_tracing.as_ref().expect("a context with ray tracing");
+        let device = &self.device.raw;
+        self.keep(&pipeline.raw);
+        self.keep(pipeline.table.any());
         let none = vk::StridedDeviceAddressRegionKHR::default();
         let [generation, miss, hit] = [0, 1, 2].map(|group_ix| pipeline.region(group_ix));
         self.pass(pipeline.name, None, || {
             // SAFETY: the set is bound, the push constants fit the layout's range, and the table has the three
             // groups.
             unsafe {
-                device.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::RAY_TRACING_KHR, pipeline.raw);
-                let (layout, stages) = (pipeline.bindings.pipeline_layout, self.context.stages());
+                device.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::RAY_TRACING_KHR, pipeline.raw.raw);
+                let (layout, stages) = (pipeline.bindings.pipeline_layout, self.device.stages());
                 device.cmd_push_constants(self.raw, layout, stages, 0, bytemuck::bytes_of(push));
                 calls.pipelines.cmd_trace_rays(self.raw, &generation, &miss, &hit, &none, n_rays, 1, 1);
             }

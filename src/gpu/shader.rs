@@ -4,7 +4,9 @@ use std::io::Cursor;
 
 use ash::vk;
 
-use super::{Context, GpuError};
+#[cfg(feature = "hot-reload")]
+use super::lock::{Rank, lock_anyway};
+use super::{GpuError, raw_device::RawDevice};
 
 /// A shader that is compiled into the program.
 #[derive(Clone, Copy)]
@@ -20,10 +22,10 @@ pub struct Shader {
 pub type Replacements = std::collections::HashMap<String, Vec<u8>>;
 
 #[cfg(feature = "hot-reload")]
-impl Context {
+impl super::Context {
     /// Sets the replacements from which later pipelines are made, and returns the earlier replacements.
     pub fn replace_shaders(&self, replacements: Replacements) -> Replacements {
-        let mut current = self.replacements.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut current = lock_anyway(Rank::Replacements, &self.device.replacements);
         std::mem::replace(&mut current, replacements)
     }
 }
@@ -31,34 +33,34 @@ impl Context {
 /// A shader module, which is needed only while a pipeline is made from it.
 pub(super) struct ShaderModule<'a> {
     pub(super) raw: vk::ShaderModule,
-    context: &'a Context,
+    device: &'a RawDevice,
 }
 
 impl<'a> ShaderModule<'a> {
-    pub(super) fn new(context: &'a Context, shader: Shader) -> Result<Self, GpuError> {
+    pub(super) fn new(device: &'a RawDevice, shader: Shader) -> Result<Self, GpuError> {
         #[cfg(feature = "hot-reload")]
         {
-            let replacements = context.replacements.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+            let replacements = lock_anyway(Rank::Replacements, &device.replacements);
             if let Some(spirv) = replacements.get(shader.file) {
-                return Self::of(context, shader.file, spirv);
+                return Self::of(device, shader.file, spirv);
             }
         }
-        Self::of(context, shader.file, shader.spirv)
+        Self::of(device, shader.file, shader.spirv)
     }
 
-    fn of(context: &'a Context, file: &str, spirv: &[u8]) -> Result<Self, GpuError> {
+    fn of(device: &'a RawDevice, file: &str, spirv: &[u8]) -> Result<Self, GpuError> {
         let code = ash::util::read_spv(&mut Cursor::new(spirv)).expect("build.rs writes whole SPIR-V words");
         let info = vk::ShaderModuleCreateInfo::default().code(&code);
         // SAFETY: the code lives until the call returns.
-        let raw = unsafe { context.device.create_shader_module(&info, None) }
+        let raw = unsafe { device.raw.create_shader_module(&info, None) }
             .map_err(GpuError::call("vkCreateShaderModule", file))?;
-        Ok(Self { raw, context })
+        Ok(Self { raw, device })
     }
 }
 
 impl Drop for ShaderModule<'_> {
     fn drop(&mut self) {
         // SAFETY: a pipeline does not need its modules once it is made.
-        unsafe { self.context.device.destroy_shader_module(self.raw, None) };
+        unsafe { self.device.raw.destroy_shader_module(self.raw, None) };
     }
 }

@@ -5,7 +5,7 @@ use std::{ffi::CStr, fmt};
 use ash::{khr, vk};
 use serde::Serialize;
 
-use super::{ComputePipeline, Context, GpuError, devices::text, instance::Instance};
+use super::{ComputePipeline, GpuError, devices::text, instance::Instance, raw_device::RawDevice};
 
 /// One statistic, under the driver's own name.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -64,8 +64,8 @@ impl StatisticsCalls {
 }
 
 /// Returns the creation flags with which a pipeline has statistics, if the device reports any.
-pub(super) fn capture_flags(context: &Context) -> vk::PipelineCreateFlags {
-    match context.statistics {
+pub(super) fn capture_flags(device: &RawDevice) -> vk::PipelineCreateFlags {
+    match device.statistics {
         Some(_) => vk::PipelineCreateFlags::CAPTURE_STATISTICS_KHR,
         None => vk::PipelineCreateFlags::empty(),
     }
@@ -78,15 +78,15 @@ impl ComputePipeline {
     /// # Errors
     /// Memory is exhausted.
     pub fn statistics(&self) -> Result<Vec<Statistic>, GpuError> {
-        let Some(StatisticsCalls(calls)) = &self.context.statistics else { return Ok(Vec::new()) };
-        let pipeline = vk::PipelineInfoKHR::default().pipeline(self.raw);
+        let Some(StatisticsCalls(calls)) = &self.raw.device.statistics else { return Ok(Vec::new()) };
+        let pipeline = vk::PipelineInfoKHR::default().pipeline(self.raw.raw);
         // SAFETY: the pipeline belongs to the device, whose feature is enabled.
         let executables = unsafe { calls.get_pipeline_executable_properties(&pipeline) }
             .map_err(GpuError::call("vkGetPipelineExecutablePropertiesKHR", self.name))?;
         let mut statistics = Vec::new();
         for (executable_ix, executable) in (0..).zip(&executables) {
             let name = text(executable.name_as_c_str().unwrap_or_default());
-            let info = vk::PipelineExecutableInfoKHR::default().pipeline(self.raw).executable_index(executable_ix);
+            let info = vk::PipelineExecutableInfoKHR::default().pipeline(self.raw.raw).executable_index(executable_ix);
             // SAFETY: the pipeline belongs to the device, whose feature is enabled, and was made with
             // `capture_flags`.
             let known = unsafe { calls.get_pipeline_executable_statistics(&info) }

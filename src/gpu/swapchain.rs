@@ -47,8 +47,9 @@ impl Swapchain {
         size: (u32, u32),
     ) -> Result<Option<Self>, GpuError> {
         // SAFETY: the surface belongs to the device's instance.
-        let able = unsafe { surface.calls.get_physical_device_surface_capabilities(context.physical, surface.raw) }
-            .map_err(GpuError::call("vkGetPhysicalDeviceSurfaceCapabilitiesKHR", "window"))?;
+        let able =
+            unsafe { surface.calls.get_physical_device_surface_capabilities(context.device.physical, surface.raw) }
+                .map_err(GpuError::call("vkGetPhysicalDeviceSurfaceCapabilitiesKHR", "window"))?;
         let extent = extent(&able, size);
         if extent.width == 0 || extent.height == 0 {
             return Ok(None);
@@ -86,7 +87,7 @@ impl Swapchain {
     }
 
     fn add_image(&mut self, raw: vk::Image, format: vk::Format) -> Result<(), GpuError> {
-        let device = &self.context.device;
+        let device = &self.context.device.raw;
         let range = vk::ImageSubresourceRange {
             aspect_mask: vk::ImageAspectFlags::COLOR,
             level_count: 1,
@@ -107,7 +108,7 @@ impl Swapchain {
             let drawn = device.create_semaphore(&info, None).map_err(GpuError::call("vkCreateSemaphore", "drawn"))?;
             self.images.last_mut().expect("just pushed").drawn = drawn;
         }
-        self.context.set_name(raw, &format!("window {}", self.images.len() - 1));
+        self.context.device.set_name(raw, &format!("window {}", self.images.len() - 1));
         Ok(())
     }
 
@@ -133,7 +134,8 @@ impl Swapchain {
             .swapchains(slice::from_ref(&self.raw))
             .image_indices(slice::from_ref(&image_ix));
         // SAFETY: the image was acquired, and a submit that signals the semaphore is under way.
-        match unsafe { calls(&self.context).queue_present(self.context.queue, &info) } {
+        let present = |queue| unsafe { calls(&self.context).queue_present(queue, &info) };
+        match self.context.queue.present(present) {
             Ok(false) => Ok(Outcome::Good(())),
             Ok(true) => Ok(Outcome::Suboptimal(())),
             Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => Ok(Outcome::OutOfDate),
@@ -144,13 +146,13 @@ impl Swapchain {
 
 impl Drop for Swapchain {
     fn drop(&mut self) {
-        // SAFETY: the first call waits until the device is idle, including its work for the window. Vulkan ignores
-        // null handles.
+        // An error can be ignored: a device that is lost has ended all work.
+        let _ = self.context.queue.wait_for_presentation();
+        // SAFETY: the device is idle, including its work for the window. Vulkan ignores null handles.
         unsafe {
-            let _ = self.context.device.device_wait_idle();
             for image in &self.images {
-                self.context.device.destroy_semaphore(image.drawn, None);
-                self.context.device.destroy_image_view(image.view, None);
+                self.context.device.raw.destroy_semaphore(image.drawn, None);
+                self.context.device.raw.destroy_image_view(image.view, None);
             }
             calls(&self.context).destroy_swapchain(self.raw, None);
         }
@@ -158,14 +160,14 @@ impl Drop for Swapchain {
 }
 
 fn calls(context: &Context) -> &khr::swapchain::Device {
-    context.presentation.as_ref().expect("a context with a surface was opened for a window")
+    context.device.presentation.as_ref().expect("a context with a surface was opened for a window")
 }
 
 /// Chooses a format of 8 bits a channel whose values are stored unchanged, since the tone mapper has already encoded
 /// them for display.
 pub(super) fn format(context: &Context, surface: &WindowSurface) -> Result<vk::SurfaceFormatKHR, GpuError> {
     // SAFETY: the surface belongs to the device's instance.
-    let offered = unsafe { surface.calls.get_physical_device_surface_formats(context.physical, surface.raw) }
+    let offered = unsafe { surface.calls.get_physical_device_surface_formats(context.device.physical, surface.raw) }
         .map_err(GpuError::call("vkGetPhysicalDeviceSurfaceFormatsKHR", "window"))?;
     let fits = |wanted: vk::Format| {
         let encoded = |f: &&vk::SurfaceFormatKHR| f.color_space == vk::ColorSpaceKHR::SRGB_NONLINEAR;
@@ -179,8 +181,9 @@ pub(super) fn format(context: &Context, surface: &WindowSurface) -> Result<vk::S
 /// Chooses how images are shown: at the screen's refresh with `vsync`, else as soon as possible.
 fn present_mode(context: &Context, surface: &WindowSurface, vsync: bool) -> Result<vk::PresentModeKHR, GpuError> {
     // SAFETY: the surface belongs to the device's instance.
-    let offered = unsafe { surface.calls.get_physical_device_surface_present_modes(context.physical, surface.raw) }
-        .map_err(GpuError::call("vkGetPhysicalDeviceSurfacePresentModesKHR", "window"))?;
+    let offered =
+        unsafe { surface.calls.get_physical_device_surface_present_modes(context.device.physical, surface.raw) }
+            .map_err(GpuError::call("vkGetPhysicalDeviceSurfacePresentModesKHR", "window"))?;
     let unpaced = [vk::PresentModeKHR::IMMEDIATE, vk::PresentModeKHR::MAILBOX];
     let found = unpaced.into_iter().find(|mode| !vsync && offered.contains(mode));
     // Every device supports FIFO.

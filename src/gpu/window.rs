@@ -25,13 +25,13 @@ impl Commands<'_> {
         let rendering = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&color);
         self.image_barrier(barrier);
         // SAFETY: the commands are being recorded, and the image is in the named layout.
-        unsafe { self.context.device.cmd_begin_rendering(self.raw, &rendering) };
+        unsafe { self.device.raw.cmd_begin_rendering(self.raw, &rendering) };
     }
 
     /// Ends rendering and hands the image to the screen.
     pub(super) fn end_window(&self, image: &SwapchainImage) {
         // SAFETY: `begin_window` has begun the rendering.
-        unsafe { self.context.device.cmd_end_rendering(self.raw) };
+        unsafe { self.device.raw.cmd_end_rendering(self.raw) };
         let barrier = image_barrier(image)
             .src_stage_mask(vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT)
             .src_access_mask(vk::AccessFlags2::COLOR_ATTACHMENT_WRITE)
@@ -43,7 +43,9 @@ impl Commands<'_> {
 
     /// Draws one triangle that covers the window, as a pass of the pipeline's name.
     pub fn cover(&self, pipeline: &RasterPipeline, set: &BindingSet, push: &impl Pod, image: &WindowImage) {
-        let device = &self.context.device;
+        let device = &self.device.raw;
+        self.keep(&pipeline.raw);
+        self.keep(&set.raw);
         let (width, height) = image.size();
         let viewport =
             vk::Viewport { width: width as f32, height: height as f32, max_depth: 1.0, ..Default::default() };
@@ -53,9 +55,9 @@ impl Commands<'_> {
             unsafe {
                 let layout = set.bindings.pipeline_layout;
                 let point = vk::PipelineBindPoint::GRAPHICS;
-                device.cmd_bind_pipeline(self.raw, point, pipeline.raw);
-                device.cmd_bind_descriptor_sets(self.raw, point, layout, 0, &[set.raw], &[]);
-                device.cmd_push_constants(self.raw, layout, self.context.stages(), 0, bytemuck::bytes_of(push));
+                device.cmd_bind_pipeline(self.raw, point, pipeline.raw.raw);
+                device.cmd_bind_descriptor_sets(self.raw, point, layout, 0, &[set.raw.raw], &[]);
+                self.push(&pipeline.bindings, push);
                 device.cmd_set_viewport(self.raw, 0, &[viewport]);
                 device.cmd_set_scissor(self.raw, 0, &[area]);
                 device.cmd_draw(self.raw, 3, 1, 0, 0);
@@ -67,7 +69,7 @@ impl Commands<'_> {
         let barriers = [barrier];
         let info = vk::DependencyInfo::default().image_memory_barriers(&barriers);
         // SAFETY: the commands are being recorded, and no rendering is open.
-        unsafe { self.context.device.cmd_pipeline_barrier2(self.raw, &info) };
+        unsafe { self.device.raw.cmd_pipeline_barrier2(self.raw, &info) };
     }
 }
 

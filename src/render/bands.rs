@@ -12,7 +12,7 @@ use super::{JoinedPicture, Renderer};
 use crate::{
     buffers::Pixels,
     frame::{Crop, Drawn, Goal, Integrator, Pacer, PathOptions, Picture, Profile, RenderOptions, Watcher},
-    gpu::{Context, DeviceInfo, GivenImage, GpuError, Limits, TimelinePoint},
+    gpu::{Context, DeviceInfo, ExternalImage, GpuError, Limits, TimelinePoint},
     scene::Camera,
     world::World,
 };
@@ -175,7 +175,7 @@ impl BandedRenderer {
     /// [`Renderer::copy_picture_to`] does.
     pub fn copy_picture_to(
         &self,
-        image: &GivenImage,
+        image: &ExternalImage,
         after: Option<TimelinePoint>,
         then: Option<TimelinePoint>,
     ) -> Result<(), GpuError> {

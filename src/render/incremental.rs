@@ -3,7 +3,7 @@
 //! A part is a command buffer of the frame. A batch has several parts: one or two for each bounce, and for the light.
 //! A sample is pending while some of its parts have run and others have not.
 
-use std::time::Instant;
+use std::{collections::VecDeque, mem, time::Instant};
 
 use glam::UVec2;
 use tracing::info_span;
@@ -57,7 +57,8 @@ pub(super) enum Until {
 
 /// A sample of which some parts have run and others have not. The device has finished the parts that were submitted.
 pub(super) struct PartialSample {
-    parts: Vec<Part>,
+    /// The parts that have not run.
+    parts: VecDeque<Part>,
     /// Number of parts that have run.
     n_done: usize,
     sample_ix: u32,
@@ -66,17 +67,18 @@ pub(super) struct PartialSample {
 }
 
 impl PartialSample {
-    /// Returns the number of parts that will have run once the sample is drawn up to `until`.
-    fn end(&self, until: Until) -> usize {
-        if until == Until::Part {
-            return self.n_done + 1;
-        }
+    /// Takes the parts that are to run until the sample is drawn up to `until`.
+    fn take(&mut self, until: Until) -> Vec<Part> {
         let ends_batch = |part: &Part| part.ends_batch;
-        let batch_end = self.parts[self.n_done..].iter().position(ends_batch).map(|place| self.n_done + place + 1);
-        match batch_end {
-            Some(end) if until == Until::Batch && self.parts[end..].iter().any(ends_batch) => end,
-            _ => self.parts.len(),
-        }
+        let n_taken = match until {
+            Until::Part => 1,
+            Until::Batch if self.parts.iter().filter(|part| part.ends_batch).count() > 1 => {
+                self.parts.iter().position(ends_batch).map_or(0, |place| place + 1)
+            }
+            Until::Batch | Until::End => self.parts.len(),
+        };
+        self.n_done += n_taken;
+        self.parts.drain(..n_taken).collect()
     }
 }
 
@@ -122,7 +124,8 @@ impl Renderer {
 
     /// Share of the pending sample's parts that have run, 0 to 1; 0 if no sample is pending.
     pub fn progress(&self) -> f32 {
-        self.pending.as_ref().map_or(0.0, |pending| pending.n_done as f32 / pending.parts.len() as f32)
+        let share = |pending: &PartialSample| pending.n_done as f32 / (pending.n_done + pending.parts.len()) as f32;
+        self.pending.as_ref().map_or(0.0, share)
     }
 
     /// Limits batches to `most_pixels` pixels or, with None, only to what the queue holds. The picture does not
@@ -170,11 +173,9 @@ impl Renderer {
     fn try_to_go_on(&mut self, mut pending: PartialSample, until: Until) -> Result<Option<Profile>, GpuError> {
         let running = info_span!("submit and wait").entered();
         let begun_at = *pending.begun_at.get_or_insert_with(Instant::now);
-        let end = pending.end(until);
-        self.run_parts(&pending.parts[pending.n_done..end])?;
+        self.run_parts(pending.take(until))?;
         drop(running);
-        pending.n_done = end;
-        if end < pending.parts.len() {
+        if !pending.parts.is_empty() {
             self.pending = Some(pending);
             return Ok(None);
         }
@@ -184,7 +185,6 @@ impl Renderer {
             // The sample is drawn again without a return to the caller, since `pixel_display` now holds a picture
             // that lacks the rays for which there was no room.
             let spans = self.schedule.split(&bounces, self.resources.constants())?;
-            pending.parts.clear();
             self.reschedule(spans)?;
             let pending = self.recorded(pending.sample_ix)?;
             return self.try_to_go_on(pending, Until::End);
@@ -196,15 +196,16 @@ impl Renderer {
 
     /// Runs parts and waits for their end. They are submitted together, except that a part whose rays can stall ends
     /// a submission, since its rays must end before the next part begins.
-    fn run_parts(&self, parts: &[Part]) -> Result<(), GpuError> {
-        for together in parts.split_inclusive(|part| part.traced.is_some()) {
-            self.context.submit(&together.iter().map(|part| &part.commands).collect::<Vec<_>>())?;
-            self.context.wait()?;
-            if let Some(traced) = together.last().and_then(|part| part.traced.as_ref()) {
-                self.finish_rays(traced)?;
+    fn run_parts(&self, parts: Vec<Part>) -> Result<(), GpuError> {
+        let mut together = Vec::new();
+        for Part { commands, traced, .. } in parts {
+            together.push(commands);
+            if let Some(traced) = traced {
+                self.context.wait_for(self.context.submit(mem::take(&mut together))?)?;
+                self.finish_rays(&traced)?;
             }
         }
-        Ok(())
+        if together.is_empty() { Ok(()) } else { self.context.wait_for(self.context.submit(together)?) }
     }
 
     fn begin_sample(&mut self) -> Result<PartialSample, GpuError> {
@@ -275,7 +276,7 @@ impl Renderer {
 
     fn recorded(&self, sample_ix: u32) -> Result<PartialSample, GpuError> {
         let parts = info_span!("record").in_scope(|| self.record())?;
-        Ok(PartialSample { parts, n_done: 0, sample_ix, begun_at: None })
+        Ok(PartialSample { parts: parts.into(), n_done: 0, sample_ix, begun_at: None })
     }
 
     /// Sets the view that the next sample and [`Renderer::show`] display: the picture, or a feature in its place. A

@@ -15,7 +15,7 @@
 //! ray has spent its turns; it goes on in a further dispatch.
 
 mod bands;
-mod given;
+mod external;
 mod incremental;
 mod joined;
 mod noise_tiles;
@@ -459,6 +459,6 @@ fn lanes_to_share(context: &Arc<Context>, options: &RenderOptions) -> Result<u32
     if options.features { Ok(0) } else { context.n_lanes() }
 }
 
-fn copy_all(commands: &Commands, source: &AnyBuffer, destination: &AnyBuffer) {
+fn copy_all(commands: &Commands, source: &Arc<AnyBuffer>, destination: &Arc<AnyBuffer>) {
     commands.copy_buffer(source, destination, source.bytes());
 }

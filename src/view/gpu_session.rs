@@ -105,7 +105,7 @@ impl GpuSession {
     /// Replaces the renderer that draws, and with it the other one.
     fn install(&mut self, renderer: Renderer) -> Result<(), GpuError> {
         let present = Present::new(&self.context, renderer.resources(), &self.presenter)?;
-        self.context.wait()?;
+        self.context.wait_for_all()?;
         (self.renderer, self.present) = (renderer, present);
         (self.other, self.shows_other) = (None, false);
         Ok(())
@@ -142,7 +142,7 @@ impl GpuSession {
     /// The driver refuses a shader.
     #[cfg(feature = "hot-reload")]
     pub fn replace_shaders(&mut self, shaders: crate::gpu::Replacements) -> Result<(), GpuError> {
-        self.context.wait()?;
+        self.context.wait_for_all()?;
         let before = self.context.replace_shaders(shaders);
         let remade = Present::new(&self.context, self.renderer.resources(), &self.presenter)
             .and_then(|present| self.renderer.remake_passes().map(|()| self.present = present));
@@ -200,6 +200,6 @@ impl Drop for GpuSession {
     fn drop(&mut self) {
         // Frames in flight still read the objects that are dropped. An error means that the device is lost; then
         // there is nothing to wait for.
-        let _ = self.context.wait();
+        let _ = self.context.wait_for_all();
     }
 }

@@ -51,15 +51,16 @@ impl Overlay {
             return Ok(());
         }
         // Frames in flight may still read the textures that are replaced here.
-        self.context.wait()?;
+        self.context.wait_for_all()?;
         let renderer = self.renderer.as_mut().expect("a renderer");
         for id in self.released.drain(..) {
             renderer.free_texture(id).map_err(error)?;
         }
         for (id, changes) in textures.set.drain() {
             for change in changes {
-                let (queue, pool) = (self.context.queue(), self.context.command_pool());
-                renderer.set_texture(queue, pool, id, &change).map_err(error)?;
+                self.context
+                    .with_queue(|queue, pool| renderer.set_texture(queue, pool, id, &change))?
+                    .map_err(error)?;
             }
         }
         self.released.extend(textures.free.drain());
@@ -79,7 +80,7 @@ impl Overlay {
 
 impl Drop for Overlay {
     fn drop(&mut self) {
-        let _ = self.context.wait();
+        let _ = self.context.wait_for_all();
         drop(self.renderer.take());
     }
 }

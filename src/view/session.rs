@@ -206,7 +206,7 @@ impl Session {
             self.pace.moved(now);
         }
         // Frames in flight read the objects that change here.
-        gpu.context.wait()?;
+        gpu.context.wait_for_all()?;
         gpu.presenter.set_vsync(self.settings.vsync);
         self.budgets.iter_mut().for_each(|budget| budget.set_budget(self.settings.budget_ms));
         self.fit_window(gpu, window)?;

@@ -10,7 +10,7 @@ use kdray::{
         kdtree::{BuildOptions, KdTree, Traversal},
     },
     cast::{Caster, CpuCaster},
-    gpu::{Context, ContextOptions},
+    gpu::Context,
     layout::{Hit, NO_TRIANGLE, Ray, Triangle},
     scene::{MIN_EXTENT, SceneError},
     world::{FlatScene, Geometry},
@@ -19,7 +19,7 @@ use kdray::{
 use super::{
     load,
     support::{
-        compare,
+        compare, devices,
         meshes::{placed, torus},
         random::Random,
     },
@@ -105,7 +105,7 @@ fn just_above_the_limit_every_ray_hits_what_it_hits_at_unit_size() {
         let found = cast_on_cpu(&small.triangles, traversal, &small_rays);
         assert_eq!(n_differing(&expected, &found), 0, "{traversal}");
     }
-    let context = Context::new(&ContextOptions::new(None, true)).expect("a device with validation");
+    let context = devices::device();
     let expected = cast_on_device(&context, &unit, &rays);
     let found = cast_on_device(&context, &small.triangles, &small_rays);
     // Where rays meet a common edge, rounding decides which of two triangles is hit at the same distance.

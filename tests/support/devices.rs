@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use kdray::gpu::{Context, ContextOptions, DeviceOverrides};
+use kdray::gpu::{Context, ContextOptions, Device, DeviceOverrides};
 
 /// The devices that `pretended` has opened in this process. One that nobody else holds is free.
 static OPENED: Mutex<Vec<(DeviceOverrides, Arc<Context>)>> = Mutex::new(Vec::new());
@@ -30,7 +30,9 @@ pub fn pretended(overrides: DeviceOverrides) -> Arc<Context> {
 
 fn open(overrides: DeviceOverrides) -> Arc<Context> {
     let options = ContextOptions { overrides, ..ContextOptions::new(None, true) };
-    Context::new(&options).expect("a device with validation")
+    let device = Device::open(&options).expect("a device with validation");
+    // SAFETY: the tests keep to what the hidden modules state.
+    Arc::clone(unsafe { device.context() })
 }
 
 /// Returns a device under validation that runs kernels as a GPU of `n_lanes` lanes does.

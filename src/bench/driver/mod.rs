@@ -33,7 +33,7 @@ use crate::{
     accel::{AccelKind, Query, kdtree::Traversal},
     buffers::{AccelBuffers, CastResources},
     cast::{Contender, Kernel, Ray, cast_ray},
-    gpu::{BindingLayout, Context, DriverAccel, GpuError},
+    gpu::{BindingLayout, Context, Device, DriverAccel, GpuError},
 };
 
 /// The searches of kdray that are measured. Three of them traverse the kd-tree: the first is the default one, the
@@ -98,7 +98,8 @@ impl DeviceStage {
     ///
     /// # Panics
     /// The context is without ray tracing.
-    pub fn new(context: &Arc<Context>, stage: &Stage) -> Result<Self, GpuError> {
+    pub fn new(device: &Device, stage: &Stage) -> Result<Self, GpuError> {
+        let context = device.inner();
         let (builds, driver_accel) = Builds::measure(context, stage)?;
         let structures = [VARIANTS[0], Variant::Grid, Variant::Grid2];
         let structures = structures.map(|variant| Structure::new(context, stage, variant));

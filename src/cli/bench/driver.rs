@@ -13,7 +13,7 @@ use kdray::{
         stage::Stage,
     },
     engine::choices::{Processor, TreeKind},
-    gpu::{Context, ContextOptions, GpuError},
+    gpu::{ContextOptions, Device, GpuError},
     world::FlatScene,
 };
 
@@ -29,18 +29,18 @@ use crate::cli::{
 /// trace each set of rays.
 pub fn run(args: &DriverArgs) -> Result<(), CliError> {
     args.files.check(&[&args.mesh], &args.load.options())?;
-    let context = Context::with_ray_tracing(&ContextOptions::new(args.device.clone(), false))?;
+    let device = Device::with_ray_tracing(&ContextOptions::new(args.device.clone(), false))?;
     let progress = Progress::new(false, 8);
     let (scene, _) = progress.stage(&format!("loading {}", args.mesh.display()), || args.load.load(&args.mesh));
     let scene = FlatScene::new(&scene?).map_err(GpuError::from)?;
-    let build_options = TreeKind::Best.options(Processor::of(Some(&context)));
+    let build_options = TreeKind::Best.options(Processor::of_device(device.info()));
     let building = format!("building the kd-tree of {} triangles", scene.triangles.len());
     let (stage, _) = progress.stage(&building, || stage(args, scene, &build_options));
-    let (arena, _) = progress.stage("letting the driver build its tree", || DeviceStage::new(&context, &stage));
+    let (arena, _) = progress.stage("letting the driver build its tree", || DeviceStage::new(&device, &stage));
     let mut arena = arena?;
     let (sets, _) = progress.stage("making rays", || ray_sets(&stage));
 
-    let mut report = empty_report(args, &stage, &context, arena.builds().clone());
+    let mut report = empty_report(args, &stage, &device, arena.builds().clone());
     for set in &sets {
         let casting = format!("casting {} {} rays", set.rays.len(), set.kind.name());
         let (result, _) = progress.stage(&casting, || arena.measure(set, args.repeat));
@@ -60,12 +60,12 @@ fn stage(args: &DriverArgs, scene: FlatScene, build_options: &BuildOptions) -> S
     make(scene, size, build_options)
 }
 
-fn empty_report(args: &DriverArgs, stage: &Stage, context: &Context, builds: Builds) -> Report {
+fn empty_report(args: &DriverArgs, stage: &Stage, device: &Device, builds: Builds) -> Report {
     let n_triangles = stage.scene().triangles.len();
     Report {
         suite: "driver",
-        device: context.info().name.clone(),
-        driver: context.info().driver.clone(),
+        device: device.info().name.clone(),
+        driver: device.info().driver.clone(),
         scene: stage.scene().name.clone(),
         room: !args.no_room,
         width: args.size.width,

@@ -7,6 +7,7 @@ mod size;
 mod traversal;
 
 pub use args::Suite;
+use kdray::{engine::choices::Processor, gpu::Device};
 
 use super::error::CliError;
 
@@ -17,4 +18,9 @@ pub fn run(suite: &Suite) -> Result<(), CliError> {
         Suite::Driver(args) => driver::run(args),
         Suite::Size(args) => size::run(args),
     }
+}
+
+/// Returns the processor that an open device is, or without a device the CPU.
+fn processor(device: Option<&Device>) -> Processor {
+    device.map_or(Processor::Cpu, |device| Processor::of_device(device.info()))
 }

@@ -1,6 +1,6 @@
 //! `kdray bench paper`: the table of the paper, measured on this machine.
 
-use std::{path::Path, sync::Arc};
+use std::path::Path;
 
 use kdray::{
     bench::{
@@ -9,7 +9,7 @@ use kdray::{
     },
     engine::choices::{Processor, TreeKind, traversal_by_rule},
     frame::RenderOptions,
-    gpu::{Context, ContextOptions, GpuError},
+    gpu::{ContextOptions, Device, GpuError},
     scene::{LoadOptions, Scene},
     world::World,
 };
@@ -32,26 +32,26 @@ pub fn run(args: &PaperArgs) -> Result<(), CliError> {
         asked => asked.iter().map(|size| (size.width, size.height)).collect(),
     };
     let progress = Progress::new(false, (SCENES.len() * (1 + sizes.len())) as u64);
-    let context = open_device(&ContextOptions::new(args.device.clone(), false), &progress)?;
-    let traversal = args.traversal.unwrap_or_else(|| traversal_by_rule(Processor::of(Some(&context))));
+    let device = open_device(&ContextOptions::new(args.device.clone(), false), &progress)?;
+    let traversal = args.traversal.unwrap_or_else(|| traversal_by_rule(Processor::of_device(device.info())));
     let mut report = Report {
         suite: "paper",
-        device: context.info().name.clone(),
-        driver: context.info().driver.clone(),
+        device: device.info().name.clone(),
+        driver: device.info().driver.clone(),
         traversal: traversal.to_string(),
         n_gpu_frames: args.repeat,
         n_cpu_frames: if args.no_cpu { 0 } else { args.cpu_repeat },
         rows: Vec::new(),
     };
     // CPU and device use the same tree. If the CPU draws, the tree has slabs, even if the device does not read them.
-    let processor = if args.no_cpu { Processor::of(Some(&context)) } else { Processor::Cpu };
+    let processor = if args.no_cpu { Processor::of_device(device.info()) } else { Processor::Cpu };
     for (name, path) in SCENES.into_iter().zip(&scenes) {
         let (loaded, _) = progress.stage(&format!("loading {}", path.display()), || load(path, processor));
         let world = loaded?;
         for &size in &sizes {
             let drawing = format!("drawing {name}, {}x{}", size.0, size.1);
             let (row, _) = progress
-                .stage(&drawing, || measure(&context, &world, &options(world.scene(), size, traversal), &report));
+                .stage(&drawing, || measure(&device, &world, &options(world.scene(), size, traversal), &report));
             report.rows.push(row?);
         }
     }
@@ -65,8 +65,8 @@ fn load(path: &Path, processor: Processor) -> Result<World, CliError> {
     Ok(World::new(&scene, &TreeKind::Best.options(processor)).map_err(GpuError::from)?)
 }
 
-fn measure(context: &Arc<Context>, world: &World, options: &RenderOptions, report: &Report) -> Result<Row, CliError> {
-    let on_gpu = draw_on_gpu(context, world, options, report.n_gpu_frames)?;
+fn measure(device: &Device, world: &World, options: &RenderOptions, report: &Report) -> Result<Row, CliError> {
+    let on_gpu = draw_on_gpu(device, world, options, report.n_gpu_frames)?;
     let on_cpu = draw_on_cpu(world, options, report.n_cpu_frames)
         .map_err(|error| CliError::Usage(format!("cannot start a thread: {error}")))?;
     Ok(Row::new(world.scene(), options, &on_gpu, &on_cpu))

@@ -1,7 +1,5 @@
 //! `kdray bench size`: build time and time per ray against the number of triangles.
 
-use std::sync::Arc;
-
 use kdray::{
     accel::AccelKind,
     bench::{
@@ -10,11 +8,12 @@ use kdray::{
         variant::Variant,
     },
     engine::choices::{Processor, TreeKind, traversal_by_rule},
-    gpu::{Context, ContextOptions, GpuError},
+    gpu::{ContextOptions, Device, GpuError},
     scene::LoadOptions,
 };
 
 use super::args::SizeArgs;
+use super::processor;
 use crate::cli::{
     device_args::open_device,
     error::CliError,
@@ -32,10 +31,10 @@ pub fn run(args: &SizeArgs) -> Result<(), CliError> {
     sizes.sort_unstable();
     sizes.dedup();
     let progress = Progress::new(false, 3 * sizes.len() as u64);
-    let device = ContextOptions::new(args.device.clone(), false);
-    let context = if args.cpu { None } else { Some(open_device(&device, &progress)?) };
-    let info = context.as_ref().map(|context| context.info());
-    let variant = variant(args, Processor::of(context.as_deref()));
+    let options = ContextOptions::new(args.device.clone(), false);
+    let device = if args.cpu { None } else { Some(open_device(&options, &progress)?) };
+    let info = device.as_ref().map(Device::info);
+    let variant = variant(args, processor(device.as_ref()));
     let n_threads = rayon::current_num_threads();
     let mut report = Report {
         suite: "size",
@@ -50,7 +49,7 @@ pub fn run(args: &SizeArgs) -> Result<(), CliError> {
     };
     // If a mesh is too large for the device, the results of the smaller ones are still reported.
     let done = sizes.into_iter().try_for_each(|n_triangles| {
-        report.rows.push(measure(args, context.as_ref(), variant, n_triangles, &progress)?);
+        report.rows.push(measure(args, device.as_ref(), variant, n_triangles, &progress)?);
         Ok(())
     });
     drop(progress);
@@ -73,18 +72,18 @@ fn variant(args: &SizeArgs, processor: Processor) -> Variant {
 
 fn measure(
     args: &SizeArgs,
-    context: Option<&Arc<Context>>,
+    device: Option<&Device>,
     variant: Variant,
     n_triangles: u32,
     progress: &Progress,
 ) -> Result<Row, GpuError> {
     let building = format!("building the kd-tree of {n_triangles} triangles");
-    let build_options = TreeKind::Best.options(Processor::of(context.map(|context| &**context)));
+    let build_options = TreeKind::Best.options(processor(device));
     let pixels = (args.size.width, args.size.height);
     let (sized, _) = progress.stage(&building, || KnotStage::new(n_triangles, pixels, &build_options));
     let (sets, _) = progress.stage("making rays", || ray_sets(&sized.stage));
     let casting = format!("casting rays at {n_triangles} triangles");
-    progress.stage(&casting, || sized.measure(context, variant, &sets, args.repeat)).0
+    progress.stage(&casting, || sized.measure(device, variant, &sets, args.repeat)).0
 }
 
 /// The report as text that ends with a line break.

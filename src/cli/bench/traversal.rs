@@ -1,7 +1,5 @@
 //! `kdray bench traversal`: compares all search algorithms for kd-trees and grids.
 
-use std::sync::Arc;
-
 use kdray::{
     accel::kdtree::BuildOptions,
     bench::{
@@ -10,12 +8,13 @@ use kdray::{
         traversal::{Report, SetResult, Tracers, VariantResult},
         variant::Variant,
     },
-    engine::choices::{Processor, TreeKind},
-    gpu::{Context, ContextOptions, GpuError},
+    engine::choices::TreeKind,
+    gpu::{ContextOptions, Device, GpuError},
     world::FlatScene,
 };
 
 use super::args::TraversalArgs;
+use super::processor;
 use crate::cli::{
     device_args::open_device,
     error::CliError,
@@ -31,15 +30,15 @@ pub fn run(args: &TraversalArgs) -> Result<(), CliError> {
     let (scene, _) = progress.stage(&format!("loading {}", args.mesh.display()), || args.load.load(&args.mesh));
     let scene = FlatScene::new(&scene?).map_err(GpuError::from)?;
     let variants = variants(&args.variants);
-    let device = ContextOptions::new(args.device.clone(), false);
-    let context = if args.cpu { None } else { Some(open_device(&device, &progress)?) };
-    let build_options = TreeKind::Best.options(Processor::of(context.as_deref()));
+    let options = ContextOptions::new(args.device.clone(), false);
+    let device = if args.cpu { None } else { Some(open_device(&options, &progress)?) };
+    let build_options = TreeKind::Best.options(processor(device.as_ref()));
     let building = format!("building the kd-tree of {} triangles", scene.triangles.len());
     let (stage, _) = progress.stage(&building, || stage(args, scene, &build_options));
     let (sets, _) = progress.stage("making rays", || ray_sets(&stage));
 
-    let mut tracers = Tracers::new(context.as_ref(), &stage, &variants)?;
-    let mut report = empty_report(args, &stage, context.as_ref());
+    let mut tracers = Tracers::new(device.as_ref(), &stage, &variants)?;
+    let mut report = empty_report(args, &stage, device.as_ref());
     for set in &sets {
         let casting = format!("casting {} {} rays", set.rays.len(), set.kind.name());
         let (result, _) = progress.stage(&casting, || tracers.measure(set, args.repeat));
@@ -71,9 +70,9 @@ fn stage(args: &TraversalArgs, scene: FlatScene, build_options: &BuildOptions) -
     make(scene, size, build_options)
 }
 
-fn empty_report(args: &TraversalArgs, stage: &Stage, context: Option<&Arc<Context>>) -> Report {
+fn empty_report(args: &TraversalArgs, stage: &Stage, device: Option<&Device>) -> Report {
     let n_triangles = stage.scene().triangles.len();
-    let info = context.map(|context| context.info());
+    let info = device.map(Device::info);
     Report {
         suite: "traversal",
         device: info.map_or_else(|| format!("CPU, {} threads", rayon::current_num_threads()), |info| info.name.clone()),

@@ -7,7 +7,7 @@ use kdray::{
     buffers::Pixels,
     engine::{Engine, choices::Workload},
     frame::{Crop, Goal, Integrator, RenderOptions},
-    gpu::{Context, GpuError},
+    gpu::{Device, GpuError},
     scene::Scene,
     world::World,
 };
@@ -56,12 +56,12 @@ impl ScenePicture {
 
     /// Checks that a whole picture fits into the memory, and draws a part of it.
     pub fn examine(&self, engine: &Engine, world: &World) -> Result<Examined, Problem> {
-        check_memory(&self.options, self.n_samples, engine.context().is_none(), 1)
+        check_memory(&self.options, self.n_samples, engine.device().is_none(), 1)
             .map_err(|error| Problem::of_memory(&error.to_string()))?;
         let methods = engine.methods(world, &self.workload).map_err(|error| Problem::of_device(&error))?;
         let options = methods.apply(&self.options);
-        let needed_bytes = match engine.context() {
-            Some(context) => Some(self.check_device_memory(engine, context, world, &options)?),
+        let needed_bytes = match engine.device() {
+            Some(device) => Some(self.check_device_memory(engine, device, world, &options)?),
             None => None,
         };
         let begin = Instant::now();
@@ -76,12 +76,12 @@ impl ScenePicture {
     fn check_device_memory(
         &self,
         engine: &Engine,
-        context: &Context,
+        device: &Device,
         world: &World,
         options: &RenderOptions,
     ) -> Result<u64, Problem> {
         let _renderer = engine.renderer(world, options).map_err(|error| Problem::of_device(&error))?;
-        let allocated: u64 = context.memory().iter().map(|it| it.bytes).sum();
+        let allocated: u64 = device.memory().iter().map(|it| it.bytes).sum();
         // The sums of samples are allocated only when the second sample is drawn.
         let bytes_of_sums = match options.integrator {
             Integrator::Path => Pixels::bytes_per_pixel_of_paths(self.n_samples),
@@ -89,7 +89,7 @@ impl ScenePicture {
             Integrator::Whitted => 0,
         };
         let needed = allocated + bytes_of_sums * u64::from(options.width) * u64::from(options.height);
-        let available = context.info().memory_bytes;
+        let available = device.info().memory_bytes;
         if needed > available { Err(Problem::of_device_memory(needed, available)) } else { Ok(needed) }
     }
 

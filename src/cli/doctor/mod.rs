@@ -18,7 +18,7 @@ use std::path::Path;
 
 use kdray::{
     engine::{Built, Engine},
-    gpu::{self, Context, ContextOptions, DeviceInfo, DeviceSelector, GpuError},
+    gpu::{self, ContextOptions, Device, DeviceInfo, DeviceSelector, GpuError},
     scene::{LoadOptions, Scene, pack_hash},
     util::progress::Work,
     world::World,
@@ -92,7 +92,7 @@ fn check_all(devices: &Result<Vec<DeviceInfo>, GpuError>) -> Vec<Processor> {
 /// Opens a device, and checks it with the sample picture.
 fn check_device(sample: &Sample, device: &DeviceInfo) -> Processor {
     let opened = match device.missing.is_empty() {
-        true => Context::new(&ContextOptions::new(Some(DeviceSelector::Index(device.index)), false))
+        true => Device::open(&ContextOptions::new(Some(DeviceSelector::Index(device.index)), false))
             .map_err(|error| Problem::of_device(&error)),
         false => Err(Problem::of_lacking(device)),
     };

@@ -101,7 +101,7 @@ pub fn draw_and_write(
 /// Whether each of several devices draws whole frames. Each has to get at least two on average: with fewer frames, some
 /// devices would have nothing to do for a large part of the time.
 pub fn draws_whole_frames(engine: &Engine, views: &[FrameJob]) -> bool {
-    let n_devices = engine.contexts().count();
+    let n_devices = engine.devices().count();
     n_devices > 1 && views.len() >= 2 * n_devices
 }
 

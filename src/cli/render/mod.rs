@@ -14,7 +14,7 @@ use kdray::{
         choices::{Choices, ChosenAccel, Workload},
     },
     frame::{Goal, Profile, RenderOptions, SampleRange},
-    gpu::{Context, DeviceInfo, GpuError},
+    gpu::{Device, DeviceInfo, GpuError},
     output::{self, Record, WholeRecord},
     scene::{LoadOptions, Scene},
     util::progress::Work,
@@ -74,14 +74,14 @@ pub fn run(args: RenderArgs) -> Result<(), CliError> {
     let n_drawn = some_samples.map_or(n_samples, |range| range.len());
     check_memory(&options, n_drawn, args.cpu, 1)?;
     let open = || open_devices(args.device.as_ref(), args.validate, &progress);
-    let contexts = if args.cpu { Vec::new() } else { info_span!("create device").in_scope(open)? };
-    args.check_devices(contexts.len())?;
+    let devices = if args.cpu { Vec::new() } else { info_span!("create device").in_scope(open)? };
+    args.check_devices(devices.len())?;
 
-    let engine = if args.cpu { Engine::on_cpu() } else { Engine::on_devices(contexts.clone()) };
+    let engine = if args.cpu { Engine::on_cpu() } else { Engine::on_devices(devices.clone()) };
     let engine = engine.with_request(args.picture.request());
     let whole_frames = draws_whole_frames(&engine, &views);
     if whole_frames {
-        check_memory(&options, n_drawn, args.cpu, contexts.len() as u64)?;
+        check_memory(&options, n_drawn, args.cpu, devices.len() as u64)?;
     }
     let n_triangles = scene.n_triangles();
     // A part of a picture gets the structure that the whole picture gets.
@@ -123,7 +123,7 @@ pub fn run(args: RenderArgs) -> Result<(), CliError> {
         choices: Choices::of_pictures(accel, methods),
         samples: n_samples,
         noise: noise_goal.zip(noise).map(|(goal, noise)| noise.report(goal)),
-        devices: contexts.len().max(1),
+        devices: devices.len().max(1),
         whole_frames,
         triangles: n_triangles,
         accel: world.statistics(),
@@ -140,7 +140,7 @@ pub fn run(args: RenderArgs) -> Result<(), CliError> {
     if !args.quiet {
         print(&args.progress.report(&report.text()))?;
     }
-    contexts.iter().try_for_each(|context| report_validation(context))
+    devices.iter().try_for_each(report_validation)
 }
 
 /// Returns the record of the pictures, from the scene's own camera.
@@ -154,7 +154,7 @@ fn record(
     // Devices of one kind round alike, so they are named once.
     let of_devices = |of: fn(&DeviceInfo) -> &String| {
         let mut words: Vec<&str> = Vec::new();
-        for word in engine.contexts().map(|context| of(context.info()).as_str()) {
+        for word in engine.devices().map(|device| of(device.info()).as_str()) {
             if !words.contains(&word) {
                 words.push(word);
             }
@@ -166,7 +166,7 @@ fn record(
         whole: WholeRecord::new(world.scene(), options, n_samples),
         crop: options.crop_or_whole(),
         samples: some_samples.unwrap_or(SampleRange::whole(n_samples)),
-        device: if engine.context().is_some() { of_devices(|it| &it.name) } else { "CPU".to_owned() },
+        device: if engine.device().is_some() { of_devices(|it| &it.name) } else { "CPU".to_owned() },
         driver: of_devices(|it| &it.driver),
         accel: match accel.tree_kind() {
             Some(tree) => format!("{}, {}, {}", accel.kind(), tree.value, options.traversal),
@@ -204,8 +204,8 @@ fn median(mut profiles: Vec<Profile>) -> Profile {
 }
 
 /// Prints the validation layer's messages. Fails if there is any.
-pub(super) fn report_validation(context: &Context) -> Result<(), CliError> {
-    let messages = context.validation_messages();
+pub(super) fn report_validation(device: &Device) -> Result<(), CliError> {
+    let messages = device.validation_messages();
     for message in &messages {
         print_line("validation", message);
     }

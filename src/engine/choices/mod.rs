@@ -81,6 +81,7 @@ pub enum Processor {
 
 impl Processor {
     /// Returns the processor that an open device is, or without a device the CPU.
+    #[doc(hidden)]
     pub fn of(context: Option<&Context>) -> Self {
         match context {
             None => Self::Cpu,
@@ -167,6 +168,7 @@ impl Request {
     }
 
     /// Chooses traversal and primary visibility, without any measurement.
+    #[doc(hidden)]
     pub fn methods_by_rule(&self, context: Option<&Context>, n_triangles: usize, size: (u32, u32)) -> Methods {
         Methods {
             traversal: Chosen::pinned_or(self.traversal, || traversal_by_rule(Processor::of(context))),
@@ -181,6 +183,7 @@ impl Request {
     ///
     /// # Errors
     /// The device is lost. If a measurement fails otherwise, the rule decides.
+    #[doc(hidden)]
     pub fn methods(
         &self,
         context: Option<&Arc<Context>>,

@@ -14,6 +14,7 @@ pub fn traversal_by_rule(processor: Processor) -> Traversal {
 
 /// Returns the kind of primary visibility that is fastest for a picture of this size on the device. If `context` is
 /// none, returns the kind that is fastest on the CPU.
+#[doc(hidden)]
 pub fn primary_by_rule(context: Option<&Context>, n_triangles: usize, size: (u32, u32)) -> Primary {
     match context {
         // Mesa's lavapipe rasterizes 870,000 triangles in 72 ms, and traces 790,000 rays in 242 ms: about 4 triangles

@@ -94,8 +94,7 @@ impl GridBuilder {
             commands.reset_timer();
             self.passes.record(commands, &self.buffers);
         })?;
-        self.context.submit(&[&commands])?;
-        self.context.wait()?;
+        self.context.wait_for(self.context.submit(vec![commands])?)?;
         let build = self.buffers.build.download()?[0];
         assert_eq!(build.counts, GRID_IS_COUNTED, "the last attempt keeps to the limit");
         let mut grid = self.with_room(&build, usage)?;

@@ -4,15 +4,18 @@
 //! Only the caller can guarantee that a raw handle is what it claims to be and lives long enough. So an `unsafe`
 //! function takes each of these handles, and all later use is safe.
 
-use std::{marker::PhantomData, sync::Arc};
+use std::{
+    marker::PhantomData,
+    sync::{Arc, Mutex},
+};
 
 use ash::vk;
 
-use super::{Commands, Context, ContextOptions, GpuError};
+use super::{Commands, Context};
 
 /// A Vulkan device that the caller has opened, and one of its queues.
 #[derive(Clone)]
-pub struct GivenDevice {
+pub struct ExternalDevice {
     /// The loader.
     pub entry: ash::Entry,
     /// The instance, for Vulkan 1.3.
@@ -25,6 +28,9 @@ pub struct GivenDevice {
     pub queue_family: u32,
     /// A queue of the family.
     pub queue: vk::Queue,
+    /// The lock under which everybody uses the queue: kdray holds it while it submits. If nobody else uses the queue,
+    /// this is a new lock.
+    pub queue_lock: Arc<Mutex<()>>,
     /// Whether the device has `shaderInt64` and `shaderBufferInt64Atomics` enabled, with which kernels can rasterize.
     pub int64_atomics: bool,
 }
@@ -61,22 +67,6 @@ impl RequiredFeatures {
     }
 }
 
-impl Context {
-    /// Makes a context of a device that the caller has opened. The caller keeps the device, and destroys it after the
-    /// context and all that was made from it.
-    ///
-    /// # Errors
-    /// The device lacks something that kdray needs, or a call fails.
-    ///
-    /// # Safety
-    /// The handles belong together and live longer than the context. The device was created with
-    /// [`RequiredFeatures`], and with 64-bit atomics if `int64_atomics` says so. No other thread uses the queue while
-    /// a function of kdray runs.
-    pub unsafe fn on_given(given: GivenDevice) -> Result<Arc<Self>, GpuError> {
-        Self::open_given(given, &ContextOptions::default().overrides)
-    }
-}
-
 /// A timeline semaphore that the caller owns, and one of its values.
 #[derive(Clone, Copy)]
 pub struct TimelinePoint {
@@ -98,7 +88,7 @@ impl TimelinePoint {
 
 /// An image that the caller owns and kdray writes a picture to.
 #[derive(Clone, Copy)]
-pub struct GivenImage {
+pub struct ExternalImage {
     pub(super) raw: vk::Image,
     /// Width and height, pixels.
     pub(super) size: (u32, u32),
@@ -106,7 +96,7 @@ pub struct GivenImage {
     pub(super) layouts: [vk::ImageLayout; 2],
 }
 
-impl GivenImage {
+impl ExternalImage {
     /// Wraps an image. `size` is its width and height, pixels. `layouts` are its layouts before the picture is
     /// written, which may be `UNDEFINED`, and afterwards.
     ///
@@ -126,13 +116,13 @@ impl GivenImage {
 
 /// A range of a storage buffer that the caller owns.
 #[derive(Clone, Copy)]
-pub struct GivenBuffer {
+pub struct ExternalBuffer {
     pub(super) raw: vk::Buffer,
     pub(super) offset: u64,
     pub(super) bytes: u64,
 }
 
-impl GivenBuffer {
+impl ExternalBuffer {
     /// Wraps `bytes` bytes of a buffer, from an offset on.
     ///
     /// # Safety
@@ -150,23 +140,24 @@ impl GivenBuffer {
 }
 
 /// A command buffer that the caller owns and is recording.
-pub struct GivenCommands<'a> {
+pub struct ExternalCommands<'a> {
     raw: vk::CommandBuffer,
     borrowed: PhantomData<&'a ()>,
 }
 
-impl GivenCommands<'_> {
+impl ExternalCommands<'_> {
     /// Wraps a command buffer.
     ///
     /// # Safety
     /// The handle is a command buffer of the context's device, of a family with compute. It is being recorded,
-    /// outside of rendering, for as long as this value lives.
+    /// outside of rendering, for as long as this value lives. Each cast that is recorded into it lives until the device
+    /// has run the commands, and runs once at a time.
     pub unsafe fn new(raw: vk::CommandBuffer) -> Self {
         Self { raw, borrowed: PhantomData }
     }
 
     /// Returns the commands. Their passes are not timed.
     pub(crate) fn commands<'c>(&'c self, context: &'c Context) -> Commands<'c> {
-        Commands::to_given(context, self.raw)
+        Commands::to_external(context, self.raw)
     }
 }

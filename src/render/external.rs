@@ -1,7 +1,7 @@
 //! Copies the picture into an image that the caller owns.
 
 use super::Renderer;
-use crate::gpu::{Access, CommandBuffer, GivenImage, GpuError, PixelRows, TimelinePoint};
+use crate::gpu::{Access, CommandBuffer, ExternalImage, GpuError, PixelRows, TimelinePoint};
 
 impl Renderer {
     /// Copies the displayed picture, as [`Renderer::picture`] returns it, into the upper left corner of an image. The
@@ -11,7 +11,7 @@ impl Renderer {
     /// The image is smaller than the picture; out of memory; a call fails. Then nothing is signalled.
     pub fn copy_picture_to(
         &self,
-        image: &GivenImage,
+        image: &ExternalImage,
         after: Option<TimelinePoint>,
         then: Option<TimelinePoint>,
     ) -> Result<(), GpuError> {
@@ -26,17 +26,10 @@ impl Renderer {
         let display = self.resources.pixels.pixel_display.any();
         let copy = CommandBuffer::record(&self.context, "copy picture", None, |commands| {
             commands.barrier(Access::ComputeWrite, Access::TransferRead); // pixel_display
-            commands.copy_to_given(display, &rows, image);
+            commands.copy_to_external(display, &rows, image);
             commands.barrier(Access::TransferRead, Access::ComputeWrite); // pixel_display, for the next frame
         })?;
-        self.context.submit_copies(copy, after, then)
-    }
-}
-
-/// Waits for the device, which may still be copying the picture.
-impl Drop for Renderer {
-    fn drop(&mut self) {
-        // An error can be ignored: a device that is lost has ended all work.
-        let _ = self.context.wait();
+        // Nobody waits for the copy here: the queue keeps the picture until it has ended.
+        self.context.submit_copies(copy, after, then).map(drop)
     }
 }
