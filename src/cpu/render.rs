@@ -234,17 +234,19 @@ impl Renderer {
     /// Returns the mean of the samples so far, after the noise filter if there is one.
     pub fn picture(&self) -> Picture {
         let (window, crop) = (self.options.window(), self.options.crop_or_whole());
-        let radiance = if self.filters() { &self.pixel_filtered } else { &self.pixel_radiance };
+        // The filter `edge` has a second half of `pixel_filtered` for its steps.
+        let filtered = if self.filters() { &self.pixel_filtered } else { &self.pixel_radiance };
         Picture {
             width: crop.width(),
             height: crop.height(),
-            radiance: opaque(window.part(radiance, &crop)),
+            radiance: opaque(window.part(&filtered[..self.pixel_radiance.len()], &crop)),
             display: window.part(&self.pixel_display, &crop),
         }
     }
 
     /// Returns the features of each pixel of the picture: the first hit, and the costs of the pixel's rays, in the
-    /// sample that was drawn last.
+    /// sample that was drawn last. Of paths, they are those of the first sample of the frame that was drawn last, and
+    /// only the first frame of a picture has costs.
     ///
     /// # Panics
     /// The options do not request features.
