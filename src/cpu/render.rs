@@ -366,6 +366,10 @@ impl Renderer {
         let Self { world, frame, links, paths, queue, path_materials, .. } = self;
         let inputs = KernelInputs::new(world, frame).with_links(links).of_paths(path_materials, world.emitters());
         let traversal = self.options.traversal;
+        // Rays are traced a second time to be counted, so later frames, whose counts nobody reads, go without.
+        if self.options.features && self.n_samples == 0 {
+            paths.note_costs(&inputs, traversal, depth, queue, &mut self.pixel_features);
+        }
         let trace = || paths.trace(&inputs, (traversal, wide_bvh_for(world, traversal)), depth, queue);
         let (n_hits, n_segments) = self.clock.time(Pass::PathTrace, Some(depth), trace);
         if let Some(before) = self.batch_stats.last_mut() {
@@ -483,7 +487,7 @@ impl Renderer {
         let n_rasterized = if self.options.primary != Primary::Trace { bounces[0].n_rays as usize } else { 0 };
         let (rasterized, traced) = rays.split_at(n_rasterized);
         costs::count_rasterized(rasterized, hits, pixels);
-        costs::count_closest(&inputs, traversal, traced, pixels);
+        costs::count_rays::<false>(&inputs, traversal, traced, pixels);
         costs::count_shadow(&inputs, traversal, rays, hits, pixels);
     }
 
