@@ -4,13 +4,16 @@ mod support;
 
 use std::{ops::RangeInclusive, sync::Arc};
 
+use fearless_simd::Level;
 use glam::{Vec3, vec3};
 use kdray::{
-    accel::{Query, kdtree::Traversal},
+    accel::{Accel, AccelOptions, Query, grid::GridOptions, kdtree::Traversal, wide_bvh::WideBvh},
     cast::{Caster, Hit, NO_TRIANGLE, Ray, cast_on_cpu},
+    cpu::wide_traverser::WideTraverser,
     gpu::Context,
     layout::{KD_MAX_DEPTH, KD_WORD_DEPTH, PathRay},
-    reference::{search_ray::SearchRay, traversal_ray::near_scene},
+    reference::{cast::cast_by, search_ray::SearchRay, traversal_ray::near_scene},
+    world::Geometry,
 };
 use rayon::prelude::*;
 use support::{
@@ -245,6 +248,77 @@ fn the_interval_s_ends_are_exact() {
     assert!(behind.iter().zip(&first).all(|(hit, first)| hit.t > first.t));
     let empty = cast(&with(&|ray, t| Ray { t_min: t.next_up(), t_max: t.next_down(), ..*ray }));
     assert!(empty.iter().all(|hit| *hit == MISS));
+}
+
+/// Returns rays at a mesh from so far away that their origins are moved near it. Every fourth begins behind its origin.
+fn rays_from_afar(world: &MeshWithTree, n: usize) -> Vec<Ray> {
+    let ray = |i: usize| {
+        let mut random = Random(i as u64);
+        let within = random.in_box(world.tree().box_min(), world.tree().box_max());
+        let distance = world.radius() * 2f32.powf(random.between(1.0, 9.0));
+        let towards = random.direction();
+        let (scale, t_min) = (2f32.powf(random.between(-9.0, 9.0)), if i % 4 == 0 { -1e9 } else { 0.0 });
+        let ray = ray(within - distance * towards, if i % 8 == 0 { -towards } else { towards });
+        scaled(&ray, t_min, scale)
+    };
+    (0..n).map(ray).collect()
+}
+
+/// Returns how rays can be cast into a mesh: on the device and on the CPU, by each algorithm and structure.
+fn ways_to_cast<'a>(
+    device: &Device,
+    world: &'a MeshWithTree,
+    (grids, bvh): (&'a [Accel], &'a WideBvh),
+) -> Vec<(String, Box<dyn FnMut(&[Ray], Query) -> Vec<Hit> + 'a>)> {
+    let trees = Traversal::ALL.iter().map(|&traversal| (traversal, world.geometry()));
+    let of_grid = |grid| (Traversal::Mask, Geometry::new(&world.triangles, grid).expect("a grid of these triangles"));
+    let mut ways: Vec<(String, Box<dyn FnMut(&[Ray], Query) -> Vec<Hit>>)> = Vec::new();
+    for (way_ix, (traversal, geometry)) in trees.chain(grids.iter().map(of_grid)).enumerate() {
+        let name = format!("{way_ix}: {} by {traversal}", geometry.accel().kind());
+        let mut caster = Caster::new(&device.0, geometry, traversal).expect("a caster");
+        let on_device = move |rays: &[Ray], query| caster.cast(rays, query, 1).expect("a cast").hits;
+        ways.push((format!("{name} on the device"), Box::new(on_device)));
+        let on_cpu = move |rays: &[Ray], query| cast_on_cpu(geometry, traversal, rays, query);
+        ways.push((name, Box::new(on_cpu)));
+    }
+    let one_by_one = move |rays: &[Ray], query| {
+        let mut hits = vec![MISS; rays.len()];
+        cast_by(&world.inputs(), || WideTraverser::new(bvh, Level::new()), query, rays, &mut hits);
+        hits
+    };
+    ways.push(("one by one".to_owned(), Box::new(one_by_one)));
+    ways
+}
+
+/// The t of a ray whose origin is moved is a rounded sum. It is in the ray's interval nevertheless.
+#[test]
+fn hits_of_moved_rays_are_in_the_interval() {
+    let device = Device::new();
+    let ground = meshes::triangle(vec3(-4e4, -1.0, -4e4), vec3(4e4, -1.0, -4e4), vec3(0.0, -1.0, 4e4));
+    let on_ground = [meshes::cube(9, 0.0), vec![ground]].concat();
+    for triangles in [meshes::cube(2, 0.0), meshes::placed(meshes::torus(40, 20), 0.3, vec3(9.0, -7.0, 3.0)), on_ground]
+    {
+        let world = MeshWithTree::new(triangles);
+        let options = [GridOptions::uniform(), GridOptions::two_level()].map(AccelOptions::Grid);
+        let grids = options.map(|options| Accel::new(&world.triangles, &options));
+        let bvh = WideBvh::new(world.tree(), &world.triangles);
+        let rays = rays_from_afar(&world, 6000);
+        for (name, mut cast) in ways_to_cast(&device, &world, (&grids, &bvh)) {
+            let first = cast(&rays, Query::Closest);
+            let struck = || rays.iter().zip(&first).filter(|(_, hit)| hit.triangle_ix != NO_TRIANGLE);
+            assert!(struck().count() > 1000, "{name}");
+            let behind: Vec<_> = struck().map(|(ray, hit)| Ray { t_min: hit.t, ..*ray }).collect();
+            let before: Vec<_> = struck().map(|(ray, hit)| Ray { t_max: hit.t, ..*ray }).collect();
+            for (rays, query) in
+                [&behind, &before].into_iter().flat_map(|rays| [Query::Closest, Query::Any].map(|q| (rays, q)))
+            {
+                let hits = cast(rays, query);
+                let is_in = |ray: &Ray, hit: &Hit| *hit == MISS || (ray.t_min < hit.t && hit.t <= ray.t_max);
+                let wrong: Vec<_> = rays.iter().zip(&hits).filter(|(ray, hit)| !is_in(ray, hit)).collect();
+                assert!(wrong.is_empty(), "{name}, {query:?}: {} hits, first {:?}", wrong.len(), wrong[0]);
+            }
+        }
+    }
 }
 
 /// A direction may have any length that a float holds without denormals.

@@ -7,10 +7,10 @@
 // segments follow the rays. Rays pass through see-through surfaces at random (cutout.glsl).
 // Reads rays, live_paths, bounces and the acceleration structure; updates hits and segments, in which stalled rays and
 // segments leave their mark (stalls.glsl), path_states (light that arrives is added), counters and, with COUNT_COSTS,
-// n_rays and n_steps of pixel_features.
+// n_rays and n_steps of pixel_features, which are about the first sample of the frame.
 #include "layout.glsl"
 
-// Whether the rays' cost is added to pixel_features.
+// Whether the cost of the rays of each pixel's first sample is added to pixel_features.
 layout(constant_id = CONSTANT_COUNT_COSTS) const bool COUNT_COSTS = false;
 const bool PASSES_VEILS = true;
 #define RANDOM_OPACITY
@@ -53,7 +53,7 @@ bool traced(uint path_ix, bool is_segment) {
     if (is_segment) ray = ray_of(segments[path_ix], ray.pixel_ix);
     Hit hit = traverse(ray, 0.0, is_segment);
     bool ends = !is_stalled(hit.triangle_ix);
-    if (COUNT_COSTS && ends) count(ray);
+    if (COUNT_COSTS && ends && sample_of_path(path_ix) == 0u) count(ray);
     if (is_segment) end_segment(path_ix, hit.triangle_ix);
     else store_hit(path_ix, hit);
     return ends && (is_segment || hit.triangle_ix != NO_TRIANGLE);

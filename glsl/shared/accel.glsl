@@ -41,7 +41,7 @@ uint search(TraversalRay ray, bool any_hit, inout Nearest best) {
 Hit traverse(PathRay ray_in, float t_min, bool any_hit) {
     float t_start;
     PathRay ray_near = near_scene(ray_in, t_min, t_start);
-    TraversalRay ray = traversal_ray(ray_near, t_min - t_start);
+    TraversalRay ray = traversal_ray(ray_near, t_min);
     spill_pair(LENGTHS_SLOT, t_start, ray_in.t_max);
     Nearest best = Nearest(0.5 * ray_near.t_max, NO_TRIANGLE);
     uint mark = search(ray, any_hit, best);
@@ -49,7 +49,8 @@ Hit traverse(PathRay ray_in, float t_min, bool any_hit) {
     vec2 lengths = spilled_pair(LENGTHS_SLOT);
     if (best.triangle_ix == NO_TRIANGLE) return Hit(lengths.y, NO_TRIANGLE, 0.0, 0.0);
     vec2 weights = spilled_pair(WEIGHTS_SLOT);
-    return Hit(2.0 * best.t + lengths.x, best.triangle_ix, weights.x, weights.y);
+    // The sum could round to more than t_max.
+    return Hit(min(2.0 * best.t + lengths.x, lengths.y), best.triangle_ix, weights.x, weights.y);
 }
 
 // The bits of a magnitude, which have the order of the magnitudes. Integers are used since a device may flush

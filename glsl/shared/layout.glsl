@@ -598,8 +598,9 @@ struct PathRay {
 // A ray that is cast by itself, not for a picture, 32 bytes. The length of `direction` is arbitrary; it is the unit
 // of t. Hits have t in `(t_min, t_max]`. All numbers are valid as `t_min` and `t_max`. An end that is less than 1e-36
 // world units from the ray's origin may count as 0, since devices may flush denormals. Otherwise both ends are exact
-// to the last bit if the origin is within `AccelConstants.origin_reach`. If it is not, they are exact to 2^-24 of the
-// distance from the ray's origin to the scene, or of the origin's distance from 0 if that is greater.
+// to the last bit if the origin is within `AccelConstants.origin_reach`. If it is not, they are exact to 2^-23 of the
+// distance from the ray's origin to the scene, or of the origin's distance from 0 if that is greater, and the t of hits
+// is in the interval nevertheless.
 struct Ray {
     vec3 origin;
     float t_min;

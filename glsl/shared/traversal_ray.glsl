@@ -76,10 +76,18 @@ float move_to_centre(inout PathRay ray, float t_min) {
     return t_move;
 }
 
+// The least number above x. Returns x if that is 0 or infinity.
+float next_above(float x) {
+    int bits = floatBitsToInt(x);
+    if (x > 0.0) return intBitsToFloat(min(bits + 1, 0x7f800000));
+    return x < 0.0 ? intBitsToFloat(bits - 1) : x;
+}
+
 // Returns the ray. If its origin is beyond the limit of KD_MAX_ORIGIN_DISTANCE, it is moved along the ray to the
 // structure's box. If it is then beyond origin_reach, it is moved towards 0 (src/accel/kdtree/scales.rs). t_start: the
-// distance of the moves, in the ray's own t, or 0 if the origin is not moved.
-PathRay near_scene(PathRay ray, float t_min, out float t_start) {
+// distance of the moves, in the ray's own t, or 0 if the origin is not moved. t_min becomes that of the returned ray,
+// such that the sum of t_start and any greater t is greater than the ray's own t_min, also after rounding.
+PathRay near_scene(PathRay ray, inout float t_min, out float t_start) {
     t_start = 0.0;
     if (longest_component(ray.origin) <= accel.origin_reach) return ray;
     if (longest_component(ray.origin) > KD_MAX_ORIGIN_DISTANCE * largest_coordinate()) {
@@ -89,5 +97,7 @@ PathRay near_scene(PathRay ray, float t_min, out float t_start) {
         ray.t_max -= t_start;
     }
     if (longest_component(ray.origin) > accel.origin_reach) t_start += move_to_centre(ray, t_min - t_start);
+    // A greater t is at least the next number above t_min - t_start. Without next_above, the sum could round to t_min.
+    if (t_start != 0.0) t_min = next_above(t_min) - t_start;
     return ray;
 }

@@ -18,7 +18,7 @@ use crate::{
         kdtree::{Cell, Pending, axis_of, is_leaf, search, search_cell},
         pending_stack::PendingStack,
         slab::slab_of,
-        traversal_ray::{TraversalRay, near_scene},
+        traversal_ray::{TraversalRay, near_scene, t_from_origin},
     },
 };
 
@@ -64,8 +64,8 @@ impl Moved {
     #[cold]
     fn hits_from_origins(&self, search_rays: &RaysSoa, mut hits: HitsSoa) -> HitsSoa {
         for lane in 0..LANES {
-            let is_miss = hits.triangle_ix[lane] == NO_TRIANGLE;
-            hits.t[lane] = if is_miss { search_rays.t_max[lane] } else { hits.t[lane] + self.t_start[lane] };
+            let (is_miss, t_max) = (hits.triangle_ix[lane] == NO_TRIANGLE, search_rays.t_max[lane]);
+            hits.t[lane] = if is_miss { t_max } else { t_from_origin(hits.t[lane], self.t_start[lane], t_max) };
         }
         hits
     }

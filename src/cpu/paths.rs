@@ -13,13 +13,15 @@ use super::{
 };
 use crate::{
     accel::{kdtree::Traversal, wide_bvh::WideBvh},
-    layout::{Batch, Bounce, Frame, Hit, PathRay, PathState, SCAN_GROUP_SIZE, Segment},
+    layout::{Batch, Bounce, Feature, Frame, Hit, PathRay, PathState, SCAN_GROUP_SIZE, Segment},
     reference::{
+        counting::costs,
         inputs::KernelInputs,
         path_compact,
         path_layers::path_layers,
         path_scatter::PathBuffers,
-        path_trace::{closest_hits_by, segments_by},
+        path_trace::{closest_hits_by, ray_of, segments_by},
+        paths::sample_of_path,
         traverser::Tracer,
     },
 };
@@ -74,6 +76,29 @@ impl Paths {
             Some(bvh) => self.trace_by(inputs, || WideTraverser::new(bvh, Level::new()), depth, queue),
             None => self.trace_by(inputs, || FastTracer::new(inputs, traversal), depth, queue),
         }
+    }
+
+    /// Adds the costs of the rays that [`Self::trace`] traces, of each pixel's first sample.
+    pub fn note_costs(
+        &self,
+        inputs: &KernelInputs,
+        traversal: Traversal,
+        depth: u32,
+        queue: &Queue,
+        pixel_features: &mut [Feature],
+    ) {
+        let is_first = |path_ix: &&u32| sample_of_path(inputs.frame(), **path_ix) == 0;
+        let ray = |path_ix: &u32| queue.rays[*path_ix as usize];
+        let shadow_ray = |path_ix: &u32| {
+            let pixel_ix = ray(path_ix).pixel_ix;
+            PathRay { pixel_ix, ..ray_of(&self.segments[*path_ix as usize]) }
+        };
+        let live = &self.live[depth as usize % 2];
+        let rays: Vec<_> = live.iter().filter(is_first).map(ray).collect();
+        let shadow_rays: Vec<_> = self.with_segment.iter().filter(is_first).map(shadow_ray).collect();
+        let inputs = &inputs.through_veils_at_random();
+        costs::count_rays::<false>(inputs, traversal, &rays, pixel_features);
+        costs::count_rays::<true>(inputs, traversal, &shadow_rays, pixel_features);
     }
 
     fn trace_by<T: Tracer>(

@@ -234,17 +234,19 @@ impl Renderer {
     /// Returns the mean of the samples so far, after the noise filter if there is one.
     pub fn picture(&self) -> Picture {
         let (window, crop) = (self.options.window(), self.options.crop_or_whole());
-        let radiance = if self.filters() { &self.pixel_filtered } else { &self.pixel_radiance };
+        // The filter `edge` has a second half of `pixel_filtered` for its steps.
+        let filtered = if self.filters() { &self.pixel_filtered } else { &self.pixel_radiance };
         Picture {
             width: crop.width(),
             height: crop.height(),
-            radiance: opaque(window.part(radiance, &crop)),
+            radiance: opaque(window.part(&filtered[..self.pixel_radiance.len()], &crop)),
             display: window.part(&self.pixel_display, &crop),
         }
     }
 
     /// Returns the features of each pixel of the picture: the first hit, and the costs of the pixel's rays, in the
-    /// sample that was drawn last.
+    /// sample that was drawn last. Of paths, they are those of the first sample of the frame that was drawn last, and
+    /// only the first frame of a picture has costs.
     ///
     /// # Panics
     /// The options do not request features.
@@ -364,6 +366,10 @@ impl Renderer {
         let Self { world, frame, links, paths, queue, path_materials, .. } = self;
         let inputs = KernelInputs::new(world, frame).with_links(links).of_paths(path_materials, world.emitters());
         let traversal = self.options.traversal;
+        // Rays are traced a second time to be counted, so later frames, whose counts nobody reads, go without.
+        if self.options.features && self.n_samples == 0 {
+            paths.note_costs(&inputs, traversal, depth, queue, &mut self.pixel_features);
+        }
         let trace = || paths.trace(&inputs, (traversal, wide_bvh_for(world, traversal)), depth, queue);
         let (n_hits, n_segments) = self.clock.time(Pass::PathTrace, Some(depth), trace);
         if let Some(before) = self.batch_stats.last_mut() {
@@ -481,7 +487,7 @@ impl Renderer {
         let n_rasterized = if self.options.primary != Primary::Trace { bounces[0].n_rays as usize } else { 0 };
         let (rasterized, traced) = rays.split_at(n_rasterized);
         costs::count_rasterized(rasterized, hits, pixels);
-        costs::count_closest(&inputs, traversal, traced, pixels);
+        costs::count_rays::<false>(&inputs, traversal, traced, pixels);
         costs::count_shadow(&inputs, traversal, rays, hits, pixels);
     }
 

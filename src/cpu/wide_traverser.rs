@@ -85,6 +85,13 @@ struct RayColumns<S: Simd> {
     far_sides: [usize; 3],
 }
 
+/// Returns the lanes whose interval of t is not empty. An end that is NaN ends no interval: it comes from `min` and
+/// `max` of a side's NaN, which on x86 return another side, and on ARM NaN. So no box is missed on either.
+#[inline(always)]
+fn entered<S: Simd>(t_enter: f32x16<S>, t_exit: f32x16<S>) -> LaneMask {
+    LaneMask::from(!(t_enter.simd_gt(t_exit).to_bitmask() as u16))
+}
+
 /// The children whose boxes a ray meets, and the t at which it enters each box.
 struct Entered {
     lanes: LaneMask,
@@ -114,8 +121,8 @@ impl<S: Simd> RayColumns<S> {
         f32x16::load_array_ref(self.t_enter.simd, &node.sides[side]) * self.inv_direction[axis] + self.bias[axis]
     }
 
-    /// Returns the children whose boxes the ray enters no farther than `t_best`. If a product overflows, t may be NaN.
-    /// x86 then ignores that side of the box, and ARM the whole box.
+    /// Returns the children whose boxes the ray enters no farther than `t_best`. If a product overflows, the t of a
+    /// side may be NaN. Then the ray may seem to enter a box that it misses.
     #[inline(always)]
     fn enter(&self, node: &WideNode, t_best: f32) -> Entered {
         let ([near_x, near_y, near_z], [far_x, far_y, far_z]) = (self.near_sides, self.far_sides);
@@ -123,7 +130,7 @@ impl<S: Simd> RayColumns<S> {
         let t_enter = x.max(y).max(z.max(self.t_enter));
         let (x, y, z) = (self.t_at(node, far_x), self.t_at(node, far_y), self.t_at(node, far_z));
         let t_exit = x.min(y).min(z.min(f32x16::splat(self.t_enter.simd, t_best)));
-        Entered { lanes: t_enter.simd_le(t_exit).to_bitmask() as LaneMask, t_enter: t_enter.to_array() }
+        Entered { lanes: entered(t_enter, t_exit), t_enter: t_enter.to_array() }
     }
 
     /// Tests a block's triangles, as `candidate::intersect` does with each.
@@ -176,13 +183,14 @@ impl Stack {
         Some(nearest.subtree)
     }
 
-    /// Returns the next pending subtree that the ray enters no farther than `t_best`.
+    /// Returns the next pending subtree that the ray enters no farther than `t_best`, or at NaN.
     #[inline(always)]
     fn pop(&mut self, t_best: f32) -> Option<u32> {
         while self.size > 0 {
             self.size -= 1;
             let Pending { t_enter, subtree } = self.entries[self.size];
-            if t_enter <= t_best {
+            // The comparison is not `<=`, since a NaN counts.
+            if !(t_enter > t_best) {
                 return Some(subtree);
             }
         }
@@ -248,6 +256,32 @@ impl Tracer for WideTraverser<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// `min` and `max` return a NaN on some platforms, and the other number on others. Neither loses a box.
+    #[test]
+    fn no_box_is_missed_for_a_nan() {
+        let (nan, infinity) = (f32::NAN, f32::INFINITY);
+        let ends = [-infinity, -1.0, 0.0, 1.0, 2.0, infinity, nan];
+        for (t_enter, t_exit) in ends.iter().flat_map(|&a| ends.map(|b| (a, b))) {
+            let is_met = t_enter.is_nan() || t_exit.is_nan() || t_enter <= t_exit;
+            for lane in 0..WIDTH {
+                // All other lanes are empty.
+                let (mut enter, mut exit) = ([1.0; WIDTH], [0.0; WIDTH]);
+                (enter[lane], exit[lane]) = (t_enter, t_exit);
+                let lanes = dispatch!(Level::new(), simd => {
+                    entered(f32x16::load_array(simd, enter), f32x16::load_array(simd, exit))
+                });
+                assert_eq!(lanes, LaneMask::from(is_met) << lane, "{t_enter}, {t_exit}");
+            }
+        }
+        let mut stack = Stack { entries: [Pending::default(); MOST_PENDING], size: 3 };
+        stack.entries[..3].copy_from_slice(&[
+            Pending { t_enter: nan, subtree: 1 },
+            Pending { t_enter: 3.0, subtree: 2 },
+            Pending { t_enter: 2.0, subtree: 3 },
+        ]);
+        assert_eq!([(); 3].map(|()| stack.pop(2.0)), [Some(3), Some(1), None]);
+    }
 
     #[test]
     fn few_triangles_narrow_vectors_and_other_algorithms_keep_to_the_tree() {

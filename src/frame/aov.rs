@@ -22,10 +22,9 @@ pub enum Aov {
     Id,
     /// Index of the first hit's material; 4294967295 for a miss.
     Material,
-    /// Number of the pixel's rays: primary, secondary and shadow rays.
+    /// Number of the rays of the pixel's first sample: primary, secondary and shadow rays.
     Rays,
-    /// Number of entries of the acceleration structure that the pixel's rays read, such as nodes and triangles in
-    /// leaves.
+    /// Number of entries of the acceleration structure that these rays read, such as nodes and triangles in leaves.
     Cost,
     /// Variance of the pixel's mean luminance, before the noise filter, as estimated from its samples. Infinity for a
     /// single sample. Only pictures of paths have it.
@@ -48,7 +47,7 @@ named_enum!(Aov {
     Albedo = "albedo": "diffuse reflectance (Kd), linear",
     Id = "id": "index of the triangle; 4294967295 where nothing is hit",
     Material = "material": "index of the material; 4294967295 where nothing is hit",
-    Rays = "rays": "number of the pixel's primary, secondary and shadow rays",
+    Rays = "rays": "number of primary, secondary and shadow rays of the pixel's first sample",
     Cost = "cost": "nodes or cells, and triangles that these rays read; also drawn as NAME.cost.png",
     Variance = "variance": "variance of the pixel's mean luminance, from its samples; needs --integrator path",
     Samples = "samples": "number of the pixel's samples; needs --integrator path",

@@ -87,7 +87,8 @@ pub fn segments_by<T: Tracer>(
     chunks.for_each_init(new_tracer, test_chunk);
 }
 
-fn ray_of(segment: &Segment) -> PathRay {
+/// Returns the ray of a segment, without its pixel.
+pub(crate) fn ray_of(segment: &Segment) -> PathRay {
     PathRay {
         origin: segment.origin,
         pixel_ix: 0,

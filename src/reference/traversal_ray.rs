@@ -124,14 +124,21 @@ fn far_near_scene(inputs: &KernelInputs<impl ReadCounter>, ray: &SearchRay) -> (
     if longest_component(near.origin) > inputs.origin_reach {
         t_start += move_to_centre(&mut near);
     }
-    // The kernel subtracts the sum, too, so that the result is the same.
-    near.t_min = ray.t_min - t_start;
+    // A greater t is above the difference, so that its sum with t_start is above t_min even if it is rounded. The
+    // kernel subtracts the sum of the moves, too, so that the result is the same.
+    near.t_min = if t_start == 0.0 { ray.t_min } else { ray.t_min.next_up() - t_start };
     (near, t_start)
 }
 
+/// Returns the t of a hit, counted from the ray's own origin. `t_near`: the t of the hit on the ray that [`near_scene`]
+/// moved by `t_start`. `t_max`: the end of the ray's interval, beyond which the sum could round.
+#[inline(always)]
+pub fn t_from_origin(t_near: f32, t_start: f32, t_max: f32) -> f32 {
+    min(t_near + t_start, t_max)
+}
+
 /// Calls `search` with the ray that [`near_scene`] returns, and returns its hit with t counted from the ray's own
-/// origin. A
-/// miss has t = t_max.
+/// origin. A miss has t = t_max.
 #[inline(always)]
 pub fn hit_from_near(
     inputs: &KernelInputs<impl ReadCounter>,
@@ -141,7 +148,8 @@ pub fn hit_from_near(
     let (near, t_start) = near_scene(inputs, search_ray);
     let mut best = near.miss();
     search(&near, &mut best);
-    best.t = if best.triangle_ix == NO_TRIANGLE { search_ray.t_max } else { best.t + t_start };
+    let is_miss = best.triangle_ix == NO_TRIANGLE;
+    best.t = if is_miss { search_ray.t_max } else { t_from_origin(best.t, t_start, search_ray.t_max) };
     best
 }
 

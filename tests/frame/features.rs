@@ -4,7 +4,7 @@ use glam::{Vec3, vec3};
 use kdray::{
     accel::kdtree::{BuildOptions, Traversal},
     cpu::{self, Batching},
-    frame::{Crop, Primary, RenderOptions},
+    frame::{Crop, Integrator, Primary, Profile, RenderOptions},
     layout::{Feature, NO_TRIANGLE},
     render::Renderer,
     world::{FlatScene, World},
@@ -14,7 +14,7 @@ use super::{
     batches::glass_in_glass,
     studio::{assert_silent, device, identical, on_both, options, world_of},
 };
-use crate::support::{scenes, world_by};
+use crate::support::{meshes, scenes, world_by};
 
 fn on_device(scene: &FlatScene, options: &RenderOptions) -> Vec<Feature> {
     on_device_by(&world_of(scene), options)
@@ -116,6 +116,47 @@ fn device_and_cpu_count_the_same_steps() {
         assert!((sum(&a) / sum(&b) - 1.0).abs() < 0.01, "{traversal}: {} steps, {}", sum(&a), sum(&b));
         assert!(sum(&a) > 20.0 * a.len() as f64);
     }
+}
+
+/// The counts of paths are those of each pixel's first sample, however many samples a frame has, on the device as on
+/// the CPU.
+#[test]
+fn the_rays_of_the_first_sample_of_paths_are_counted() {
+    let mut scene = scenes::mixed_outdoors();
+    scenes::add(&mut scene, meshes::torus(6, 5), scenes::emissive(vec3(3.0, 2.0, 1.0)));
+    let context = device();
+    let build_options = BuildOptions { slabs: !context.is_software(), ..BuildOptions::default() };
+    let (world, world_of_cpu) = (world_of(&scene), world_by(&scene, &build_options));
+    for traversal in [Traversal::Mask, Traversal::Stack] {
+        let options = noting(RenderOptions { integrator: Integrator::Path, traversal, ..options(60, 45, 4) });
+        let on_device = |samples_log2| {
+            let mut renderer = Renderer::new(context.clone(), &world, &options).expect("a renderer");
+            renderer.set_samples_per_frame(samples_log2);
+            let profile = renderer.draw_sample().expect("samples");
+            (profile, renderer.features().expect("features"))
+        };
+        let on_cpu = |samples_log2| {
+            // A batch has several pixels and is not the whole picture.
+            let batching = Batching { n_pixels: 500, ..Batching::default() };
+            let mut renderer = cpu::Renderer::new(&world_of_cpu, &options, batching);
+            renderer.set_samples_per_frame(samples_log2);
+            (renderer.draw_sample(), renderer.features())
+        };
+        let [device, cpu] = [&on_device as &dyn Fn(u32) -> (Profile, Vec<Feature>), &on_cpu].map(|draw| {
+            let (profile, of_one) = draw(0);
+            let n_rays: u64 = profile.bounces.iter().map(|bounce| bounce.n_rays + bounce.n_shadow_rays).sum();
+            assert_eq!(of_one.iter().map(|feature| u64::from(feature.n_rays)).sum::<u64>(), n_rays, "{traversal}");
+            assert!(draw(2).1 == of_one, "{traversal}: the number of samples changes the features");
+            of_one
+        });
+        // Sines and cosines are rounded differently, so a few paths take another way.
+        for count in [|feature: &Feature| feature.n_rays, |feature: &Feature| feature.n_steps] {
+            let n_differing = device.iter().zip(&cpu).filter(|(a, b)| count(a) != count(b)).count();
+            assert!(n_differing <= device.len() / 20, "{traversal}: {n_differing} of {} pixels", device.len());
+        }
+        assert!(cpu.iter().all(|feature| feature.n_rays > 0) && cpu.iter().any(|feature| feature.n_rays > 4));
+    }
+    assert_silent(&context);
 }
 
 /// A ray through a tree of one leaf reads the leaf and its triangles. A ray that misses the tree reads nothing.

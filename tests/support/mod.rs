@@ -80,7 +80,7 @@ impl MeshWithTree {
     pub fn by_brute_force(&self, ray: &PathRay, t_min: f32) -> Hit {
         let (near, t_start) = near_scene(&self.inputs(), &SearchRay { t_min, ..SearchRay::from(ray) });
         let hit = brute::closest_hit(&self.triangles, &near);
-        Hit { t: if hit.triangle_ix == NO_TRIANGLE { ray.t_max } else { hit.t + t_start }, ..hit }
+        Hit { t: if hit.triangle_ix == NO_TRIANGLE { ray.t_max } else { (hit.t + t_start).min(ray.t_max) }, ..hit }
     }
 
     /// Returns the centre of the root's cell.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use kdray::{
     frame::{Aov, Picture},
-    output::{self, Format, HeatMap, Layers},
+    output::{self, Format, HeatMap, Layers, OutputError},
     scene::Scene,
 };
 
@@ -53,17 +53,26 @@ impl Files {
         Ok(self.beside().try_for_each(|path| output::check(path))?)
     }
 
+    /// Writes the picture before what lies beside it. A layer that cannot be written does not cost the picture: an .exr
+    /// is then written without layers.
+    ///
+    /// # Errors
+    /// A file cannot be written.
     pub fn write(&self, picture: &Picture, layers: &Layers) -> Result<(), CliError> {
         let is_exr = self.picture.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("exr"));
+        if !is_exr {
+            output::write_recorded(&self.picture, picture, layers.record)?;
+        }
         if let Some(path) = self.layers.as_ref().or(is_exr.then_some(&self.picture)) {
-            output::write_layers(path, picture, layers)?;
+            let written = output::write_layers(path, picture, layers);
+            if is_exr && matches!(written, Err(OutputError::Encode { .. })) {
+                output::write_layers(path, picture, &Layers { aovs: &[], ..*layers })?;
+            }
+            written?;
         }
         if let Some(path) = &self.heat_map {
             let values = layers.features.iter().map(|feature| feature.n_steps).collect();
             HeatMap { title: "steps a pixel", width: picture.width, height: picture.height, values }.write(path)?;
-        }
-        if !is_exr {
-            output::write_recorded(&self.picture, picture, layers.record)?;
         }
         Ok(())
     }
@@ -147,6 +156,22 @@ mod tests {
         for pattern in ["out.png", "a##/out.png", "#a#.png", ""] {
             assert!(numbered(Path::new(pattern), 1).is_err(), "{pattern}");
         }
+    }
+
+    #[test]
+    fn a_picture_outlives_a_layer_that_cannot_be_written() {
+        let directory = tempfile::tempdir().unwrap();
+        let picture =
+            Picture { width: 2, height: 1, radiance: vec![[0.5, 1.5, 2.5, 1.0]; 2], display: vec![[9, 8, 7, 255]; 2] };
+        for name in ["x.png", "y.exr"] {
+            let path = directory.path().join(name);
+            // No feature is there for the two pixels.
+            let layers = Layers { aovs: &[Aov::Depth], ..Layers::default() };
+            let error = Files::of(path.clone(), layers.aovs).write(&picture, &layers).unwrap_err();
+            assert!(error.to_string().contains("cannot encode"), "{error}");
+            assert_eq!(image::image_dimensions(&path).unwrap(), (2, 1), "{name}");
+        }
+        assert!(!directory.path().join("x.exr").exists(), "layers without their pixels");
     }
 
     #[test]

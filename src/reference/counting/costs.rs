@@ -25,10 +25,15 @@ pub fn count_rasterized(rays: &[PathRay], hits: &[Hit], pixel_features: &mut [Fe
     }
 }
 
-/// Adds the cost of rays whose closest hits were found by a search.
-pub fn count_closest(inputs: &KernelInputs, traversal: Traversal, rays: &[PathRay], pixel_features: &mut [Feature]) {
+/// Adds the cost of rays whose closest hits, or with `ANY_HIT` any hits, are found by a search.
+pub fn count_rays<const ANY_HIT: bool>(
+    inputs: &KernelInputs,
+    traversal: Traversal,
+    rays: &[PathRay],
+    pixel_features: &mut [Feature],
+) {
     let steps: Vec<_> = (rays.par_iter().with_min_len(RAYS_PER_TASK))
-        .map_init(|| Traverser::new(inputs, traversal), |traverser, ray| steps_of::<false>(inputs, traverser, ray))
+        .map_init(|| Traverser::new(inputs, traversal), |traverser, ray| steps_of::<ANY_HIT>(inputs, traverser, ray))
         .collect();
     for (ray, n_steps) in rays.iter().zip(steps) {
         add(pixel_features, ray, n_steps);
