@@ -67,17 +67,23 @@ fn each_frame_is_the_one_of_its_device() {
     let frames = format!("0-{}", 4 * indices.len() - 1);
     for more in [&["--integrator", "path", "--spp", "16"][..], &["--spp", "2", "--aov", "depth"]] {
         let more = [more, &["--primary", "trace", "--frames", &frames]].concat();
-        let (together, printed) = film(path, &list, &more);
-        assert_eq!(together.len(), 4 * indices.len());
-        assert!(printed.contains(&format!("{} devices: each drew whole frames", indices.len())), "{printed}");
+        let alone: Vec<_> = devices.iter().map(|it| (kind(it), film(path, &it.index.to_string(), &more).0)).collect();
         let named = kinds.iter().cloned().collect::<Vec<_>>().join("; ");
         let note = format!("note: the devices are of several kinds, which may round in different ways: {named}");
-        assert_eq!(printed.lines().any(|line| line == note), kinds.len() > 1, "{printed}");
-        let alone: Vec<_> = devices.iter().map(|it| (kind(it), film(path, &it.index.to_string(), &more).0)).collect();
         let mut seen = BTreeSet::new();
-        for (ix, frame) in together.iter().enumerate() {
-            let drawn_by = alone.iter().find(|(_, frames)| frames[ix] == *frame);
-            seen.insert(&drawn_by.unwrap_or_else(|| panic!("no device draws frame {ix} alone as it is")).0);
+        // On a busy machine, one device may draw all frames of a film before another one begins.
+        for _ in 0..20 {
+            let (together, printed) = film(path, &list, &more);
+            assert_eq!(together.len(), 4 * indices.len());
+            assert!(printed.contains(&format!("{} devices: each drew whole frames", indices.len())), "{printed}");
+            assert_eq!(printed.lines().any(|line| line == note), kinds.len() > 1, "{printed}");
+            for (ix, frame) in together.iter().enumerate() {
+                let drawn_by = alone.iter().find(|(_, frames)| frames[ix] == *frame);
+                seen.insert(&drawn_by.unwrap_or_else(|| panic!("no device draws frame {ix} alone as it is")).0);
+            }
+            if seen.len() == kinds.len() {
+                break;
+            }
         }
         assert_eq!(seen.len(), kinds.len(), "devices of all kinds have drawn frames");
     }

@@ -5,13 +5,12 @@ mod support;
 
 use std::{
     fs,
-    io::{BufRead, BufReader},
     path::Path,
     process::{Command, Stdio},
 };
 
 use support::{
-    command::{cornell, kdray, succeed},
+    command::{Messages, cornell, kdray, succeed},
     display::{Display, Screen},
 };
 use tempfile::TempDir;
@@ -59,8 +58,7 @@ fn changed_shaders_draw_and_broken_ones_do_not() {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    let mut messages = BufReader::new(viewer.stderr.take().unwrap()).lines();
-    let mut next = |prefix: &str| messages.find_map(|line| line.ok().filter(|line| line.starts_with(prefix))).unwrap();
+    let messages = Messages::of(&mut viewer);
     display.wait_until("the picture", |screen| picture.is_shown_on(screen));
 
     // The tone-mapping kernel swaps red and blue. Then the shader that draws the window swaps them back.
@@ -70,17 +68,17 @@ fn changed_shaders_draw_and_broken_ones_do_not() {
     display.wait_until("the changed shader's picture", |screen| picture.is_shown_on(screen));
 
     edit(&path(tonemap), "uvec3 bytes = ", "uvec3 bytes = no_such_word + ");
-    let warning = next("warning: glsl/passes/tonemap.comp:");
+    let warning = messages.wait_for("warning: glsl/passes/tonemap.comp:");
     assert!(warning.contains("no_such_word"), "{warning}");
     assert!(picture.is_shown_on(&display.screen()), "the previous shaders stay in use");
     edit(&path(layout), "#define TILE_SIZE 8u", "#define TILE_SIZE 4u");
     edit(&path(tonemap), "no_such_word + ", "255u - ");
-    next("warning: glsl/shared/layout.glsl: ");
+    messages.wait_for("warning: glsl/shared/layout.glsl: ");
     assert!(picture.is_shown_on(&display.screen()), "the previous shaders stay in use");
     edit(&path(layout), "#define TILE_SIZE 4u", "#define TILE_SIZE 8u");
     display.wait_until("the mended kernel's picture", |screen| inverted(&picture).is_shown_on(screen));
 
     display.focus("kdray");
     display.act(&["key", "Escape"]);
-    assert_eq!(viewer.wait().unwrap().code(), Some(0), "{:?}", messages.collect::<Vec<_>>());
+    assert_eq!(viewer.wait().unwrap().code(), Some(0));
 }

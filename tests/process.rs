@@ -14,11 +14,9 @@ use std::{
 
 use npyz::WriterBuilder;
 use rustix::process::{Pid, Signal, kill_process};
-use support::command::{cornell, kdray, names, stderr};
+use support::command::{PATIENCE, cornell, kdray, names, stderr};
 use tempfile::TempDir;
 
-/// Time limit of each wait. It is longer than anything here takes on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(120);
 const N_RAYS: u64 = 1_500_000;
 
 /// Creates a directory with a triangle and so many rays that writing their hits takes a while.
@@ -97,14 +95,19 @@ fn a_signal_leaves_the_target_whole_or_as_it_was_and_no_other_file() {
     let whole = fs::read(&target).unwrap();
     let mut n_interrupted = 0;
     let all = [&[Signal::INT][..], &[Signal::TERM], &[Signal::HUP], &[Signal::INT, Signal::INT, Signal::TERM]];
-    for (turn, signals) in all.iter().cycle().take(16).enumerate() {
+    // On a busy machine, the command often ends before a signal reaches it.
+    for (turn, signals) in all.iter().cycle().enumerate() {
+        if turn >= 16 && n_interrupted >= 4 {
+            break;
+        }
+        assert!(turn < 400, "only {n_interrupted} of {turn} were interrupted while they wrote");
         let before: &[u8] = if turn % 2 == 0 { b"old" } else { &whole[..0] };
         if before.is_empty() {
             let _ = fs::remove_file(&target);
         } else {
             fs::write(&target, before).unwrap();
         }
-        let status = interrupt(directory.path(), signals, Duration::from_millis(turn as u64 * 4));
+        let status = interrupt(directory.path(), signals, Duration::from_millis(turn as u64 % 16 * 4));
         match status.signal() {
             Some(signal) => {
                 assert!(signals.iter().any(|sent| sent.as_raw() == signal), "{status}");
@@ -118,7 +121,6 @@ fn a_signal_leaves_the_target_whole_or_as_it_was_and_no_other_file() {
             None => assert!(status.success() && fs::read(&target).unwrap() == whole, "turn {turn}: {status}"),
         }
     }
-    assert!(n_interrupted >= 4, "only {n_interrupted} of 16 were interrupted while they wrote");
 }
 
 #[test]

@@ -6,9 +6,11 @@ use std::{
     fs,
     path::Path,
     sync::{
-        Arc, Mutex,
-        atomic::{AtomicU32, Ordering},
+        Arc, Barrier, Mutex,
+        atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering},
     },
+    thread,
+    time::Duration,
 };
 
 use glam::Vec3;
@@ -195,15 +197,24 @@ fn a_device_may_fail_at_any_time() {
     for (n_samples, steps) in [(48, [1, 3]), (8, [3, 5])] {
         let [(one, _), _] = draw(vec![device()], &world, &options, n_samples);
         for (failing, step) in contexts.iter().zip(steps) {
-            let n_failures = (0..).step_by(step).take_while(|&n_creations| {
+            let has_failed = |n_creations| {
                 let mut renderer = Engine::on_devices(contexts.to_vec()).renderer(&world, &options).unwrap();
                 failing.fail_creations_after(Some(n_creations));
                 let (picture, drawn) = draw_next(&mut renderer, &world, n_samples);
                 failing.fail_creations_after(None);
                 assert!(picture == one, "{n_samples} samples, after {n_creations} creations");
                 !drawn.profile.device.starts_with("2 x ")
-            });
-            let n_failures = n_failures.count();
+            };
+            // On a busy machine the other device may do all of the work, and this one does not fail then.
+            let (mut n_failures, mut n_successes) = (0, 0);
+            for n_creations in (0..).step_by(step) {
+                let failed = has_failed(n_creations);
+                n_failures += u32::from(failed);
+                n_successes = if failed { 0 } else { n_successes + 1 };
+                if n_successes == 3 {
+                    break;
+                }
+            }
             assert!(n_failures > 3, "{n_samples} samples: {n_failures}");
         }
     }
@@ -227,13 +238,20 @@ struct DrawnFilm<E> {
 /// Number of samples of a frame of a film.
 const FRAME_SAMPLES: u32 = 3;
 
+/// Draws a film, of which each of the `n_devices` devices draws a frame at least.
 fn draw_film<E: From<GpuError> + Send>(
     film: &mut FilmRenderer,
+    n_devices: usize,
     cameras: &[Camera],
     finish: impl Fn(u32, Picture) -> Result<Picture, E> + Sync,
 ) -> DrawnFilm<E> {
     let (mut samples, failures) = (Samples::default(), Mutex::new(Vec::new()));
+    let (all_begin, n_begun) = (Barrier::new(n_devices), AtomicUsize::new(0));
     let draw = |renderer: &mut Renderer, frame_ix: u32, tell_sample: &dyn Fn()| {
+        // A device could draw all frames before the thread of another one begins.
+        if n_begun.fetch_add(1, Ordering::Relaxed) < n_devices {
+            all_begin.wait();
+        }
         let mut n_drawn = 0;
         let watcher = || {
             n_drawn += 1;
@@ -271,9 +289,9 @@ fn a_film_outlives_a_device() {
     for n_creations in 0.. {
         let mut film = engine.film_renderer(&world, &options).unwrap();
         contexts[1].fail_creations_after(Some(n_creations));
-        let first = draw_film(&mut film, &cameras, whole);
+        let first = draw_film(&mut film, 2, &cameras, whole);
         contexts[1].fail_creations_after(None);
-        let second = draw_film(&mut film, &cameras, whole);
+        let second = draw_film(&mut film, 2 - first.failures.len(), &cameras, whole);
         for film in [&first, &second] {
             assert!(film.frames.as_ref().unwrap() == &expected, "after {n_creations} creations");
             assert_eq!(film.n_samples, 4 * FRAME_SAMPLES, "samples that the watcher is told of");
@@ -288,7 +306,7 @@ fn a_film_outlives_a_device() {
     assert!((0..=FRAME_SAMPLES).all(|n_drawn| all_failures.contains(&n_drawn)), "{all_failures:?}");
     let mut film = engine.film_renderer(&world, &options).unwrap();
     contexts.iter().for_each(|context| context.fail_creations_after(Some(0)));
-    assert!(draw_film(&mut film, &cameras, whole).frames.is_err(), "no device is left");
+    assert!(draw_film(&mut film, 2, &cameras, whole).frames.is_err(), "no device is left");
     contexts.iter().for_each(|context| context.fail_creations_after(None));
 }
 
@@ -318,12 +336,21 @@ fn an_error_of_writing_ends_a_film() {
     let world = world(&options);
     let cameras = cameras(&world, 16);
     let mut film = Engine::on_devices(vec![device(), device()]).film_renderer(&world, &options).unwrap();
-    let n_written = AtomicU32::new(0);
+    let (n_written, is_refused) = (AtomicU32::new(0), AtomicBool::new(false));
     let refuse_third = |frame_ix: u32, picture: Picture| {
         n_written.fetch_add(1, Ordering::Relaxed);
-        if frame_ix == 2 { Err(GpuError::NoDriver) } else { Ok(picture) }
+        if frame_ix == 2 {
+            is_refused.store(true, Ordering::Relaxed);
+            return Err(GpuError::NoDriver);
+        }
+        // Frames after the third are not written before the film knows that it ends.
+        while frame_ix > 2 && !is_refused.load(Ordering::Relaxed) {
+            thread::yield_now();
+        }
+        thread::sleep(Duration::from_millis(if frame_ix > 2 { 500 } else { 0 }));
+        Ok(picture)
     };
-    let frames = draw_film(&mut film, &cameras, refuse_third).frames;
+    let frames = draw_film(&mut film, 2, &cameras, refuse_third).frames;
     assert!(matches!(frames, Err(GpuError::NoDriver)), "{frames:?}");
     let n_written = n_written.into_inner();
     assert!((3..=5).contains(&n_written), "{n_written} frames");

@@ -2,9 +2,17 @@
 
 use std::{
     fs,
+    io::{BufRead, BufReader},
     path::{Path, PathBuf},
-    process::{Command, Output, Stdio},
+    process::{Child, Command, Output, Stdio},
+    sync::mpsc::{Receiver, channel},
+    thread,
+    time::{Duration, Instant},
 };
+
+/// Time limit of each wait in the tests. It is longer than anything that they wait for takes on a busy machine. Pictures
+/// that take seconds alone have taken more than two minutes beside ten busy programs on two cores.
+pub const PATIENCE: Duration = Duration::from_secs(600);
 
 /// Returns the command with arguments, to be run in a directory.
 pub fn kdray(directory: &Path, arguments: &[&str]) -> Command {
@@ -51,6 +59,35 @@ pub fn fail(directory: &Path, arguments: &[&str], code: i32, named: &str) {
     assert_eq!(text.lines().last(), Some(errors[0]), "{arguments:?}");
     assert!(errors[0].contains(named), "{arguments:?}: {} does not name {named}", errors[0]);
     assert!(output.stdout.is_empty(), "{arguments:?}: {}", stdout(&output));
+}
+
+/// The lines that a running command writes to its standard error, which has to be piped.
+pub struct Messages(Receiver<String>);
+
+impl Messages {
+    /// Reads the lines on a thread of its own, so that the command never waits for the test.
+    pub fn of(command: &mut Child) -> Self {
+        let (send, receive) = channel();
+        let lines = BufReader::new(command.stderr.take().expect("a pipe")).lines();
+        // Sending fails when the test has ended.
+        thread::spawn(move || lines.map_while(Result::ok).for_each(|line| drop(send.send(line))));
+        Self(receive)
+    }
+
+    /// Waits for the next line that contains `part` and returns it. The lines before it are dropped.
+    ///
+    /// # Panics
+    /// No such line comes in time.
+    pub fn wait_for(&self, part: &str) -> String {
+        let begin = Instant::now();
+        loop {
+            let line = self.0.recv_timeout(PATIENCE.saturating_sub(begin.elapsed()));
+            let line = line.unwrap_or_else(|error| panic!("no message contains `{part}`: {error}"));
+            if line.contains(part) {
+                return line;
+            }
+        }
+    }
 }
 
 /// Returns the colours of a picture's file, without what the file says of its origin.

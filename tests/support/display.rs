@@ -1,7 +1,6 @@
 //! A display for a test: an X server without a screen, what it shows, and simulated keys and mouse.
 
 use std::{
-    fs,
     io::{BufRead, BufReader},
     path::{Path, PathBuf},
     process::{Child, Command, Stdio},
@@ -9,29 +8,31 @@ use std::{
     time::{Duration, Instant},
 };
 
-use tempfile::TempDir;
+use rustix::process::{Pid, Signal, kill_process};
 use x11rb::{
     connection::Connection,
     protocol::{
         Event,
         xproto::{
-            ClientMessageEvent, ConnectionExt, CreateWindowAux, EventMask, PropMode, SELECTION_NOTIFY_EVENT,
-            SelectionNotifyEvent, WindowClass,
+            ChangeWindowAttributesAux, ClientMessageEvent, ConnectionExt, CreateWindowAux, EventMask, ImageFormat,
+            ImageOrder, PropMode, SELECTION_NOTIFY_EVENT, SelectionNotifyEvent, WindowClass,
         },
     },
+    rust_connection::RustConnection,
     wrapper::ConnectionExt as _,
 };
 
-/// Longer than any picture takes to appear on a busy machine.
-pub const PATIENCE: Duration = Duration::from_secs(120);
+use super::command::PATIENCE;
 
 /// A running Xvfb.
 pub struct Display {
     server: Child,
     /// The value of the environment variable DISPLAY.
     pub name: String,
-    /// Holds the screen's memory, as an XWD file.
-    memory: TempDir,
+    /// Reads the screen. While it is open, the server does not reset itself, as it does when its last client leaves.
+    connection: RustConnection,
+    /// Index of the server's only screen.
+    screen_ix: usize,
 }
 
 /// The contents of a screen or of a picture file: rows from the top, RGB.
@@ -44,10 +45,8 @@ pub struct Screen {
 
 impl Display {
     pub fn start(width: u32, height: u32) -> Self {
-        let memory = TempDir::new().unwrap();
         let mut server = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-nolisten", "tcp", "-screen", "0", &format!("{width}x{height}x24"), "-fbdir"])
-            .arg(memory.path())
+            .args(["-displayfd", "1", "-nolisten", "tcp", "-screen", "0", &format!("{width}x{height}x24")])
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
@@ -55,19 +54,22 @@ impl Display {
         let mut number = String::new();
         BufReader::new(server.stdout.take().unwrap()).read_line(&mut number).unwrap();
         assert!(!number.trim().is_empty(), "Xvfb found no free display");
-        Self { server, name: format!(":{}", number.trim()), memory }
+        let name = format!(":{}", number.trim());
+        let (connection, screen_ix) = x11rb::connect(Some(&name)).expect("a connection to Xvfb");
+        Self { server, name, connection, screen_ix }
     }
 
-    /// Returns what the screen shows at present.
+    /// Returns what the screen shows at present, without the mouse pointer. The server draws the pointer into the
+    /// memory of its screen, also if it lies over a window from outside, so the pixels are not read from there.
     pub fn screen(&self) -> Screen {
-        let xwd = fs::read(self.memory.path().join("Xvfb_screen0")).unwrap();
-        let field = |ix: usize| u32::from_be_bytes(xwd[4 * ix..4 * ix + 4].try_into().unwrap()) as usize;
-        let [header, width, height, bits, stride, n_colors] = [0, 4, 5, 11, 12, 19].map(field);
-        assert_eq!((field(2), bits, field(7)), (2, 32, 0), "32 bits a pixel, the lowest byte first");
-        let pixels = &xwd[header + 12 * n_colors..];
-        let row = |y: usize| (0..width).map(move |x| &pixels[y * stride + 4 * x..][..4]);
-        let pixels = (0..height).flat_map(|y| row(y).map(|bgrx| [bgrx[2], bgrx[1], bgrx[0]])).collect();
-        Screen { width, height, pixels }
+        let setup = self.connection.setup();
+        let root = &setup.roots[self.screen_ix];
+        let (width, height) = (root.width_in_pixels, root.height_in_pixels);
+        let image = self.connection.get_image(ImageFormat::Z_PIXMAP, root.root, 0, 0, width, height, !0).unwrap();
+        let image = image.reply().expect("the screen's image");
+        let (width, height) = (usize::from(width), usize::from(height));
+        assert_eq!((setup.image_byte_order, image.data.len()), (ImageOrder::LSB_FIRST, 4 * width * height));
+        Screen { width, height, pixels: image.data.chunks_exact(4).map(|bgrx| [bgrx[2], bgrx[1], bgrx[0]]).collect() }
     }
 
     /// Waits until `is_so` is true of the screen.
@@ -89,14 +91,13 @@ impl Display {
 
     /// Closes a window as a window manager does when its user clicks the close button.
     pub fn close(&self, window: &str) {
-        let (connection, _) = x11rb::connect(Some(&self.name)).expect("a connection to Xvfb");
+        let connection = &self.connection;
         let atom = |name: &str| connection.intern_atom(false, name.as_bytes()).unwrap().reply().unwrap().atom;
         let window = window.parse().expect("a window's id");
         let data = [atom("WM_DELETE_WINDOW"), x11rb::CURRENT_TIME, 0, 0, 0];
         let message = ClientMessageEvent::new(32, window, atom("WM_PROTOCOLS"), data);
         connection.send_event(false, window, EventMask::NO_EVENT, message).unwrap();
-        // The server may drop what it has not read yet when a connection ends, so the test waits for a reply.
-        connection.get_input_focus().unwrap().reply().expect("a reply after the message");
+        connection.flush().unwrap();
     }
 
     /// Drops a file on a window as a file manager does, by the protocol XDND, and waits until the window has taken it.
@@ -145,10 +146,24 @@ impl Display {
         }
     }
 
-    /// Waits for the window of a name and gives it the keyboard focus, since there is no window manager that would.
-    /// Returns the window's id.
+    /// Gives the screen a mouse pointer that is drawn, and moves it to a point in pixels.
+    pub fn show_pointer(&self, x: i16, y: i16) {
+        let (connection, root) = (&self.connection, self.connection.setup().roots[self.screen_ix].root);
+        let [font, cursor] = [(), ()].map(|()| connection.generate_id().unwrap());
+        connection.open_font(font, b"cursor").unwrap();
+        // A black arrow with a white edge: the glyph 68 and its mask.
+        connection.create_glyph_cursor(cursor, font, font, 68, 69, 0, 0, 0, !0, !0, !0).unwrap();
+        let look = ChangeWindowAttributesAux::new().cursor(cursor);
+        connection.change_window_attributes(root, &look).unwrap().check().expect("a pointer");
+        connection.warp_pointer(x11rb::NONE, root, 0, 0, 0, 0, x, y).unwrap().check().expect("a motion");
+    }
+
+    /// Waits until a window of a name is visible and gives it the keyboard focus, since there is no window manager that
+    /// would. Returns the window's id.
     pub fn focus(&self, name: &str) -> String {
-        let window = self.act(&["search", "--sync", "--name", name]).lines().last().unwrap().to_owned();
+        // The server refuses to give the focus to a window that has its name but is not shown yet.
+        let found = self.act(&["search", "--sync", "--onlyvisible", "--name", name]);
+        let window = found.lines().last().unwrap().to_owned();
         self.act(&["windowfocus", "--sync", &window]);
         window
     }
@@ -156,7 +171,8 @@ impl Display {
 
 impl Drop for Display {
     fn drop(&mut self) {
-        let _ = self.server.kill();
+        // The server removes its lock and its socket from /tmp when it is asked to end, but not when it is killed.
+        let _ = kill_process(Pid::from_child(&self.server), Signal::TERM);
         let _ = self.server.wait();
     }
 }

@@ -6,6 +6,7 @@ pub mod chain;
 pub mod command;
 pub mod compare;
 pub mod devices;
+#[cfg(target_os = "linux")]
 pub mod display;
 pub mod meshes;
 pub mod packets;

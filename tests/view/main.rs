@@ -19,8 +19,8 @@ use std::{
 
 use serde_json::Value;
 use support::{
-    command::{cornell, kdray, names, stderr, stdout, succeed},
-    display::{Display, PATIENCE, Screen},
+    command::{PATIENCE, cornell, kdray, names, stderr, stdout, succeed},
+    display::{Display, Screen},
 };
 use tempfile::TempDir;
 
@@ -190,6 +190,24 @@ fn the_window_shows_the_picture_and_the_overlay_over_it() {
     assert_eq!(Screen::load(&directory.path().join("cornell-001.png")), picture);
 }
 
+/// The server draws the pointer over the window, but tests see the picture without it.
+#[test]
+fn a_pointer_over_the_picture_hides_nothing_from_tests() {
+    let (directory, display) = (TempDir::new().unwrap(), Display::start(320, 240));
+    let picture = rendered(directory.path(), &cornell(), &[]);
+    let viewer = viewer(directory.path(), &display, &cornell(), &["--spp", "1", "--no-overlay", "-q"]);
+    display.wait_until("the picture", |screen| picture.is_shown_on(screen));
+    let before = display.screen();
+    // Over the picture, and beside it, whence the pointer's edge reaches into the picture.
+    for (x, y) in [(80, 60), (159, 119), (161, 60)] {
+        display.show_pointer(x, y);
+        assert!(display.screen() == before, "{x}, {y}");
+    }
+    display.focus("kdray");
+    display.act(&["key", "Escape"]);
+    ended(viewer);
+}
+
 #[test]
 fn keys_and_mouse_move_the_camera_and_home_brings_it_back() {
     let (directory, display) = (TempDir::new().unwrap(), Display::start(320, 240));
@@ -197,8 +215,12 @@ fn keys_and_mouse_move_the_camera_and_home_brings_it_back() {
     let viewer = viewer(directory.path(), &display, &cornell(), &["--spp", "1", "--no-overlay", "-q"]);
     display.wait_until("the picture", |screen| picture.is_shown_on(screen));
     display.focus("kdray");
-    let moves: [&[&str]; 9] = [
-        &["keydown", "w", "sleep", "0.3", "keyup", "w"],
+    // A key that goes down and up between two frames moves nothing, so it is held until the screen shows the motion.
+    display.act(&["keydown", "w"]);
+    display.wait_until("another view", |screen| !picture.is_shown_on(screen));
+    display.act(&["keyup", "w", "key", "Home"]);
+    display.wait_until("the first view", |screen| picture.is_shown_on(screen));
+    let moves: [&[&str]; 8] = [
         &["mousemove", "80", "60", "mousedown", "1", "mousemove", "120", "60", "mouseup", "1"],
         &["mousemove", "80", "60", "mousedown", "3", "mousemove", "120", "60", "mouseup", "3"],
         &["mousemove", "80", "60", "mousedown", "2", "mousemove", "100", "70", "mouseup", "2"],

@@ -12,7 +12,7 @@ use tempfile::TempDir;
 use super::{
     ended,
     support::{
-        command::{shipped, stdout, succeed},
+        command::{PATIENCE, shipped, stdout, succeed},
         display::{Display, Screen},
     },
     viewer_of_size,
@@ -52,7 +52,7 @@ fn previews(display: &Display, framed: &Screen, picture: &Screen) -> bool {
         // Two equal screens in a row show a complete frame and not one that is just being drawn.
         is_previewed |= screen == before && screen != *framed;
         before = screen;
-        assert!(start.elapsed() < Duration::from_secs(120), "the picture never came");
+        assert!(start.elapsed() < PATIENCE, "the picture never came");
     }
 }
 
