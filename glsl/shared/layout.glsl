@@ -896,8 +896,8 @@ struct Guide {
 // - `environment_width`, `environment_height`: size of the map, texels.
 // - `environment_turn`: by which the map is turned about +y, in turns, counter-clockwise as seen from above.
 // - `origin_reach`: the greatest magnitude of a coordinate of a ray's origin up to which the origin is not moved (world
-//   units). It is `KD_MAX_ORIGIN_DISTANCE` times the greatest magnitude of a coordinate of the box, or less in a
-//   kd-tree with several scales (src/accel/kdtree/scales.rs).
+//   units). It is `KD_MAX_ORIGIN_DISTANCE` times the greatest magnitude of a coordinate of the box, or less if
+//   the triangles have several scales (src/accel/kdtree/scales.rs).
 // - The rest: the device address of each of the scene's arrays, low word first. 0 if kernels read the array by its
 //   binding.
 struct AccelConstants {

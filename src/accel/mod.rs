@@ -15,8 +15,8 @@ use self::{
     kdtree::{BuildOptions, KdTree},
 };
 pub use self::{query::Query, statistics::Statistics};
+use crate::layout::Triangle;
 pub use crate::layout::{Hit, NO_TRIANGLE, Ray};
-use crate::layout::{KD_MAX_ORIGIN_DISTANCE, Triangle};
 use crate::util::progress::Progress;
 
 /// An acceleration structure over the triangles of a world.
@@ -119,10 +119,7 @@ impl Accel {
     pub fn origin_reach(&self) -> f32 {
         match self {
             Self::KdTree(tree) => tree.constants().origin_reach,
-            Self::Grid(_) => {
-                let [least, greatest] = self.bounds();
-                KD_MAX_ORIGIN_DISTANCE * least.abs().max(greatest.abs()).max_element()
-            }
+            Self::Grid(grid) => grid.origin_reach(),
         }
     }
 }

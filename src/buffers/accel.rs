@@ -162,7 +162,8 @@ impl AccelBuffers {
         let built = builder.build(Some(&timer), BufferUse::Texels)?;
         drop(builder); // its memory is larger than the grid's
         grid.note(built.report(triangles.len()));
-        let (constants, structure) = (built.constants(), Structure::Grid { n_levels: built.n_levels });
+        let constants = built.constants(grid.origin_reach());
+        let structure = Structure::Grid { n_levels: built.n_levels };
         let contents = Contents {
             triangles: Content::OnDevice(on_device),
             grid_cells: Content::OnDevice(built.cells),

@@ -251,8 +251,9 @@ mod tests {
             reporter.progress(Work::Reading, share);
         }
         reporter.progress(Work::Building, 0.5);
-        // A file that is loaded at once.
-        Reporter { path, begun: Instant::now(), last: Mutex::default(), send }.progress(Work::Reading, 0.5);
+        // A file that is loaded at once, however long this thread is stopped here.
+        let begun = Instant::now() + 1000 * SHOWN_AFTER;
+        Reporter { path, begun, last: Mutex::default(), send }.progress(Work::Reading, 0.5);
         let expected = ["reading 0 %", "reading 42 %", "reading 100 %", "building 50 %"];
         assert_eq!(*sent.lock().unwrap(), expected.map(|what| format!("opening a.obj: {what}")));
     }

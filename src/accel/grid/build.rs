@@ -4,7 +4,10 @@ use rayon::prelude::*;
 
 use super::{Grid, GridLevels, GridOptions, Lattice, overlap::Columns, planes::plane_of};
 use crate::{
-    accel::bounds::{Bounds, is_finite},
+    accel::{
+        bounds::{Bounds, is_finite},
+        kdtree::scales::Scales,
+    },
     layout::{GRID_MAX_ATTEMPTS, GRID_MAX_BLOCK_RESOLUTION, GRID_MAX_COUNT, GRID_MAX_HALVINGS, GridCell, Triangle},
 };
 
@@ -67,6 +70,7 @@ impl Grid {
             leaf_triangles,
             n_triangles: triangles.len(),
             n_coarser: lowest.n_coarser,
+            origin_reach: Scales::new(triangles, &exact_bounds).origin_reach(largest_coordinate),
         }
     }
 }

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::{
     accel::bounds::Bounds,
-    layout::{AccelConstants, GRID_MAX_RESOLUTION, KD_MAX_ORIGIN_DISTANCE, KD_PLANE_EPSILON},
+    layout::{AccelConstants, GRID_MAX_RESOLUTION, KD_PLANE_EPSILON},
 };
 
 /// Cubes side by side that fill a box, beginning at its least corner. At its greatest corner the box may cut some of
@@ -154,15 +154,15 @@ impl Lattice {
         [cell_ix % n_x, cell_ix / n_x % n_y, cell_ix / n_x / n_y]
     }
 
-    /// Returns the uniform constants that kernels need of a grid with these cells on its upper level.
-    pub fn constants(&self) -> AccelConstants {
+    /// Returns the uniform constants that kernels need of a grid with these cells on its upper level. `origin_reach`:
+    /// that of the grid's triangles (kdtree/scales.rs), world units.
+    pub fn constants(&self, origin_reach: f32) -> AccelConstants {
         let [box_min, box_max] = self.bounds();
         let [n_cells_x, n_cells_y, n_cells_z] = self.n_cells;
-        let largest_coordinate = self.largest_coordinate();
         AccelConstants {
             box_min,
-            plane_epsilon: KD_PLANE_EPSILON * largest_coordinate,
-            origin_reach: KD_MAX_ORIGIN_DISTANCE * largest_coordinate,
+            plane_epsilon: KD_PLANE_EPSILON * self.largest_coordinate(),
+            origin_reach,
             box_max,
             n_cells_x,
             n_cells_y,

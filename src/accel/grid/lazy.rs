@@ -8,7 +8,10 @@ use glam::Vec3;
 use serde::Serialize;
 
 use super::{Grid, GridOptions, Statistics};
-use crate::{accel::bounds::Bounds, layout::Triangle};
+use crate::{
+    accel::{bounds::Bounds, kdtree::scales::Scales},
+    layout::Triangle,
+};
 
 /// A grid over some triangles that is built on demand: its options, the host's grid if that is built, and the report
 /// of the first device that has built one.
@@ -17,6 +20,7 @@ pub struct LazyGrid {
     options: GridOptions,
     n_triangles: usize,
     bounds: [Vec3; 2],
+    origin_reach: f32,
     on_host: OnceLock<Grid>,
     on_device: OnceLock<DeviceBuild>,
 }
@@ -45,12 +49,13 @@ pub struct BuildStage {
 impl LazyGrid {
     /// Keeps the options of a grid over these triangles. The grid itself is not built.
     pub fn new(triangles: &[Triangle], options: GridOptions) -> Self {
-        let bounds = Bounds::of_all(triangles);
-        let Bounds { min, max } = bounds.grown(bounds.margin());
+        let exact_bounds = Bounds::of_all(triangles);
+        let bounds = exact_bounds.grown(exact_bounds.margin());
         Self {
             options,
             n_triangles: triangles.len(),
-            bounds: [min.into(), max.into()],
+            bounds: [bounds.min.into(), bounds.max.into()],
+            origin_reach: Scales::new(triangles, &exact_bounds).origin_reach(bounds.largest_coordinate()),
             on_host: OnceLock::new(),
             on_device: OnceLock::new(),
         }
@@ -100,5 +105,11 @@ impl LazyGrid {
     /// The least and the greatest corner of the grid's box, which holds all triangles, world units.
     pub fn bounds(&self) -> [Vec3; 2] {
         self.bounds
+    }
+
+    /// The greatest magnitude of a coordinate of a ray's origin up to which a search does not move the origin, world
+    /// units.
+    pub fn origin_reach(&self) -> f32 {
+        self.origin_reach
     }
 }

@@ -42,6 +42,7 @@ pub struct Grid {
     leaf_planes: Vec<Plane>,
     n_triangles: usize,
     n_coarser: u32,
+    origin_reach: f32,
 }
 
 /// Build options of a grid.
@@ -121,7 +122,7 @@ impl GridOptions {
 impl Grid {
     /// Returns the uniform constants that kernels need in addition to the grid's arrays.
     pub fn constants(&self) -> AccelConstants {
-        self.lattice.constants()
+        self.lattice.constants(self.origin_reach)
     }
 
     /// The lattice of the upper level's cells.

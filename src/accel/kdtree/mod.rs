@@ -23,7 +23,7 @@ mod parts;
 mod planes;
 mod ropes;
 mod sah;
-mod scales;
+pub(super) mod scales;
 mod search;
 mod slabs;
 mod statistics;

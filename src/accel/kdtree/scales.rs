@@ -27,6 +27,10 @@
 //!   bounds.rs does not. So the epsilons in a cell are multiples of the cell's length too, if that is greater.
 //!
 //! A moved ray is tested against all triangles from its new origin, so an edge has no gap between its triangles.
+//!
+//! Grids treat all places alike, by the length m. Yet they move origins as the tree of the same triangles does, since a
+//! moved origin is rounded, and all structures are to find the same hits. The proof in bounds.rs holds for a moved
+//! origin, too, as it is nearer to 0.
 
 use rayon::prelude::*;
 

@@ -8,9 +8,10 @@ use crate::{
 };
 
 impl DeviceGrid {
-    /// Returns the constants for kernels that trace rays through the grid.
-    pub fn constants(&self) -> AccelConstants {
-        self.lattice.constants()
+    /// Returns the constants for kernels that trace rays through the grid. `origin_reach`: that of the grid's triangles
+    /// (accel/kdtree/scales.rs), world units.
+    pub fn constants(&self, origin_reach: f32) -> AccelConstants {
+        self.lattice.constants(origin_reach)
     }
 
     /// Returns the grid's statistics, which are the same as those of the host's grid.
