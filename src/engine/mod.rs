@@ -68,14 +68,10 @@ impl Engine {
     }
 
     /// Uses several Vulkan devices that are already open. They share the drawing of a picture or of the frames of a
-    /// film. Everything else is done by the first one.
-    ///
-    /// # Panics
-    /// There are no devices.
+    /// film. Everything else is done by the first one. If there are none, the engine runs on the CPU.
     pub fn on_devices(contexts: Vec<Arc<Context>>) -> Self {
         let mut contexts = contexts.into_iter();
-        let first = contexts.next().expect("at least one device");
-        Self { others: contexts.collect(), ..Self::on_device(first) }
+        Self { context: contexts.next(), others: contexts.collect(), ..Self::on_cpu() }
     }
 
     /// Uses the CPU without Vulkan, on the current rayon pool.
@@ -145,7 +141,7 @@ impl Engine {
     /// Does what [`Engine::build`] does, with a scene that is already flattened.
     ///
     /// # Errors
-    /// The scene has a triangle without a material.
+    /// The scene's parts do not fit together: see [`Mismatch`].
     pub fn build_flat(&self, scene: FlatScene, workload: &Workload) -> Result<Built, Mismatch> {
         let accel = self.choose_accel(scene.triangles.len(), workload);
         let world = World::with_accel_observed(scene, &accel.options(self.processor()), &self.progress)?;
@@ -164,7 +160,7 @@ impl Engine {
     /// Creates a renderer, which can draw many pictures of one world.
     ///
     /// # Errors
-    /// The scene or a row of the picture is beyond the device's limits or memory.
+    /// An option is out of its range, or the scene or a row of the picture is beyond the device's limits or memory.
     pub fn renderer(&self, world: &World, options: &RenderOptions) -> Result<Renderer, GpuError> {
         let contexts: Vec<_> = self.contexts().cloned().collect();
         Renderer::new(&contexts, world, options)
@@ -173,13 +169,13 @@ impl Engine {
     /// Creates renderers that draw the frames of a film, one on each device.
     ///
     /// # Errors
-    /// The scene or a row of the picture is beyond the limits or the memory of a device.
-    ///
-    /// # Panics
-    /// The engine runs on the CPU.
+    /// The engine runs on the CPU, an option is out of its range, or the scene or a row of the picture is beyond the
+    /// limits or the memory of a device.
     pub fn film_renderer(&self, world: &World, options: &RenderOptions) -> Result<FilmRenderer, GpuError> {
         let contexts: Vec<_> = self.contexts().cloned().collect();
-        assert!(!contexts.is_empty(), "at least one device");
+        if contexts.is_empty() {
+            return Err(GpuError::Lacks { device: "CPU".to_owned(), missing: "renderers of films".to_owned() });
+        }
         FilmRenderer::new(&contexts, world, options)
     }
 
@@ -197,6 +193,7 @@ impl Engine {
     /// # Errors
     /// Fails as [`Engine::methods`] and [`Engine::renderer`] do, or if a call fails.
     pub fn render(&self, world: &World, options: &RenderOptions) -> Result<Rendered, GpuError> {
+        options.check()?;
         let scene = world.scene();
         let workload = Workload::of_pictures(options, scene.lights.len(), 1).with_cameras([&scene.camera].into_iter());
         let options = self.methods(world, &workload)?.apply(options);
