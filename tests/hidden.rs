@@ -96,7 +96,8 @@ fn the_cpu_finds_what_is_not_hidden() {
         let rays = case.rays();
         let expected = case.by_brute_force(&rays);
         for &traversal in Traversal::ALL {
-            let caster = CpuCaster::new(case.mesh.geometry(), traversal).hiding(&case.hidden);
+            let caster =
+                CpuCaster::new(case.mesh.geometry(), traversal).hiding(&case.hidden).expect("hidden triangles");
             compare::exact(&expected, &caster.cast(&rays, Query::Closest))
                 .unwrap_or_else(|e| panic!("{traversal}: {e}"));
             let any = caster.cast(&rays, Query::Any);

@@ -1,10 +1,13 @@
 //! What all fuzz targets share.
 
+#[path = "../../tests/support/assembled.rs"]
+pub mod assembled;
 #[path = "../../tests/support/hostile.rs"]
 pub mod hostile;
 
 use std::sync::OnceLock;
 
+use kdray::engine::Engine;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
 use self::hostile::{Format, Reader};
@@ -42,4 +45,10 @@ pub fn prepare() {
 pub fn check(format: Format, content: &[u8]) {
     static READER: OnceLock<Reader> = OnceLock::new();
     READER.get_or_init(Reader::new).check(format, content);
+}
+
+/// Assembles a world, options and rays of the bytes, and draws and casts on the CPU.
+pub fn check_world(bytes: &[u8]) {
+    static ENGINE: OnceLock<Engine> = OnceLock::new();
+    assembled::check(ENGINE.get_or_init(Engine::on_cpu), bytes);
 }

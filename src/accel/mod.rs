@@ -11,7 +11,7 @@ pub mod wide_bvh;
 use glam::Vec3;
 
 use self::{
-    grid::{GridOptions, LazyGrid},
+    grid::{GridLevels, GridOptions, LazyGrid},
     kdtree::{BuildOptions, KdTree},
 };
 pub use self::{query::Query, statistics::Statistics};
@@ -36,6 +36,35 @@ pub enum AccelOptions {
     /// Options of a grid.
     Grid(GridOptions),
 }
+
+impl AccelOptions {
+    /// Returns what is out of range. Other costs could split empty cells without an end, and other densities ask for
+    /// more cells than there is memory.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let within = |name: &str, value: f32, least: f32, most: f32| match value >= least && value <= most {
+            true => Ok(()),
+            false => Err(format!("{name} is {value}, not {least:e} to {most:e}")),
+        };
+        let density = |name: &str, value: f32| within(name, value, f32::MIN_POSITIVE, MOST_DENSITY);
+        match self {
+            Self::KdTree(options) => {
+                within("traversal_cost", options.traversal_cost, 0.0, f32::MAX)?;
+                within("intersection_cost", options.intersection_cost, 0.0, f32::MAX)?;
+                within("empty_bonus", options.empty_bonus, 0.0, 1.0)
+            }
+            Self::Grid(GridOptions { levels: GridLevels::Uniform { density: cells }, .. }) => {
+                density("density", *cells)
+            }
+            Self::Grid(GridOptions { levels: GridLevels::Two { upper_density, lower_density }, .. }) => {
+                density("upper_density", *upper_density)?;
+                density("lower_density", *lower_density)
+            }
+        }
+    }
+}
+
+/// The most cells of a grid for each triangle. More of them take longer to build and to cross than they save.
+const MOST_DENSITY: f32 = 1024.0;
 
 /// The kinds of acceleration structures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

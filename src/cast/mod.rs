@@ -33,6 +33,7 @@ use crate::{
     },
     buffers::{AccelBuffers, CastResources, Round, hidden_words},
     cpu,
+    frame::{BadOptions, check::check},
     gpu::{Access, BindingLayout, CommandBuffer, Context, Device, GpuError, Limits, Statistic, Timer},
     layout::{PathRay, RAY_GROUP_SIZE},
     passes, reference,
@@ -54,6 +55,9 @@ pub struct CastResult {
 
 /// Number of rays in a batch: 64 MiB of rays and 32 MiB of hits, enough to fill a large GPU many times over.
 pub const RAYS_PER_BATCH: usize = 1 << 21;
+
+/// The most repetitions of a cast.
+pub const MOST_REPETITIONS: u32 = 10_000;
 
 /// Casts rays on a device, which holds the triangles and their acceleration structure.
 pub struct Caster {
@@ -96,11 +100,9 @@ impl Caster {
     /// Makes rays pass through the triangles with these indices. A second call replaces the indices of the first.
     ///
     /// # Errors
-    /// The buffers are beyond the device's limits or memory.
-    ///
-    /// # Panics
-    /// There is no triangle with one of the indices.
+    /// There is no triangle with one of the indices, or the buffers are beyond the device's limits or memory.
     pub fn hiding(mut self, triangles: &[u32]) -> Result<Self, GpuError> {
+        check_indices(self.tree.arrays.triangles.len(), triangles)?;
         self.tree.hide(&self.context, triangles)?;
         self.bindings = CastResources::bindings(&self.context, &self.tree)?;
         self.resources = CastResources::new(&self.context, &self.bindings, &self.tree, 0)?;
@@ -118,8 +120,9 @@ impl Caster {
     /// hits.
     ///
     /// # Errors
-    /// Memory runs out, or a call fails.
+    /// There are more than [`MOST_REPETITIONS`], memory runs out, or a call fails.
     pub fn cast(&mut self, rays: &[Ray], query: Query, n_times: u32) -> Result<CastResult, GpuError> {
+        check_repetitions(n_times)?;
         self.prepare(query, rays.len())?;
         let mut hits = Vec::with_capacity(rays.len());
         let mut gpu_ms = Some(vec![0.0; n_times.max(1) as usize]);
@@ -202,6 +205,18 @@ impl Caster {
     }
 }
 
+/// Checks the number of repetitions of a cast.
+pub(crate) fn check_repetitions(n_times: u32) -> Result<(), BadOptions> {
+    check("n_times", n_times, n_times <= MOST_REPETITIONS, || format!("at most {MOST_REPETITIONS}"))
+}
+
+/// Checks the indices of triangles that are to be hidden.
+fn check_indices(n_triangles: usize, triangles: &[u32]) -> Result<(), BadOptions> {
+    let missing = triangles.iter().find(|triangle_ix| **triangle_ix as usize >= n_triangles);
+    let error = |ix: &u32| BadOptions(format!("triangle {ix} cannot be hidden: there are {n_triangles} triangles"));
+    missing.map_or(Ok(()), |ix| Err(error(ix)))
+}
+
 /// Returns the largest number of rays in a batch on a device.
 fn most_rays(limits: &Limits) -> usize {
     let bytes_per_ray = mem::size_of::<Ray>().max(mem::size_of::<Hit>()) as u64;
@@ -233,11 +248,12 @@ impl<'a> CpuCaster<'a> {
 
     /// Makes rays pass through the triangles with these indices. A second call replaces the indices of the first.
     ///
-    /// # Panics
+    /// # Errors
     /// There is no triangle with one of the indices.
-    #[must_use]
-    pub fn hiding(self, triangles: &[u32]) -> Self {
-        Self { hidden: Some(hidden_words(self.geometry.triangles().len(), triangles)), ..self }
+    pub fn hiding(self, triangles: &[u32]) -> Result<Self, BadOptions> {
+        let n_triangles = self.geometry.triangles().len();
+        check_indices(n_triangles, triangles)?;
+        Ok(Self { hidden: Some(hidden_words(n_triangles, triangles)), ..self })
     }
 
     /// Casts rays, and returns one hit for each.

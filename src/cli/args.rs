@@ -107,7 +107,7 @@ pub struct RenderArgs {
     pub tile: Option<Tile>,
     /// Samples per pixel, 1 to 65536: the first sample is at the pixel's centre, further ones smooth edges [default:
     /// the scene file's, else 1; 4 for a mesh file; 1 with --trace]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=65_536))]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=i64::from(SampleRange::MOST)))]
     pub spp: Option<u32>,
     /// Draw as many samples of each pixel as fit into this time, at least one, for example 30s or 5m; loading and
     /// building do not count
@@ -446,19 +446,14 @@ pub struct Size {
     pub height: u32,
 }
 
-impl Size {
-    /// Longest side of an image that common GPUs support, in pixels.
-    const MAX_SIDE: u32 = 16384;
-}
-
 impl FromStr for Size {
     type Err = String;
 
     fn from_str(word: &str) -> Result<Self, String> {
-        let side = |digits: &str| digits.parse().ok().filter(|side| (1..=Self::MAX_SIDE).contains(side));
+        let side = |digits: &str| digits.parse().ok().filter(|side| (1..=RenderOptions::MOST_SIDE).contains(side));
         word.split_once('x')
             .and_then(|(width, height)| Some(Self { width: side(width)?, height: side(height)? }))
-            .ok_or_else(|| format!("expected WIDTHxHEIGHT, each 1 to {}", Self::MAX_SIDE))
+            .ok_or_else(|| format!("expected WIDTHxHEIGHT, each 1 to {}", RenderOptions::MOST_SIDE))
     }
 }
 

@@ -23,7 +23,7 @@ pub struct PictureArgs {
     pub integrator: Option<Integrator>,
     /// Levels of rays per pixel, 1 to 64: 1 traces primary rays only, and each further level adds one bounce of
     /// reflected and refracted rays; shadow rays are not counted [default: the scene's]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=64))]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=i64::from(RenderOptions::MOST_DEPTH)))]
     pub max_depth: Option<u32>,
     /// Noise filter for the finished picture; edge needs --integrator path [default: the scene's]
     #[arg(long, value_name = "paper|edge|off")]
@@ -272,7 +272,8 @@ pub enum DenoiseWord {
 
 /// Parses `--denoise-threshold`, 0 to 4.
 fn threshold(word: &str) -> Result<f32, String> {
-    word.parse().ok().filter(|x| (0.0..=4.0).contains(x)).ok_or_else(|| "expected a number from 0 to 4".into())
+    let most = RenderOptions::MOST_THRESHOLD;
+    word.parse().ok().filter(|x| (0.0..=most).contains(x)).ok_or_else(|| format!("expected a number from 0 to {most}"))
 }
 
 /// Parses a finite number above 0.

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{ValueEnum, value_parser};
-use kdray::{gpu::DeviceSelector, view::InMotion};
+use kdray::{frame::SampleRange, gpu::DeviceSelector, view::InMotion};
 
 use super::{
     device_args::device,
@@ -28,7 +28,7 @@ pub struct ViewArgs {
     #[command(flatten)]
     pub picture: PictureArgs,
     /// Samples per pixel while the camera rests, 1 to 65536 [default: 256; 1 with --frames or --path]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=65_536))]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=i64::from(SampleRange::MOST)))]
     pub spp: Option<u32>,
     #[arg(long, value_name = "PICTURE", default_value = "whitted", hide_default_value = true)]
     #[arg(help = with_words(IN_MOTION, Some("whitted"), &InMotion::words()))]

@@ -33,14 +33,11 @@ impl<'a> Caster<'a> {
     /// Makes rays pass through the triangles with these indices. A second call replaces the indices of the first.
     ///
     /// # Errors
-    /// The buffers are beyond the device's limits or memory.
-    ///
-    /// # Panics
-    /// There is no triangle with one of the indices.
+    /// There is no triangle with one of the indices, or the buffers are beyond the device's limits or memory.
     pub fn hiding(self, triangles: &[u32]) -> Result<Self, GpuError> {
         Ok(Self(match self.0 {
             Backend::Device(caster) => Backend::Device(Box::new(caster.hiding(triangles)?)),
-            Backend::Cpu(caster) => Backend::Cpu(Box::new(caster.hiding(triangles))),
+            Backend::Cpu(caster) => Backend::Cpu(Box::new(caster.hiding(triangles)?)),
         }))
     }
 
@@ -48,8 +45,9 @@ impl<'a> Caster<'a> {
     /// result are those of the device's kernel, or wall-clock times on the CPU.
     ///
     /// # Errors
-    /// Memory runs out, or a call fails.
+    /// There are more than [`MOST_REPETITIONS`](cast::MOST_REPETITIONS), memory runs out, or a call fails.
     pub fn cast(&mut self, rays: &[Ray], query: Query, n_times: u32) -> Result<CastResult, GpuError> {
+        cast::check_repetitions(n_times)?;
         match &mut self.0 {
             Backend::Device(caster) => caster.cast(rays, query, n_times),
             Backend::Cpu(caster) => Ok(cast_on_cpu(caster, rays, query, n_times)),

@@ -68,14 +68,10 @@ impl Engine {
     }
 
     /// Uses several Vulkan devices that are already open. They share the drawing of a picture or of the frames of a
-    /// film. Everything else is done by the first one.
-    ///
-    /// # Panics
-    /// There are no devices.
+    /// film. Everything else is done by the first one. If there are none, the engine runs on the CPU.
     pub fn on_devices(devices: Vec<impl Into<Device>>) -> Self {
         let mut devices = devices.into_iter().map(Into::into);
-        let first: Device = devices.next().expect("at least one device");
-        Self { others: devices.collect(), ..Self::on_device(first) }
+        Self { device: devices.next(), others: devices.collect(), ..Self::on_cpu() }
     }
 
     /// Uses the CPU without Vulkan, on the current rayon pool.
@@ -153,7 +149,7 @@ impl Engine {
     /// Does what [`Engine::build`] does, with a scene that is already flattened.
     ///
     /// # Errors
-    /// The scene has a triangle without a material.
+    /// The scene's parts do not fit together: see [`Mismatch`].
     pub fn build_flat(&self, scene: FlatScene, workload: &Workload) -> Result<Built, Mismatch> {
         let accel = self.choose_accel(scene.triangles.len(), workload);
         let world = World::with_accel_observed(scene, &accel.options(self.processor()), &self.progress)?;
@@ -172,7 +168,7 @@ impl Engine {
     /// Creates a renderer, which can draw many pictures of one world.
     ///
     /// # Errors
-    /// The scene or a row of the picture is beyond the device's limits or memory.
+    /// An option is out of its range, or the scene or a row of the picture is beyond the device's limits or memory.
     pub fn renderer(&self, world: &World, options: &RenderOptions) -> Result<Renderer, GpuError> {
         Renderer::new(&self.contexts(), world, options)
     }
@@ -180,13 +176,13 @@ impl Engine {
     /// Creates renderers that draw the frames of a film, one on each device.
     ///
     /// # Errors
-    /// The scene or a row of the picture is beyond the limits or the memory of a device.
-    ///
-    /// # Panics
-    /// The engine runs on the CPU.
+    /// The engine runs on the CPU, an option is out of its range, or the scene or a row of the picture is beyond the
+    /// limits or the memory of a device.
     pub fn film_renderer(&self, world: &World, options: &RenderOptions) -> Result<FilmRenderer, GpuError> {
         let contexts = self.contexts();
-        assert!(!contexts.is_empty(), "at least one device");
+        if contexts.is_empty() {
+            return Err(GpuError::Lacks { device: "CPU".to_owned(), missing: "renderers of films".to_owned() });
+        }
         FilmRenderer::new(&contexts, world, options)
     }
 
@@ -204,6 +200,7 @@ impl Engine {
     /// # Errors
     /// Fails as [`Engine::methods`] and [`Engine::renderer`] do, or if a call fails.
     pub fn render(&self, world: &World, options: &RenderOptions) -> Result<Rendered, GpuError> {
+        options.check()?;
         let scene = world.scene();
         let workload = Workload::of_pictures(options, scene.lights.len(), 1).with_cameras([&scene.camera].into_iter());
         let options = self.methods(world, &workload)?.apply(options);

@@ -15,7 +15,8 @@ use rayon::prelude::*;
 use crate::{
     cpu,
     frame::{
-        Crop, Drawn, DrawnTiles, LightLayers, NoiseTiles, Picture, Profile, RenderOptions, SampleRange, TileSamples,
+        BadOptions, Crop, Drawn, DrawnTiles, LightLayers, NoiseTiles, Picture, Profile, RenderOptions, SampleRange,
+        TileSamples, check::check,
     },
     gpu::GpuError,
     layout::{Feature, LIGHT_LAYERS, SAMPLE_BLOCK_LOG2},
@@ -41,6 +42,19 @@ impl NoiseGoal {
     pub const MOST: u32 = 4096;
     /// The fewest samples of a pixel.
     pub const FEWEST: u32 = 2 << SAMPLE_BLOCK_LOG2;
+
+    /// Checks that the goal can be met.
+    ///
+    /// # Errors
+    /// The noise is not a finite number above 0, or the number of samples is no power of two or out of its range.
+    pub fn check(&self) -> Result<(), BadOptions> {
+        let (noise, most) = (self.noise, self.most_samples);
+        check("noise", noise, noise > 0.0 && noise.is_finite(), || "a finite number above 0".to_owned())?;
+        let range = Self::FEWEST..=SampleRange::MOST;
+        check("most_samples", most, most.is_power_of_two() && range.contains(&most), || {
+            format!("a power of two from {} to {}", range.start(), range.end())
+        })
+    }
 
     /// Returns the blocks of samples that a tile gets one after the other: each but the first has as many samples as
     /// all before it.

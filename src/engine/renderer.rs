@@ -11,8 +11,8 @@ use super::{
 use crate::{
     cpu::{self, Batching},
     frame::{
-        Drawn, DrawnTiles, Goal, Integrator, NoiseTiles, Pacer, Picture, RangeSums, RenderOptions, SampleRange,
-        TileSamples, Watcher,
+        BadOptions, Denoise, Drawn, DrawnTiles, Goal, Integrator, NoiseTiles, Pacer, Picture, RangeSums, RenderOptions,
+        SampleRange, TileSamples, Watcher,
     },
     gpu::{Context, DeviceInfo, ExternalImage, GpuError, TimelinePoint},
     layout::SAMPLE_BLOCK_LOG2,
@@ -45,6 +45,7 @@ enum Backend {
 impl Renderer {
     /// Creates a renderer on the devices. If there are none, the renderer runs on the CPU.
     pub(super) fn new(contexts: &[Arc<Context>], world: &World, options: &RenderOptions) -> Result<Self, GpuError> {
+        options.check()?;
         let backend = match contexts {
             [] => Backend::Cpu(Box::new(cpu::Renderer::new(world, options, Batching::default()))),
             [context] => Backend::Device(Box::new(BandedRenderer::new(Arc::clone(context), world, options)?)),
@@ -70,7 +71,8 @@ impl Renderer {
     /// sample of each band. If it uses [`Watcher::part`], it is also notified of the progress within a sample.
     ///
     /// # Errors
-    /// A call fails, one pixel alone makes more rays than a queue holds, or memory runs out.
+    /// The camera shows no picture, the goal is more than [`SampleRange::MOST`] samples, a call fails, one pixel alone
+    /// makes more rays than a queue holds, or memory runs out.
     pub fn draw(&mut self, camera: &Camera, goal: Goal, mut watcher: impl Watcher) -> Result<Drawn, GpuError> {
         self.draw_watched(camera, goal, &mut watcher)
     }
@@ -80,13 +82,14 @@ impl Renderer {
     /// first block, with the noise of all. The layers of light are those of all blocks.
     ///
     /// # Errors
-    /// Fails as [`Renderer::draw`] does.
+    /// Fails as [`Renderer::draw`] does, or as [`SampleRange::check`] does.
     pub fn draw_range(
         &mut self,
         camera: &Camera,
         samples: SampleRange,
         mut watcher: impl Watcher,
     ) -> Result<(Drawn, RangeSums), GpuError> {
+        samples.check()?;
         let (mut drawn, mut sums) = (None::<Drawn>, RangeSums::default());
         for block in samples.blocks() {
             match &mut self.backend {
@@ -112,11 +115,9 @@ impl Renderer {
     /// Draws what a camera sees until the noise of each tile of the picture is low, or the tile has the most samples.
     /// The watcher is notified as if the whole picture were one sample, which [`Renderer::draw`] draws band by band.
     ///
-    /// # Panics
-    /// The options do not ask for paths, have a noise filter or another first sample than 0.
-    ///
     /// # Errors
-    /// Fails as [`Renderer::draw`] does.
+    /// Fails as [`Renderer::draw`] and [`NoiseGoal::check`] do, or if the options do not ask for paths, have a noise
+    /// filter or another first sample than 0.
     pub fn draw_until(
         &mut self,
         camera: &Camera,
@@ -124,7 +125,13 @@ impl Renderer {
         mut watcher: impl Watcher,
     ) -> Result<NoisePicture, GpuError> {
         let options = self.options.clone();
-        self.set_camera(camera);
+        goal.check()?;
+        let is_unfiltered = options.integrator == Integrator::Path && options.noise_filter() == Denoise::Off;
+        if !is_unfiltered || options.paths.first_sample != 0 || options.noise_tiles.is_some() {
+            let needed = "the integrator path from sample 0 on, without noise filter and noise_tiles";
+            return Err(BadOptions(format!("pictures of low noise need {needed}")).into());
+        }
+        self.set_camera(camera)?;
         let mut progress = BandProgress { n_bands: self.n_bands(), n_told: 0, watcher: &mut watcher };
         let n_devices = if let Backend::Group(group) = &self.backend { group.n_devices() } else { 1 };
         let mut draw = |tiles: &[TileSamples]| self.draw_tiles(tiles);
@@ -147,20 +154,23 @@ impl Renderer {
         match &mut self.backend {
             Backend::Device(renderer) => renderer.draw_tiles(tiles),
             Backend::Group(group) => group.draw_tiles(tiles),
-            Backend::Cpu(renderer) => Ok(draw_tiles_on_cpu(renderer, tiles)),
+            Backend::Cpu(renderer) => draw_tiles_on_cpu(renderer, tiles),
         }
     }
 
-    fn set_camera(&mut self, camera: &Camera) {
+    fn set_camera(&mut self, camera: &Camera) -> Result<(), BadOptions> {
+        camera.check().map_err(|what| BadOptions(format!("camera: {what}")))?;
         match &mut self.backend {
             Backend::Device(renderer) => renderer.set_camera(camera),
             Backend::Group(group) => group.set_camera(camera),
             Backend::Cpu(renderer) => renderer.set_camera(camera),
         }
+        Ok(())
     }
 
     fn draw_watched(&mut self, camera: &Camera, goal: Goal, watcher: &mut impl Watcher) -> Result<Drawn, GpuError> {
-        self.set_camera(camera);
+        goal.check()?;
+        self.set_camera(camera)?;
         match &mut self.backend {
             Backend::Device(renderer) => renderer.draw(goal, watcher),
             Backend::Group(group) => group.draw(goal, watcher),
@@ -253,14 +263,14 @@ fn draw_on_cpu(renderer: &mut cpu::Renderer, goal: Goal, watcher: &mut impl Watc
     drawn
 }
 
-fn draw_tiles_on_cpu(renderer: &mut cpu::Renderer, tiles: &[TileSamples]) -> DrawnTiles {
+fn draw_tiles_on_cpu(renderer: &mut cpu::Renderer, tiles: &[TileSamples]) -> Result<DrawnTiles, GpuError> {
     let mut all = DrawnTiles::default();
     for together in tiles.chunks(NoiseTiles::MOST) {
-        let tiles = NoiseTiles::new(together);
+        let tiles = NoiseTiles::new(together)?;
         let (first_sample, n_samples) = (tiles.first_sample(), tiles.n_samples());
         renderer.set_window(Some(tiles), first_sample);
         let drawn = draw_on_cpu(renderer, Goal::Samples(n_samples), &mut || ());
         all.append(DrawnTiles { drawn, means: renderer.window_mean().to_vec() });
     }
-    all
+    Ok(all)
 }

@@ -50,7 +50,7 @@ impl Bounce {
     pub fn set_rays(&mut self, first_ray: u32, n_rays: u32, constants: &Frame) {
         let n_so_far = first_ray + n_rays;
         let for_rays = lanes_log2(n_rays, constants.n_lanes);
-        let for_segments = lanes_log2(n_so_far * constants.n_lights, constants.n_lanes);
+        let for_segments = lanes_log2(n_so_far.saturating_mul(constants.n_lights), constants.n_lanes);
         self.first_ray = first_ray;
         self.n_rays = n_rays;
         self.trace_groups_x = (n_rays << for_rays).div_ceil(RAY_GROUP_SIZE);

@@ -28,14 +28,14 @@ impl Crop {
         Self { x0: 0, y0: 0, x1: width, y1: height }
     }
 
-    /// Number of columns.
+    /// Number of columns; 0 if there are none.
     pub fn width(&self) -> u32 {
-        self.x1 - self.x0
+        self.x1.saturating_sub(self.x0)
     }
 
-    /// Number of rows.
+    /// Number of rows; 0 if there are none.
     pub fn height(&self) -> u32 {
-        self.y1 - self.y0
+        self.y1.saturating_sub(self.y0)
     }
 
     /// Returns the crop with `border` more pixels on each side, clipped to a picture of `width` x `height` pixels.
@@ -43,8 +43,8 @@ impl Crop {
         Self {
             x0: self.x0.saturating_sub(border),
             y0: self.y0.saturating_sub(border),
-            x1: (self.x1 + border).min(width),
-            y1: (self.y1 + border).min(height),
+            x1: self.x1.saturating_add(border).min(width),
+            y1: self.y1.saturating_add(border).min(height),
         }
     }
 

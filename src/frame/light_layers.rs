@@ -43,7 +43,7 @@ impl RangeSums {
     ///
     /// # Panics
     /// As [`SampleSums::push_mean`].
-    pub fn push_mean(&mut self, samples: SampleRange, radiance: &[[f32; 4]], light: &LightLayers) {
+    pub(crate) fn push_mean(&mut self, samples: SampleRange, radiance: &[[f32; 4]], light: &LightLayers) {
         self.picture.push_mean(samples, radiance);
         if !light.is_empty() {
             self.light.iter_mut().zip(&light.0).for_each(|(sums, layer)| sums.push_mean(samples, layer));

@@ -5,6 +5,7 @@
 //! options    RenderOptions, crop: what to render, and by which methods
 //! constants  the uniform buffer of the kernels; sampling: the positions of samples in their pixels
 //! goal       the end of a picture: a number of samples, or a time
+//! check      the ranges of options
 //! sample_range  parts of a picture's samples, and their sums
 //! plan       the order of passes and the barriers between them
 //!   pass       what each pass does, reads and writes
@@ -15,6 +16,7 @@
 
 mod aov;
 pub(crate) mod bounce;
+pub(crate) mod check;
 mod constants;
 pub(crate) mod counts;
 mod crop;
@@ -52,9 +54,9 @@ use crate::{accel::kdtree::Traversal, layout};
 /// [`RenderDefaults`](crate::scene::RenderDefaults).
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderOptions {
-    /// Width of the whole picture, pixels.
+    /// Width of the whole picture, pixels: 1 to [`RenderOptions::MOST_SIDE`].
     pub width: u32,
-    /// Height of the whole picture, pixels.
+    /// Height of the whole picture, pixels: 1 to [`RenderOptions::MOST_SIDE`].
     pub height: u32,
     /// The part of the picture to render, which is inside the picture. None: all of it.
     pub crop: Option<Crop>,
@@ -63,9 +65,10 @@ pub struct RenderOptions {
     pub noise_tiles: Option<NoiseTiles>,
     /// How light is computed.
     pub integrator: Integrator,
-    /// Number of bounces, the primary rays included: 1 is ray casting with shadows (Algorithm 1's `maximumDepth`).
+    /// Number of bounces, the primary rays included, 1 to [`RenderOptions::MOST_DEPTH`]: 1 is ray casting with shadows
+    /// (Algorithm 1's `maximumDepth`).
     pub max_depth: u32,
-    /// Factor by which radiance is multiplied before it is encoded for display.
+    /// Factor by which radiance is multiplied before it is encoded for display, finite and above 0.
     pub exposure: f32,
     /// The curve from radiance to display.
     pub tonemap: Tonemap,
@@ -88,6 +91,11 @@ pub struct RenderOptions {
     /// What only paths have: filters, lens, bounds.
     pub paths: PathOptions,
 }
+
+/// Options with which nothing can be rendered. The message is one line, which names the option and its range.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct BadOptions(pub(crate) String);
 
 impl RenderOptions {
     /// Returns the number of bounces of a frame. Paths have one more than `max_depth`, in which the rays from the last
@@ -123,7 +131,7 @@ pub struct PathOptions {
     /// The density of samples around the centre of their pixel.
     pub filter: PixelFilter,
     /// The most light that a path adds to its pixel after its first hit, in any colour (radiance). It makes pictures
-    /// darker than they should be. Infinity: any amount.
+    /// darker than they should be. It is above 0. Infinity: any amount.
     pub clamp: f32,
     /// Radius of the camera's lens, world units. 0: everything is sharp.
     pub aperture: f32,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{UVec2, uvec2};
 
-use super::{Crop, SampleRange};
+use super::{BadOptions, Crop, SampleRange};
 use crate::layout::{MOST_NOISE_TILES, NOISE_TILE_SIZE};
 
 /// A tile, and samples that each of its pixels gets.
@@ -39,23 +39,30 @@ impl NoiseTiles {
 
     /// Returns tiles that are drawn together.
     ///
-    /// # Panics
+    /// # Errors
     /// There are none or more than [`NoiseTiles::MOST`]; a coordinate has more than 12 bits; the tiles get different
     /// numbers of samples, or samples of more than [`NoiseTiles::MOST_BLOCKS`] blocks.
-    pub fn new(tiles: &[TileSamples]) -> Self {
-        assert!((1..=Self::MOST).contains(&tiles.len()), "{} tiles", tiles.len());
-        let first_sample = tiles.iter().map(|tile| tile.samples.first).min().expect("tiles");
-        let n_samples = tiles[0].samples.len();
-        let word = |&TileSamples { place, samples }: &TileSamples| {
+    pub fn new(tiles: &[TileSamples]) -> Result<Self, BadOptions> {
+        let first_sample = tiles.iter().map(|tile| tile.samples.first).min().unwrap_or(0);
+        let n_samples = tiles.first().map_or(0, |tile| tile.samples.len());
+        let is_block = n_samples.is_power_of_two() && first_sample.is_multiple_of(n_samples);
+        if !(1..=Self::MOST).contains(&tiles.len()) || !is_block {
+            let n = tiles.len();
+            return Err(BadOptions(format!("noise_tiles: {n} tiles of {n_samples} samples from {first_sample} on")));
+        }
+        let word = |tile: &TileSamples| {
+            let TileSamples { place, samples } = *tile;
             let block = (samples.first - first_sample) / n_samples;
-            assert!(place.max_element() <= 0xfff && samples.len() == n_samples && block < Self::MOST_BLOCKS);
-            place.x | place.y << 12 | block << 24
+            let fits = place.max_element() <= 0xfff && samples.len() == n_samples && block < Self::MOST_BLOCKS;
+            let is_right = fits && samples.first.is_multiple_of(n_samples);
+            let word = place.x | place.y << 12 | block << 24;
+            is_right.then_some(word).ok_or_else(|| BadOptions(format!("noise_tiles: {tile:?} does not fit the others")))
         };
-        Self { words: tiles.iter().map(word).collect(), first_sample, n_samples }
+        Ok(Self { words: tiles.iter().map(word).collect::<Result<_, _>>()?, first_sample, n_samples })
     }
 
     /// Returns the places of all tiles that have pixels of a crop, row by row.
-    pub fn places_of(crop: &Crop) -> Vec<UVec2> {
+    pub(crate) fn places_of(crop: &Crop) -> Vec<UVec2> {
         let rows = crop.y0 / Self::SIZE..crop.y1.div_ceil(Self::SIZE);
         let columns = crop.x0 / Self::SIZE..crop.x1.div_ceil(Self::SIZE);
         rows.flat_map(|y| columns.clone().map(move |x| uvec2(x, y))).collect()
@@ -64,6 +71,11 @@ impl NoiseTiles {
     /// Index of the first sample of all tiles.
     pub(crate) fn first_sample(&self) -> u32 {
         self.first_sample
+    }
+
+    /// The places of the tiles in the picture, in units of their side.
+    pub(super) fn places(&self) -> impl Iterator<Item = UVec2> {
+        self.words.iter().map(|word| uvec2(word & 0xfff, word >> 12 & 0xfff))
     }
 
     /// Number of samples that each tile gets.

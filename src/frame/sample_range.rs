@@ -60,7 +60,8 @@ impl SampleRange {
 
     /// Returns the block that consists of this block and the next one, if that is an aligned block.
     fn joined(&self, next: &Self) -> Option<Self> {
-        let fits = self.end == next.first && self.len() == next.len() && self.first.is_multiple_of(2 * self.len());
+        let len = self.len().saturating_mul(2);
+        let fits = self.end == next.first && self.len() == next.len() && self.first.is_multiple_of(len);
         fits.then_some(Self { first: self.first, end: next.end })
     }
 }
@@ -122,7 +123,7 @@ impl SampleSums {
     ///
     /// # Panics
     /// The block is not aligned, does not follow the last one, or has another number of pixels.
-    pub fn push(&mut self, block: BlockSum) {
+    pub(crate) fn push(&mut self, block: BlockSum) {
         let SampleRange { first, .. } = block.samples;
         let len = block.samples.len();
         assert!(len.is_power_of_two() && first.is_multiple_of(len), "{} is no aligned block", block.samples);
@@ -142,7 +143,7 @@ impl SampleSums {
     ///
     /// # Panics
     /// As [`SampleSums::push`].
-    pub fn push_mean(&mut self, samples: SampleRange, radiance: &[[f32; 4]]) {
+    pub(crate) fn push_mean(&mut self, samples: SampleRange, radiance: &[[f32; 4]]) {
         let n = samples.len() as f32;
         let sums = radiance.par_iter().map(|&[r, g, b, _]| [r * n, g * n, b * n]).collect();
         self.push(BlockSum { samples, sums });

@@ -100,7 +100,8 @@ impl Context {
         let families = unsafe { instance.raw.get_physical_device_queue_family_properties(physical) };
         let family = queue_family(&families).expect("`select` refuses a device without such a queue");
         let extras = DeviceExtras::of(&instance, physical, purpose)
-            .map_err(GpuError::call("vkEnumerateDeviceExtensionProperties", &info.name))?;
+            .map_err(GpuError::call("vkEnumerateDeviceExtensionProperties", &info.name))?
+            .with_bounds_checks(overrides.bounds_checks);
         let device = extras
             .create_device(&instance, physical, family as u32)
             .map_err(GpuError::call("vkCreateDevice", &info.name))?;

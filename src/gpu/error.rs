@@ -89,6 +89,9 @@ pub enum GpuError {
     /// [`Mismatch`](crate::world::Mismatch).
     #[error("{0}")]
     Mismatch(String),
+    /// An option is out of its range. The text is that of [`BadOptions`](crate::frame::BadOptions).
+    #[error("{0}")]
+    BadOptions(String),
     /// A number is beyond a limit of the device.
     #[error("{what}: {value} is beyond this device's limit of {limit}")]
     Limit {

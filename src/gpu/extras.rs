@@ -28,6 +28,8 @@ pub(super) struct DeviceExtras {
     pub statistics: bool,
     /// Whether pipelines can be made without bounds checks.
     pub unchecked: bool,
+    /// Whether the device checks the bounds of buffers.
+    bounds_checks: bool,
     /// Whether kernels have 64-bit atomics on buffers.
     pub int64_atomics: bool,
     purpose: Purpose,
@@ -45,13 +47,21 @@ impl DeviceExtras {
             statistics: has(StatisticsCalls::EXTENSION) && StatisticsCalls::has_feature(instance, physical),
             unchecked: has(robustness::EXTENSION) && robustness::has_feature(instance, physical),
             int64_atomics: has_int64_atomics(instance, physical),
+            bounds_checks: false,
             purpose,
         })
     }
 
+    /// Returns the extras of a device that checks bounds, if `is_checked`.
+    pub fn with_bounds_checks(self, is_checked: bool) -> Self {
+        Self { unchecked: self.unchecked && !is_checked, bounds_checks: is_checked, ..self }
+    }
+
     /// Returns the extras of a device that the library's caller has created: at most 64-bit atomics.
     pub fn of_external(int64_atomics: bool) -> Self {
-        Self { portability: false, statistics: false, unchecked: false, int64_atomics, purpose: Purpose::Compute }
+        let (portability, statistics, unchecked, bounds_checks) = Default::default();
+        let purpose = Purpose::Compute;
+        Self { portability, statistics, unchecked, bounds_checks, int64_atomics, purpose }
     }
 
     fn extensions(self) -> Vec<*const c_char> {
@@ -78,6 +88,8 @@ impl DeviceExtras {
         let priorities = [1.0];
         let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&priorities)];
         let RequiredFeatures { of_1_0, mut of_1_2, mut of_1_3 } = RequiredFeatures::new(self.int64_atomics);
+        // Every device has this feature.
+        let of_1_0 = of_1_0.robust_buffer_access(self.bounds_checks);
         let mut executables =
             vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default().pipeline_executable_info(true);
         let mut unchecked = vk::PhysicalDevicePipelineRobustnessFeaturesEXT::default().pipeline_robustness(true);

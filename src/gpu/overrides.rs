@@ -13,6 +13,9 @@ pub struct DeviceOverrides {
     pub n_lanes: Option<u32>,
     /// Whether kernels lack 64-bit atomics.
     pub no_int64_atomics: bool,
+    /// Whether the device checks the bounds of buffers, so that a kernel that reads or writes beyond them harms nothing
+    /// else. Otherwise kernels are made without such checks (`robustness.rs`).
+    pub bounds_checks: bool,
     /// Number of turns (iterations) of a kernel's loops after which the driver ends the kernel.
     pub loop_limit: Option<u32>,
     /// Whether each buffer has memory of its own, which is overwritten before it is released. In a block that buffers

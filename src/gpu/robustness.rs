@@ -1,6 +1,6 @@
 //! Kernels without bounds checks. Their indices come from queues that kdray's own kernels write, from grids and trees
-//! that kdray builds, and from other trees and materials, which are checked before they are uploaded
-//! (accel/kdtree/validate.rs, world/mismatch.rs). A check of each load costs rays 3 to 4 % of their speed on an H200
+//! that kdray builds, and from other trees and from scenes, which are checked before they are uploaded
+//! (accel/kdtree/validate.rs, world/check.rs). A check of each load costs rays 3 to 4 % of their speed on an H200
 //! (docs/experiments.md).
 
 use std::ffi::CStr;

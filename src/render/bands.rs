@@ -43,6 +43,7 @@ impl BandedRenderer {
     /// The scene, or a single row of the picture, exceeds the device's limits or memory, or the driver refuses a
     /// shader.
     pub fn new(context: Arc<Context>, world: &World, options: &RenderOptions) -> Result<Self, GpuError> {
+        options.check()?;
         let bands = bands(context.limits(), options);
         let is_slow = context.predicates_branches();
         let renderer = match largest(&bands, options) {
@@ -71,16 +72,14 @@ impl BandedRenderer {
     /// Sets the part of the picture that is drawn next, a rectangle. Buffers are kept as [`Renderer::set_crop`] keeps
     /// them.
     ///
-    /// # Panics
-    /// The crop exceeds the picture.
-    ///
     /// # Errors
-    /// The part exceeds the device's limits or memory.
+    /// The crop is empty or exceeds the picture, or the part exceeds the device's limits or memory.
     pub fn set_crop(&mut self, crop: Crop) -> Result<(), GpuError> {
         if self.bands == [crop] && self.renderer.options().noise_tiles.is_none() {
             return Ok(());
         }
         let options = RenderOptions { crop: Some(crop), noise_tiles: None, ..self.renderer.options().clone() };
+        options.check()?;
         let bands = bands(self.renderer.context.limits(), &options);
         let crop = largest(&bands, &options).unwrap_or(crop);
         self.renderer.set_options(&RenderOptions { crop: Some(crop), ..options })?;

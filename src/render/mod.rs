@@ -80,8 +80,8 @@ impl Renderer {
     /// Uploads the scene and creates the pipelines.
     ///
     /// # Errors
-    /// The scene or the picture exceeds the device's limits or memory, the device lacks 64-bit atomics for
-    /// [`Primary::SoftwareRaster`], or the driver refuses a shader.
+    /// An option is out of its range, the scene or the picture exceeds the device's limits or memory, the device lacks
+    /// 64-bit atomics for [`Primary::SoftwareRaster`], or the driver refuses a shader.
     pub fn new(context: Arc<Context>, world: &World, options: &RenderOptions) -> Result<Self, GpuError> {
         Self::with_capacity((context, world), options, None, None)
     }
@@ -119,6 +119,7 @@ impl Renderer {
         fixed_capacity: Option<u32>,
         shared: Option<&Self>,
     ) -> Result<Self, GpuError> {
+        options.check()?;
         let scene = world.scene();
         let (asked, options) = (options.clone(), &in_use(options));
         let both = MATERIAL_REFLECT | MATERIAL_REFRACT;
@@ -126,6 +127,7 @@ impl Renderer {
         let mut constants = world.frame_constants(options);
         constants.n_lanes = lanes_to_share(&context, options)?;
         let of_paths = options.integrator == Integrator::Path;
+        check_lights(&context, if of_paths { 0 } else { constants.n_lights })?;
         let budget = QueueSizing { fixed_capacity, branches, of_paths };
         constants.queue_capacity = budget.queue_capacity(context.limits(), context.info(), &constants);
         let spans = budget.spans(&constants, None);
@@ -451,6 +453,16 @@ impl Renderer {
 fn in_use(options: &RenderOptions) -> RenderOptions {
     let primary = if options.integrator == Integrator::Path { Primary::Trace } else { options.primary };
     RenderOptions { primary, ..options.clone() }
+}
+
+/// Checks that a dispatch can have a row of workgroups for each light.
+fn check_lights(context: &Context, n_lights: u32) -> Result<(), GpuError> {
+    let (value, limit) = (u64::from(n_lights), u64::from(context.limits().n_groups));
+    if value <= limit {
+        Ok(())
+    } else {
+        Err(GpuError::Limit { what: "lights of the integrator whitted", value, limit })
+    }
 }
 
 /// Returns the number of lanes to share among the rays of a dispatch. 0 means that each ray gets one lane, and is

@@ -23,7 +23,7 @@ impl BandedRenderer {
         let mut all = DrawnTiles::default();
         let n_chunks = tiles.len().div_ceil(most_tiles).max(1);
         for together in tiles.chunks(tiles.len().div_ceil(n_chunks).max(1)) {
-            let tiles = NoiseTiles::new(together);
+            let tiles = NoiseTiles::new(together)?;
             let (paths, n_samples) =
                 (PathOptions { first_sample: tiles.first_sample(), ..options.paths }, tiles.n_samples());
             (self.bands, self.joined) = (vec![tiles.window()], None);

@@ -42,8 +42,8 @@ impl Renderer {
     /// new picture. The buffers of the largest picture so far are kept, so that changes below its size are cheap.
     ///
     /// # Errors
-    /// The picture exceeds the device's limits or memory. Then nothing has changed, and a pending sample stays
-    /// pending.
+    /// The size is out of its range, or the picture exceeds the device's limits or memory. Then nothing has changed,
+    /// and a pending sample stays pending.
     pub fn resize(&mut self, width: u32, height: u32) -> Result<(), GpuError> {
         let options = RenderOptions { width, height, crop: None, ..self.options.clone() };
         self.remake(&options)
@@ -52,11 +52,9 @@ impl Renderer {
     /// Sets the part of the picture to render. If it changes, the next sample is the first of a new picture. Buffers
     /// are kept as [`Renderer::resize`] keeps them.
     ///
-    /// # Panics
-    /// The crop exceeds the picture.
-    ///
     /// # Errors
-    /// The part exceeds the device's limits or memory. Then nothing has changed.
+    /// The crop is empty or exceeds the picture, or the part exceeds the device's limits or memory. Then nothing has
+    /// changed.
     pub fn set_crop(&mut self, crop: Crop) -> Result<(), GpuError> {
         self.remake(&RenderOptions { crop: Some(crop), ..self.options.clone() })
     }
@@ -66,12 +64,9 @@ impl Renderer {
     /// [`Renderer::show`] then displays them by the new options, unless a pending sample has overwritten some of
     /// their radiance. A pending sample is dropped.
     ///
-    /// # Panics
-    /// The crop exceeds the picture.
-    ///
     /// # Errors
-    /// The options exceed the device's limits or memory, or the driver refuses a kernel. Then nothing has changed,
-    /// and a pending sample stays pending.
+    /// An option is out of its range, the options exceed the device's limits or memory, or the driver refuses a kernel.
+    /// Then nothing has changed, and a pending sample stays pending.
     pub fn set_options(&mut self, options: &RenderOptions) -> Result<(), GpuError> {
         self.remake(options)
     }
@@ -91,6 +86,7 @@ impl Renderer {
     /// Creates the buffers and kernels that the changed options need, and then installs them by steps that cannot
     /// fail.
     fn remake(&mut self, options: &RenderOptions) -> Result<(), GpuError> {
+        options.check()?;
         let (asked, options) = (options.clone(), &in_use(options));
         if options.integrator != self.in_use.integrator {
             return self.replace(&asked);

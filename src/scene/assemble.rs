@@ -36,7 +36,7 @@ use super::{
     transform::finite,
 };
 use crate::{
-    frame::{Denoise, Integrator},
+    frame::{Denoise, Integrator, RenderOptions, SampleRange},
     util::memory,
 };
 
@@ -424,13 +424,13 @@ fn render_defaults(spec: &RenderSpec) -> Checked<RenderDefaults> {
         value => Err(format!("{name} = {value} is outside 1 to {max}")),
     };
     let threshold = spec.denoise_threshold.unwrap_or(Denoise::DEFAULT_THRESHOLD);
-    let threshold = within("denoise_threshold", threshold, 0.0, 4.0)?;
+    let threshold = within("denoise_threshold", threshold, 0.0, RenderOptions::MOST_THRESHOLD)?;
     let is_metered = spec.metered.unwrap_or(false);
     if is_metered && spec.exposure.is_some() {
         return Err("has both `exposure` and `metered = true`".to_owned());
     }
-    let samples = count("samples", spec.samples, defaults.samples, 65_536)?;
-    let max_depth = count("max_depth", spec.max_depth, defaults.max_depth, 64)?;
+    let samples = count("samples", spec.samples, defaults.samples, SampleRange::MOST)?;
+    let max_depth = count("max_depth", spec.max_depth, defaults.max_depth, RenderOptions::MOST_DEPTH)?;
     let filter = Denoise::Paper { threshold };
     let integrator = spec.integrator.as_ref().map(|word| word.parse()).transpose();
     let integrator = integrator.map_err(|e| format!("integrator: {e}"))?;
@@ -449,8 +449,8 @@ fn render_defaults(spec: &RenderSpec) -> Checked<RenderDefaults> {
     Ok(RenderDefaults {
         integrator: integrator.unwrap_or(defaults.integrator),
         of_paths,
-        width: count("width", spec.width, defaults.width, 16_384)?,
-        height: count("height", spec.height, defaults.height, 16_384)?,
+        width: count("width", spec.width, defaults.width, RenderOptions::MOST_SIDE)?,
+        height: count("height", spec.height, defaults.height, RenderOptions::MOST_SIDE)?,
         max_depth,
         tonemap: match &spec.tonemap {
             Some(word) => word.parse().map_err(|e| format!("tonemap: {e}"))?,

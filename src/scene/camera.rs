@@ -46,6 +46,27 @@ impl Camera {
         forward.cross(self.up.as_dvec3()).length() >= 1e-4
     }
 
+    /// Returns what keeps the camera from showing a picture.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let points = [("eye", self.eye), ("target", self.target), ("up", self.up)];
+        if let Some((name, point)) = points.into_iter().find(|(_, point)| !point.is_finite()) {
+            return Err(format!("{name} is {:?}, which is not finite", point.to_array()));
+        }
+        let right = (self.target.as_dvec3() - self.eye.as_dvec3()).cross(self.up.as_dvec3());
+        if right.length_squared() == 0.0 {
+            return Err("up points along the view, or eye and target are one point".to_owned());
+        }
+        match self.projection {
+            Projection::Perspective { vertical_fov_degrees: angle } if !(angle > 0.0 && angle < 180.0) => {
+                Err(format!("vertical_fov_degrees is {angle}, not above 0 and below 180"))
+            }
+            Projection::Orthographic { height } if !(height > 0.0 && height.is_finite()) => {
+                Err(format!("height is {height}, not a finite number above 0"))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Returns whether the camera is orthographic.
     pub fn is_orthographic(&self) -> bool {
         matches!(self.projection, Projection::Orthographic { .. })

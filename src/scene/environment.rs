@@ -39,7 +39,8 @@ impl Environment {
     /// texels have such numbers.
     ///
     /// # Errors
-    /// The number of colours is not that of an image of this size with at least one pixel.
+    /// The number of colours is not that of an image of this size with at least one pixel. The rotation is not finite.
+    /// The strength is not finite or is negative.
     pub fn new(
         size: [u32; 2],
         mut colours: Vec<Vec3>,
@@ -48,6 +49,9 @@ impl Environment {
         let [width, height] = size;
         if colours.is_empty() || colours.len() as u64 != u64::from(width) * u64::from(height) {
             return Err(format!("{} colours are not those of {width} x {height} pixels", colours.len()));
+        }
+        if !rotation_degrees.is_finite() || !(strength >= 0.0 && strength.is_finite()) {
+            return Err(format!("a rotation of {rotation_degrees} degrees or a strength of {strength} is no number"));
         }
         let usual = |part: &f32| *part >= 0.0 && *part <= MOST_RADIANCE;
         let parts = colours.iter().flat_map(|colour| colour.to_array());

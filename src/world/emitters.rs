@@ -71,7 +71,9 @@ impl Emitters {
         // Directions are picked as if the brighter half of the ambient light came from everywhere.
         let ambient = scene.ambient.max(ground.ambient);
         let environment = scene.environment.as_ref().map(|map| EnvironmentMap::new(map, ambient));
-        let mut area_lights = scene.area_lights.clone();
+        // Who has no entry is never picked, whatever the scene says: the leaf ends a loop of the kernels.
+        let unpicked = |light: &AreaLight| AreaLight { probability: 0.0, leaf_ix: 0, ..*light };
+        let mut area_lights: Vec<AreaLight> = scene.area_lights.iter().map(unpicked).collect();
         let (lights, suns) = lights_and_suns(&scene.lights, disk);
         let of_areas = area_lights.iter().enumerate().map(|(ix, light)| Weighed {
             kind: EMITTER_AREA,

@@ -10,6 +10,10 @@ use crate::{
 impl World {
     /// Returns the constants of a frame that shows the first sample of each pixel from the scene's own camera.
     /// `queue_capacity` is left 0; the code that makes the queues sets it.
+    ///
+    /// # Panics
+    /// The crop exceeds the picture, or tiles have a noise filter ([`RenderOptions::check`]).
+    #[doc(hidden)]
     pub fn frame_constants(&self, options: &RenderOptions) -> Frame {
         let scene = self.scene();
         let ground = scene.ground.unwrap_or(Ground { ambient: scene.ambient, up: Up::Y });

@@ -1,6 +1,5 @@
 //! Errors of worlds whose parts do not fit together.
 
-use super::FlatScene;
 use crate::gpu::GpuError;
 
 /// Why a scene's arrays, or its triangles and their structure, do not fit together.
@@ -46,6 +45,13 @@ pub enum Mismatch {
         /// Number of materials.
         materials: usize,
     },
+    /// A part of a flattened scene does not fit the others, or is out of range. The text names the array and the
+    /// element.
+    #[error("{0}")]
+    Scene(String),
+    /// The build options of an acceleration structure are out of range. The text names the option and its range.
+    #[error("{0}")]
+    AccelOptions(String),
     /// An image of a scene cannot be shown.
     #[error("image {image} of the scene, `{name}`: {what}")]
     Image {
@@ -72,22 +78,5 @@ pub enum Mismatch {
 impl From<Mismatch> for GpuError {
     fn from(mismatch: Mismatch) -> Self {
         Self::Mismatch(mismatch.to_string())
-    }
-}
-
-/// Checks that every triangle has a material, in one pass over `triangle_materials`.
-///
-/// # Errors
-/// The first mismatch.
-pub(super) fn check_materials(scene: &FlatScene) -> Result<(), Mismatch> {
-    let (triangle_materials, triangles) = (scene.triangle_materials.len(), scene.triangles.len());
-    if triangle_materials != triangles {
-        return Err(Mismatch::TriangleMaterials { triangle_materials, triangles });
-    }
-    let materials = scene.materials.len();
-    let is_missing = |(_, material): &(usize, &u32)| **material as usize >= materials;
-    match scene.triangle_materials.iter().enumerate().find(is_missing) {
-        Some((triangle, &material)) => Err(Mismatch::Material { triangle, material, materials }),
-        None => Ok(()),
     }
 }

@@ -2,6 +2,7 @@
 //! by construction.
 
 mod alias;
+mod check;
 mod corners;
 mod emissive;
 mod emitters;
@@ -45,9 +46,9 @@ use crate::{
 
 /// A scene and its acceleration structure.
 ///
-/// Kernels read both without bounds checks. So a world checks that every index of the scene names an element of its
-/// arrays. It builds the structure itself, or checks that the structure fits. Nothing can change either of them
-/// afterwards. A clone is a second handle to the same world.
+/// Kernels read both without bounds checks. So a world checks every length, index and kind of the scene's arrays. It
+/// builds the structure itself, or checks that the structure fits. Nothing can change either of them afterwards. A
+/// clone is a second handle to the same world.
 #[derive(Clone, Debug)]
 pub struct World(Arc<Parts>);
 
@@ -87,7 +88,7 @@ impl World {
     /// Builds the kd-tree of a flattened scene on the current rayon pool.
     ///
     /// # Errors
-    /// The scene has a triangle without a material.
+    /// The scene's parts do not fit together, or a corner of a triangle is too far from the origin.
     pub fn of_flat(scene: FlatScene, build_options: &BuildOptions) -> Result<Self, Mismatch> {
         Self::with_accel(scene, &AccelOptions::KdTree(build_options.clone()))
     }
@@ -95,7 +96,7 @@ impl World {
     /// Builds an acceleration structure over a flattened scene on the current rayon pool.
     ///
     /// # Errors
-    /// The scene has a triangle without a material.
+    /// Fails as [`World::of_flat`] does, or if an option is out of range.
     pub fn with_accel(scene: FlatScene, options: &AccelOptions) -> Result<Self, Mismatch> {
         Self::with_accel_observed(scene, options, &Progress::default())
     }
@@ -103,13 +104,14 @@ impl World {
     /// Does what [`World::with_accel`] does, and reports the progress of a kd-tree's build.
     ///
     /// # Errors
-    /// The scene has a triangle without a material.
+    /// Fails as [`World::with_accel`] does.
     pub fn with_accel_observed(
         scene: FlatScene,
         options: &AccelOptions,
         progress: &Progress,
     ) -> Result<Self, Mismatch> {
-        mismatch::check_materials(&scene)?;
+        check::check(&scene)?;
+        options.check().map_err(Mismatch::AccelOptions)?;
         let accel = Accel::new_observed(&scene.triangles, options, progress);
         Ok(Self::of_parts(scene, accel, options.clone()))
     }
@@ -118,9 +120,9 @@ impl World {
     /// with.
     ///
     /// # Errors
-    /// The scene has a triangle without a material, or the tree was built from more or fewer triangles.
+    /// Fails as [`World::of_flat`] does, or if the tree was built from more or fewer triangles.
     pub fn with_tree(scene: FlatScene, tree: KdTree, build_options: &BuildOptions) -> Result<Self, Mismatch> {
-        mismatch::check_materials(&scene)?;
+        check::check(&scene)?;
         let (accel, accel_options) = (Accel::KdTree(tree), AccelOptions::KdTree(build_options.clone()));
         Geometry::new(&scene.triangles, &accel)?;
         Ok(Self::of_parts(scene, accel, accel_options))

@@ -66,18 +66,14 @@ impl Textures {
         let n_bytes = n_bytes_of_corners(scene.n_triangles(), n_sets, has_corners);
         memory::require("texture coordinates, tangents and colours", n_bytes)
             .map_err(|error| Mismatch::Textures(error.to_string()))?;
-        let made = Self {
+        Ok(Self {
             texels,
             textures,
             material_maps,
             uvs: uvs(scene, n_sets),
             corners: if has_corners { corner_surfaces(scene) } else { Vec::new() },
             n_triangles: scene.n_triangles(),
-        };
-        match made.n_bytes() / 4 {
-            n_words if n_words < u64::from(u32::MAX) => Ok(made),
-            n_words => Err(Mismatch::Textures(format!("they and the triangles' corners need {n_words} words"))),
-        }
+        })
     }
 
     /// Returns whether the scene has textures, colours at corners, or opacity that rays have to ask for. Opacity that
