@@ -22,7 +22,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let scene = Scene::load(Path::new(&path))?;
     let rays: Vec<_> =
         (0..SIZE.1).flat_map(|y| (0..SIZE.0).map(move |x| (x, y))).map(|(x, y)| ray(&scene.camera, x, y)).collect();
-    let engine = Engine::open(&ContextOptions::default()).unwrap_or_else(|_| Engine::on_cpu());
+    // Only a machine without a Vulkan driver casts on the CPU: any other error is one.
+    let engine = match Engine::open(&ContextOptions::default()) {
+        Err(error) if error.is_without_driver() => {
+            eprintln!("{error}; casting on the CPU");
+            Engine::on_cpu()
+        }
+        opened => opened?,
+    };
     let Built { world, .. } = engine.build(scene, &Workload::of_rays(rays.len() as u64))?;
     let hits = engine.cast(&world, &rays, Query::Closest)?;
     for row in hits.chunks(SIZE.0 as usize) {

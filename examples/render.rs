@@ -22,8 +22,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let options = scene.defaults.options();
     // The engine chooses a tree that suits the number of rays.
     let workload = Workload::of_pictures(&options, scene.lights.len(), 1);
-    // A machine without a Vulkan driver renders on the CPU.
-    let engine = Engine::open(&ContextOptions::default()).unwrap_or_else(|_| Engine::on_cpu());
+    // Only a machine without a Vulkan driver renders on the CPU: any other error is one.
+    let engine = match Engine::open(&ContextOptions::default()) {
+        Err(error) if error.is_without_driver() => {
+            eprintln!("{error}; rendering on the CPU");
+            Engine::on_cpu()
+        }
+        opened => opened?,
+    };
     let Built { world, .. } = engine.build(scene, &workload)?;
     let rendered = engine.render(&world, &options)?;
     output::write_picture(&picture, &rendered.picture)?;

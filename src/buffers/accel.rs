@@ -137,7 +137,11 @@ impl AccelBuffers {
         let write_entries = |first: usize, part: &mut [LeafTriangle]| leaf_triangles(triangles, entries, first, part);
         let contents = Contents {
             kd_nodes: Content::Elements(tree.nodes()),
-            kd_parents: Content::Elements(tree.parents()),
+            // Suspended rays go back to where they stopped by the parents.
+            kd_parents: match context.loop_limit()? {
+                Some(_) => Content::Elements(tree.parents()),
+                None => Content::Reserved(tree.parents().len()),
+            },
             leaf_triangles: Content::Written { len: entries.len(), write: &write_entries },
             leaf_planes: Content::Elements(tree.leaf_planes()),
             kd_slabs: Content::Elements(slabs_for(context, tree)),
@@ -269,6 +273,9 @@ impl AccelBuffers {
         }
         let links = TraversalLinks::new(tree, traversal);
         let mut next = self.clone();
+        if traversal.needs_parents() && self.arrays.kd_parents.is_empty() {
+            next.arrays.kd_parents = Content::Elements(tree.parents()).upload(context, "kd_parents", self.access)?;
+        }
         next.arrays.kd_boxes = Content::Elements(&links.boxes).upload(context, "kd_boxes", self.access)?;
         next.arrays.kd_ropes = Content::Elements(&links.ropes).upload(context, "kd_ropes", self.access)?;
         next.upload_constants(context)?;

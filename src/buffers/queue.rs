@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::{
     frame::NoiseTiles,
     gpu::{Buffer, BufferUse, Context, GpuError},
-    layout::{Hit, PathRay, PathState, SCAN_GROUP_SIZE, Segment},
+    layout::{Hit, MOST_SAMPLES_LOG2, PathRay, PathState, SCAN_GROUP_SIZE, Segment},
 };
 
 /// What a batch of paths has beside the buffers of [`Queue`], in which each path has one ray. A clone is a second
@@ -29,6 +29,16 @@ impl PathQueue {
     /// take 16 more.
     pub const BYTES_PER_PATH: usize =
         size_of::<PathRay>() + size_of::<Hit>() + size_of::<PathState>() + size_of::<Segment>() + 4 * size_of::<u32>();
+
+    /// The part of a device's memory that paths may take is 1 / this.
+    pub const MEMORY_PER_PATHS: u64 = 8;
+
+    /// Returns an upper bound of the bytes by which the queue grows when a frame draws several of `n_samples` samples of
+    /// each pixel. It begins with room for one.
+    pub fn bytes_of_more_samples(n_pixels: u64, n_samples: u32, memory_bytes: u64) -> u64 {
+        let n_more = u64::from(n_samples.clamp(1, 1 << MOST_SAMPLES_LOG2) - 1);
+        (Self::BYTES_PER_PATH as u64 * n_pixels * n_more).min(memory_bytes / Self::MEMORY_PER_PATHS)
+    }
 
     /// Makes the buffers for `capacity` paths. `has_layers`: whether the picture has layers of light.
     ///

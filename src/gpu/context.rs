@@ -117,10 +117,7 @@ impl Context {
     ///
     /// # Safety
     /// [`Device::external`](super::Device::external) states the conditions.
-    pub(super) unsafe fn on_external(
-        external: ExternalDevice,
-        overrides: &DeviceOverrides,
-    ) -> Result<Arc<Self>, GpuError> {
+    pub unsafe fn on_external(external: ExternalDevice, overrides: &DeviceOverrides) -> Result<Arc<Self>, GpuError> {
         let instance = Instance::external(external.entry, external.instance);
         let (physical, info) = list(&instance)?
             .into_iter()

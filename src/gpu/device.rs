@@ -6,6 +6,28 @@ use super::{Context, ContextOptions, DeviceInfo, DeviceOverrides, ExternalDevice
 
 /// An open Vulkan device. A clone is a second handle to the same device, and any number of threads may use it at once.
 /// The device stays open as long as there is a handle, or an engine, renderer or caster that works on it.
+///
+/// Safe code renders and casts. Buffers, commands and kernels need [`Device::context`], which is unsafe:
+///
+/// ```no_run
+/// # fn main() -> Result<(), kdray::gpu::GpuError> {
+/// let device = kdray::gpu::Device::open(&Default::default())?;
+/// // SAFETY: the buffer is not given to a kernel.
+/// let context = unsafe { device.context() };
+/// let buffer = kdray::gpu::Buffer::<u32>::new(context, "numbers", 8, kdray::gpu::BufferUse::Storage)?;
+/// # Ok(())
+/// # }
+/// ```
+///
+/// ```compile_fail,E0133
+/// # fn main() -> Result<(), kdray::gpu::GpuError> {
+/// let device = kdray::gpu::Device::open(&Default::default())?;
+///
+/// let context = device.context();
+/// let buffer = kdray::gpu::Buffer::<u32>::new(context, "numbers", 8, kdray::gpu::BufferUse::Storage)?;
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone)]
 pub struct Device(Arc<Context>);
 

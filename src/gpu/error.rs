@@ -131,6 +131,12 @@ impl GpuError {
         matches!(result, vk::Result::ERROR_DEVICE_LOST | vk::Result::ERROR_SURFACE_LOST_KHR)
     }
 
+    /// Whether the machine has no Vulkan loader or no driver, so that only the CPU is left. Every other error of
+    /// [`Device::open`](super::Device::open) tells of something that its caller can mend.
+    pub fn is_without_driver(&self) -> bool {
+        matches!(self, Self::NoLoader(_) | Self::NoDriver)
+    }
+
     /// Whether the device or the system has too little memory.
     pub fn is_out_of_memory(&self) -> bool {
         let out_of_memory = [vk::Result::ERROR_OUT_OF_DEVICE_MEMORY, vk::Result::ERROR_OUT_OF_HOST_MEMORY];

@@ -199,3 +199,150 @@ impl Drop for Slot {
         unsafe { self.context.device.raw.destroy_semaphore(self.acquired, None) };
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::{
+        io::{BufRead, BufReader},
+        num::NonZeroU32,
+        process::{Child, Command, Stdio},
+        ptr::NonNull,
+        sync::atomic::{AtomicBool, Ordering},
+        thread,
+    };
+
+    use raw_window_handle::{
+        DisplayHandle, HandleError, HasDisplayHandle, HasWindowHandle, WindowHandle, XcbDisplayHandle, XcbWindowHandle,
+    };
+    use x11rb::{
+        connection::Connection,
+        protocol::xproto::{ConfigureWindowAux, ConnectionExt as _, CreateWindowAux, WindowClass},
+        wrapper::ConnectionExt as _,
+        xcb_ffi::XCBConnection,
+    };
+
+    use super::*;
+    use crate::gpu::ContextOptions;
+
+    /// A window on an X server of its own.
+    struct Window {
+        id: u32,
+        screen_ix: usize,
+        connection: XCBConnection,
+        server: Child,
+    }
+
+    impl Window {
+        fn open() -> Arc<Self> {
+            let mut server = Command::new("Xvfb")
+                .args(["-displayfd", "1", "-nolisten", "tcp", "-screen", "0", "320x240x24"])
+                .stdout(Stdio::piped())
+                .stderr(Stdio::null())
+                .spawn()
+                .expect("Xvfb, which ./setup installs");
+            let mut number = String::new();
+            BufReader::new(server.stdout.take().unwrap()).read_line(&mut number).unwrap();
+            let name = std::ffi::CString::new(format!(":{}", number.trim())).unwrap();
+            let (connection, screen_ix) = XCBConnection::connect(Some(&name)).expect("a connection to Xvfb");
+            let (id, root) = (connection.generate_id().unwrap(), connection.setup().roots[screen_ix].root);
+            let (class, window) = (WindowClass::INPUT_OUTPUT, CreateWindowAux::new());
+            connection.create_window(0, id, root, 0, 0, 64, 48, 0, class, 0, &window).unwrap();
+            connection.map_window(id).unwrap();
+            connection.sync().unwrap();
+            Arc::new(Self { id, screen_ix, connection, server })
+        }
+
+        fn resize(&self, width: u32, height: u32) {
+            let size = ConfigureWindowAux::new().width(width).height(height);
+            self.connection.configure_window(self.id, &size).unwrap();
+            self.connection.sync().unwrap();
+        }
+    }
+
+    impl Drop for Window {
+        fn drop(&mut self) {
+            let _ = self.server.kill();
+            let _ = self.server.wait();
+        }
+    }
+
+    impl HasDisplayHandle for Window {
+        fn display_handle(&self) -> Result<DisplayHandle<'_>, HandleError> {
+            let connection = NonNull::new(self.connection.get_raw_xcb_connection());
+            let handle = XcbDisplayHandle::new(connection, self.screen_ix as i32);
+            // SAFETY: the connection lives as long as the window.
+            Ok(unsafe { DisplayHandle::borrow_raw(handle.into()) })
+        }
+    }
+
+    impl HasWindowHandle for Window {
+        fn window_handle(&self) -> Result<WindowHandle<'_>, HandleError> {
+            let handle = XcbWindowHandle::new(NonZeroU32::new(self.id).unwrap());
+            // SAFETY: the window is not destroyed before the connection ends.
+            Ok(unsafe { WindowHandle::borrow_raw(handle.into()) })
+        }
+    }
+
+    fn presenter(window: &Arc<Window>) -> (Arc<Context>, Presenter) {
+        let options = ContextOptions::new(None, true);
+        let (context, surface) = Context::for_window(&options, window.clone()).expect("a device that presents");
+        let presenter = Presenter::new(&context, surface, false).expect("a presenter");
+        (context, presenter)
+    }
+
+    /// Shows frames until `n_shown` have been shown.
+    fn show(presenter: &mut Presenter, n_shown: usize) {
+        let mut n = 0;
+        for _ in 0..50 * n_shown {
+            n += usize::from(presenter.present((64, 48), |_, _| Ok(())).expect("a frame"));
+            if n == n_shown {
+                return;
+            }
+        }
+        panic!("{n} of {n_shown} frames were shown");
+    }
+
+    #[test]
+    fn a_window_is_resized_while_another_thread_submits() {
+        let window = Window::open();
+        let (context, mut presenter) = presenter(&window);
+        let has_ended = AtomicBool::new(false);
+        thread::scope(|scope| {
+            let submit = || {
+                let mut n_runs = 0;
+                while !has_ended.load(Ordering::Relaxed) {
+                    context.run("work of another thread", |_| ()).expect("a run");
+                    n_runs += 1;
+                }
+                n_runs
+            };
+            let submitting = scope.spawn(submit);
+            for (width, height) in [(64, 48), (200, 100), (1, 1), (320, 240), (33, 77)] {
+                window.resize(width, height);
+                presenter.mark_stale();
+                show(&mut presenter, 10);
+            }
+            has_ended.store(true, Ordering::Relaxed);
+            assert!(submitting.join().expect("no panic") > 10);
+        });
+        drop(presenter);
+        assert_eq!(context.validation_messages(), Vec::<String>::new());
+    }
+
+    /// The image of a failed frame has been acquired by then, and its semaphore is signalled.
+    #[test]
+    fn frames_follow_one_that_could_not_be_recorded() {
+        let window = Window::open();
+        let (context, mut presenter) = presenter(&window);
+        for n_before in 0..4 {
+            show(&mut presenter, n_before);
+            context.fail_creations_after(Some(0));
+            let failed = presenter.present((64, 48), |_, _| Ok(())).expect_err("no command buffer");
+            assert!(failed.is_out_of_memory(), "{failed}");
+            context.fail_creations_after(None);
+        }
+        show(&mut presenter, 8);
+        drop(presenter);
+        assert_eq!(context.validation_messages(), Vec::<String>::new());
+    }
+}

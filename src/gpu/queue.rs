@@ -206,3 +206,23 @@ impl Drop for Fence {
         unsafe { self.device.raw.destroy_fence(self.raw, None) };
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{ContextOptions, Device};
+    use ash::vk;
+
+    #[test]
+    fn every_handle_sees_a_lost_device() {
+        let device = Device::open(&ContextOptions::new(None, true)).expect("a device with validation");
+        let (context, clone) = (device.inner(), device.clone());
+        context.run("before", |_| ()).expect("the device works");
+        assert!(!clone.is_lost());
+        // What a driver answers to the call of one thread.
+        assert!(context.queue.note(Err::<(), _>(vk::Result::ERROR_DEVICE_LOST)).is_err());
+        assert!(clone.is_lost());
+        let error = clone.inner().run("after", |_| ()).expect_err("no work is begun");
+        assert!(error.is_device_lost(), "{error}");
+        assert_eq!(device.validation_messages(), Vec::<String>::new());
+    }
+}

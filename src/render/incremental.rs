@@ -10,6 +10,7 @@ use tracing::info_span;
 
 use super::{Renderer, schedule::Schedule};
 use crate::{
+    buffers::Needs,
     frame::{Integrator, Pass, Picture, Profile, View},
     gpu::{CommandBuffer, GpuError},
     layout::{Batch, FalseColor, Feature, Frame, MOST_SAMPLES_LOG2, constants},
@@ -231,13 +232,15 @@ impl Renderer {
     /// Prepares a frame of paths: batches for its number of samples, and room for the sums of the samples.
     fn begin_paths(&mut self) -> Result<(), GpuError> {
         let samples_log2 = if self.draws_primary_rays_only() { 0 } else { self.samples_log2 };
-        let mut constants = *self.resources.constants();
-        if constants.samples_log2 != samples_log2 {
-            constants.samples_log2 = samples_log2;
+        if self.resources.constants().samples_log2 != samples_log2 {
+            let constants = Frame { samples_log2, ..*self.resources.constants() };
+            let wanted = self.budget.queue_capacity(self.context.limits(), self.context.info(), &constants);
+            let queue_capacity = wanted.max(constants.queue_capacity);
+            let constants = Frame { queue_capacity, ..constants };
             let spans = self.budget.spans(&constants, self.most_pixels);
             let schedule = Schedule::new(&self.context, &constants, spans, &self.in_use)?;
-            let mut resources = self.resources.with_bounces(&self.context, schedule.n_rows())?;
-            resources.set_constants(&constants);
+            let needs = Needs { constants: &constants, options: &self.in_use, n_bounces: schedule.n_rows() };
+            let resources = self.resources.for_frame(&self.context, None, &needs)?;
             (self.resources, self.schedule) = (resources, schedule);
         }
         // There is one sum for each bit of the number of samples. Those of the lowest bits become one with the frame's.

@@ -20,8 +20,6 @@ const MOST_PATHS: u64 = 1 << 24;
 const FEW_PATHS: u64 = 1 << 21;
 /// What a path takes in the queue's buffers, bytes.
 const PATH_BYTES: u64 = PathQueue::BYTES_PER_PATH as u64;
-/// The part of a device's memory that paths may take is 1 / this.
-const MEMORY_PER_PATHS: u64 = 8;
 
 /// The batches of a frame, and the objects whose size depends on their number.
 pub struct Schedule {
@@ -127,7 +125,8 @@ impl QueueSizing {
     }
 
     /// Returns the capacity that the queue should have: the caller's, if it is set. Otherwise the rays that the whole
-    /// picture is expected to make, but no more than [`MOST_RAYS`] and no more than the device's limits allow.
+    /// picture is expected to make, or the paths of the frame's samples, but no more than [`MOST_RAYS`] or
+    /// [`MOST_PATHS`], and no more than the device's limits allow.
     pub fn queue_capacity(&self, limits: &Limits, info: &DeviceInfo, constants: &Frame) -> u32 {
         if let Some(capacity) = self.fixed_capacity {
             return capacity;
@@ -136,7 +135,7 @@ impl QueueSizing {
         if self.of_paths {
             let most = limits.storage_range / size_of::<PathRay>() as u64;
             let most_in_groups = u64::from(limits.n_groups) * u64::from(RAY_GROUP_SIZE) / 2;
-            let wanted = n_pixels << self.most_samples_log2(info, n_pixels);
+            let wanted = n_pixels << constants.samples_log2;
             return wanted.min(most_paths(info)).min(most).min(most_in_groups).max(1 << MOST_SAMPLES_LOG2) as u32;
         }
         // The largest buffer of the queue is `rays` or `light_visibility`.
@@ -175,7 +174,7 @@ fn most_paths(info: &DeviceInfo) -> u64 {
     if info.is_software() {
         return FEW_PATHS;
     }
-    (info.memory_bytes / MEMORY_PER_PATHS / PATH_BYTES).clamp(FEW_PATHS, MOST_PATHS)
+    (info.memory_bytes / PathQueue::MEMORY_PER_PATHS / PATH_BYTES).clamp(FEW_PATHS, MOST_PATHS)
 }
 
 #[cfg(test)]
@@ -203,7 +202,7 @@ mod tests {
         let capacity = |memory_bytes: u64, kind: &str| {
             let limits = Limits { storage_range: u64::MAX, n_groups: u32::MAX, ..LIMITS };
             let sizing = QueueSizing { fixed_capacity: None, branches: false, of_paths: true };
-            let constants = Frame { width: 1024, height: 1024, ..Frame::default() };
+            let constants = Frame { width: 1024, height: 1024, samples_log2: 8, ..Frame::default() };
             sizing.queue_capacity(&limits, &info(memory_bytes, kind), &constants)
         };
         assert_eq!(capacity(1 << 40, "discrete GPU"), 1 << 24);

@@ -40,6 +40,11 @@ impl Traversal {
         matches!(self, Self::MaskBoxes | Self::Backtrack)
     }
 
+    /// Whether the algorithm reads the nodes' parents.
+    pub(crate) fn needs_parents(self) -> bool {
+        self.needs_boxes()
+    }
+
     /// Whether the algorithm reads the nodes' ropes.
     pub(crate) fn needs_ropes(self) -> bool {
         self == Self::Ropes

@@ -4,7 +4,7 @@
 use std::time::Instant;
 
 use kdray::{
-    buffers::Pixels,
+    buffers::{PathQueue, Pixels},
     engine::{Engine, choices::Workload},
     frame::{Crop, Goal, Integrator, RenderOptions},
     gpu::{Device, GpuError},
@@ -88,8 +88,14 @@ impl ScenePicture {
             Integrator::Whitted if self.n_samples > 1 => size_of::<[f32; 4]>() as u64,
             Integrator::Whitted => 0,
         };
-        let needed = allocated + bytes_of_sums * u64::from(options.width) * u64::from(options.height);
+        let n_pixels = u64::from(options.width) * u64::from(options.height);
         let available = device.info().memory_bytes;
+        // So do the paths of further samples in a frame, which get a part of the memory at most.
+        let bytes_of_paths = match options.integrator {
+            Integrator::Path => PathQueue::bytes_of_more_samples(n_pixels, self.n_samples, available),
+            Integrator::Whitted => 0,
+        };
+        let needed = allocated + bytes_of_sums * n_pixels + bytes_of_paths;
         if needed > available { Err(Problem::of_device_memory(needed, available)) } else { Ok(needed) }
     }
 
