@@ -127,7 +127,8 @@ mod tests {
     }
 
     /// Changes that make one option wrong, and how the error begins.
-    const CHANGES: &[(&str, fn(&mut RenderOptions))] = &[
+    type Change = fn(&mut RenderOptions);
+    const CHANGES: &[(&str, Change)] = &[
         ("width is 0, not 1 to 16384", |it| it.width = 0),
         ("width is 16385", |it| it.width = 16_385),
         ("height is 0", |it| it.height = 0),

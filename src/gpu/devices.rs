@@ -111,7 +111,7 @@ pub fn devices() -> Result<Vec<DeviceInfo>, GpuError> {
     Ok(list(&instance)?.into_iter().map(|(_, info)| info).collect())
 }
 
-/// Returns the device that [`Context::new`](super::Context::new) would open, without opening it.
+/// Returns the device that [`Device::open`](super::Device::open) would open, without opening it.
 ///
 /// # Errors
 /// There is no loader, driver or device of that name; the device lacks a feature; or a call fails.

@@ -129,6 +129,7 @@ pub struct RasterDesc {
 /// A raster pipeline for triangle lists, two-sided and without vertex buffers.
 pub struct RasterPipeline {
     pub(super) raw: Arc<RawPipeline>,
+    #[cfg(feature = "view")]
     pub(super) bindings: Arc<BindingLayout>,
     pub(super) name: &'static str,
 }
@@ -192,6 +193,11 @@ impl RasterPipeline {
         // SAFETY: all that `info` points to lives until the call returns.
         let raw = unsafe { device.raw.create_graphics_pipelines(device.pipeline_cache, &info, None) }
             .map_err(|(_, result)| GpuError::call("vkCreateGraphicsPipelines", desc.name)(result))?[0];
-        Ok(Self { raw: RawPipeline::new(context, raw, desc.name), bindings: bindings.clone(), name: desc.name })
+        Ok(Self {
+            raw: RawPipeline::new(context, raw, desc.name),
+            #[cfg(feature = "view")]
+            bindings: bindings.clone(),
+            name: desc.name,
+        })
     }
 }

@@ -334,7 +334,7 @@ mod tests {
     fn frames_follow_one_that_could_not_be_recorded() {
         let window = Window::open();
         let (context, mut presenter) = presenter(&window);
-        for n_before in 0..4 {
+        for n_before in 1..5 {
             show(&mut presenter, n_before);
             context.fail_creations_after(Some(0));
             let failed = presenter.present((64, 48), |_, _| Ok(())).expect_err("no command buffer");

@@ -50,7 +50,7 @@ impl Environment {
         if colours.is_empty() || colours.len() as u64 != u64::from(width) * u64::from(height) {
             return Err(format!("{} colours are not those of {width} x {height} pixels", colours.len()));
         }
-        if !rotation_degrees.is_finite() || !(strength >= 0.0 && strength.is_finite()) {
+        if !(rotation_degrees.is_finite() && strength >= 0.0 && strength.is_finite()) {
             return Err(format!("a rotation of {rotation_degrees} degrees or a strength of {strength} is no number"));
         }
         let usual = |part: &f32| *part >= 0.0 && *part <= MOST_RADIANCE;

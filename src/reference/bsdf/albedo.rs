@@ -56,7 +56,8 @@ pub fn ggx_albedo(cosine: f32, roughness: f32) -> GgxAlbedo {
     let loss = ((1.0 - z) * loss_polynomial(centred(z), powers, fifth)).clamp(0.0, 0.9);
     let smooth_grazing = x * x * x * x * x;
     let grazing = smooth_grazing + (1.0 - z) * grazing_polynomial(centred(z), powers, fifth);
-    GgxAlbedo { loss, grazing: grazing.clamp(0.0001, 1.0 - loss) }
+    // GLSL's `clamp`, which takes a limit that is NaN: Rust's panics.
+    GgxAlbedo { loss, grazing: grazing.max(0.0001).min(1.0 - loss) }
 }
 
 /// The mean of [`ggx_albedo`] over the hemisphere, weighted by the cosine.
@@ -84,4 +85,19 @@ pub fn sheen_albedo(cosine: f32, roughness: f32) -> f32 {
     let y = y * z + 0.4354193 + Vec4::new(0.27736488, -0.137553, 0.09287007, -0.070511475).dot(powers);
     let y = y.max(0.01);
     y * y
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As in the kernels, a direction that is none has an albedo that is none, and ends nothing.
+    #[test]
+    fn a_cosine_that_is_nan_does_not_panic() {
+        for (cosine, roughness) in [(f32::NAN, 0.5), (0.0, 0.0), (0.5, f32::NAN)] {
+            let GgxAlbedo { loss, grazing } = ggx_albedo(cosine, roughness);
+            assert!(loss.is_nan() || (0.0..=0.9).contains(&loss), "{cosine}, {roughness}: {loss}");
+            assert!(grazing.is_nan() || (0.0001..=1.0).contains(&grazing), "{cosine}, {roughness}: {grazing}");
+        }
+    }
 }

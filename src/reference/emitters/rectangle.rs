@@ -89,11 +89,11 @@ fn vector_to_rectangle(light: &AreaLight, seen: &SeenRectangle, u: Vec2) -> Vec3
     let rest = squared / (y0 * y0 + squared);
     let root = (n * n - rest * sine * sine).max(1e-20).sqrt();
     let sign = if n > 0.0 { 1.0 } else { -1.0 };
-    let x = (seen.height * sine * sign / root).clamp(x0, x1);
+    let x = (seen.height * sine * sign / root).max(x0).min(x1);
     let across = x * x + squared;
     let [low, high] = [y0, y1].map(|y| y / (across + y * y).sqrt());
     let at = low + u.y * (high - low);
-    let y = (at * (across / (1.0 - at * at).max(1e-20)).sqrt()).clamp(y0, y1);
+    let y = (at * (across / (1.0 - at * at).max(1e-20)).sqrt()).max(y0).min(y1);
     x * light.edge_u.normalize() + y * light.edge_v.normalize() - seen.height * light.axis
 }
 
