@@ -33,8 +33,8 @@ impl PathQueue {
     /// The part of a device's memory that paths may take is 1 / this.
     pub const MEMORY_PER_PATHS: u64 = 8;
 
-    /// Returns an upper bound of the bytes by which the queue grows when a frame draws several of `n_samples` samples of
-    /// each pixel. It begins with room for one.
+    /// Returns an upper bound of the bytes by which the queue grows when a frame draws several of `n_samples` samples
+    /// of each pixel. It begins with room for one.
     pub fn bytes_of_more_samples(n_pixels: u64, n_samples: u32, memory_bytes: u64) -> u64 {
         let n_more = u64::from(n_samples.clamp(1, 1 << MOST_SAMPLES_LOG2) - 1);
         (Self::BYTES_PER_PATH as u64 * n_pixels * n_more).min(memory_bytes / Self::MEMORY_PER_PATHS)

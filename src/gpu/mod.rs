@@ -2,8 +2,8 @@
 //!
 //! All of the crate's `unsafe` is here. Every handle is released by its owner's `Drop`. Commands keep what they use,
 //! and the queue keeps commands until the device has ended them, so objects may be dropped at any time and in any
-//! order. All threads may use a [`Context`] at once. Names that begin with `External` are Vulkan objects that the library's
-//! caller owns.
+//! order. All threads may use a [`Context`] at once. Names that begin with `External` are Vulkan objects that the
+//! library's caller owns.
 //!
 //! ```text
 //! context ─> queue ─> in flight: commands ─> pipelines, sets ─> buffers, images

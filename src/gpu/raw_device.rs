@@ -1,5 +1,5 @@
-//! The open device, which every Vulkan object holds until it is released. It knows no queue, so an object that the queue
-//! still keeps alive does not keep the queue alive.
+//! The open device, which every Vulkan object holds until it is released. It knows no queue, so an object that the
+//! queue still keeps alive does not keep the queue alive.
 
 use std::{
     ffi::CString,

@@ -10,8 +10,8 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Time limit of each wait in the tests. It is longer than anything that they wait for takes on a busy machine. Pictures
-/// that take seconds alone have taken more than two minutes beside ten busy programs on two cores.
+/// Time limit of each wait in the tests. It is longer than anything that they wait for takes on a busy machine.
+/// Pictures that take seconds alone have taken more than two minutes beside ten busy programs on two cores.
 pub const PATIENCE: Duration = Duration::from_secs(600);
 
 /// Returns the command with arguments, to be run in a directory.
