@@ -257,22 +257,25 @@ fn rays_from_afar(world: &MeshWithTree, n: usize) -> Vec<Ray> {
         let within = random.in_box(world.tree().box_min(), world.tree().box_max());
         let distance = world.radius() * 2f32.powf(random.between(1.0, 9.0));
         let towards = random.direction();
-        let (scale, t_min) = (2f32.powf(random.between(-9.0, 9.0)), if i % 4 == 0 { -1e9 } else { 0.0 });
-        let ray = ray(within - distance * towards, if i % 8 == 0 { -towards } else { towards });
+        let (scale, t_min) = (2f32.powf(random.between(-9.0, 9.0)), if i.is_multiple_of(4) { -1e9 } else { 0.0 });
+        let ray = ray(within - distance * towards, if i.is_multiple_of(8) { -towards } else { towards });
         scaled(&ray, t_min, scale)
     };
     (0..n).map(ray).collect()
 }
+
+/// A way to cast rays: its name, and what casts.
+type Way<'a> = (String, Box<dyn FnMut(&[Ray], Query) -> Vec<Hit> + 'a>);
 
 /// Returns how rays can be cast into a mesh: on the device and on the CPU, by each algorithm and structure.
 fn ways_to_cast<'a>(
     device: &Device,
     world: &'a MeshWithTree,
     (grids, bvh): (&'a [Accel], &'a WideBvh),
-) -> Vec<(String, Box<dyn FnMut(&[Ray], Query) -> Vec<Hit> + 'a>)> {
+) -> Vec<Way<'a>> {
     let trees = Traversal::ALL.iter().map(|&traversal| (traversal, world.geometry()));
     let of_grid = |grid| (Traversal::Mask, Geometry::new(&world.triangles, grid).expect("a grid of these triangles"));
-    let mut ways: Vec<(String, Box<dyn FnMut(&[Ray], Query) -> Vec<Hit>>)> = Vec::new();
+    let mut ways: Vec<Way> = Vec::new();
     for (way_ix, (traversal, geometry)) in trees.chain(grids.iter().map(of_grid)).enumerate() {
         let name = format!("{way_ix}: {} by {traversal}", geometry.accel().kind());
         let mut caster = Caster::new(&device.0, geometry, traversal).expect("a caster");

@@ -1,6 +1,8 @@
 //! Tests that what a program assembles is checked before a kernel reads it: each wrong world, option or query gives an
 //! error that names what is wrong, on the device and on the CPU.
 
+#![allow(clippy::duplicate_mod, reason = "the fuzz target takes `assembled` without `support`")]
+
 #[path = "support/assembled.rs"]
 mod assembled;
 mod support;
@@ -202,7 +204,7 @@ fn a_leaf_of_a_light_is_not_taken_from_the_scene() {
         kind: AREA_SPHERE,
         position: 2.0 * Vec3::new((i as f32).sin(), 1.0, (i as f32).cos()),
         radius: 0.01,
-        radiance: if i % 3 == 0 { Vec3::ZERO } else { Vec3::ONE },
+        radiance: if i.is_multiple_of(3) { Vec3::ZERO } else { Vec3::ONE },
         area: 1e-3,
         leaf_ix: 1 << 20,
         probability: f32::NAN,

@@ -282,7 +282,9 @@ fn all_aovs(integrator: Integrator) -> (Vec<Aov>, String) {
 #[test]
 fn the_command_writes_all_layers_of_parts_of_pictures() {
     let scene = cornell();
-    let parts: [(&[&str], (u32, u32), Option<u32>); 5] = [
+    /// Arguments, the size that they give, and the number of samples, if it is known.
+    type Part<'a> = (&'a [&'a str], (u32, u32), Option<u32>);
+    let parts: [Part; 5] = [
         (&["--spp", "3", "--crop", "3,2,9,11"], (6, 9), Some(3)),
         (&["--spp", "3", "--tile", "2/3"], (16, 4), Some(3)),
         (&["--spp", "3", "--crop", "0,0,16,12", "--repeat", "2"], (16, 12), Some(3)),
