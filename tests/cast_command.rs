@@ -10,7 +10,7 @@ use std::{
 
 use npyz::{NpyFile, WriterBuilder};
 use serde_json::Value;
-use support::command::{cornell, fail, kdray, names, stderr, stdout, succeed};
+use support::command::{COMPLAINTS, cornell, fail, kdray, names, stderr, stdout, succeed};
 use tempfile::TempDir;
 use zip::ZipArchive;
 
@@ -293,13 +293,12 @@ mod unix {
     }
 }
 
-/// The validation layer's best-practice messages, enabled by an environment variable, stand in for an error.
 #[test]
 fn a_validation_message_fails() {
     let directory = with_mesh();
     save(&directory.path().join("rays.npy"), &RAYS);
     let output = kdray(directory.path(), &["cast", "mesh.obj", "rays.npy", "-o", "x.npz", "--validate", "-q"])
-        .env("VK_LAYER_ENABLES", "VK_VALIDATION_FEATURE_ENABLE_BEST_PRACTICES_EXT")
+        .env(COMPLAINTS.0, COMPLAINTS.1)
         .output()
         .unwrap();
     assert_eq!(output.status.code(), Some(4), "{}", stderr(&output));

@@ -9,7 +9,7 @@ use std::{
 };
 
 use serde_json::Value;
-use support::command::{cornell, fail, kdray, names, pixels, stderr, stdout, succeed};
+use support::command::{COMPLAINTS, cornell, fail, kdray, names, pixels, stderr, stdout, succeed};
 use tempfile::TempDir;
 
 #[test]
@@ -427,13 +427,12 @@ fn the_validation_layer_has_nothing_to_say() {
     render_small(directory.path(), &["--validate", "-o", "x.png"]);
 }
 
-/// The validation layer's best-practice messages, enabled by an environment variable, stand in for an error.
 #[test]
 fn a_validation_message_is_listed_and_fails() {
     let directory = TempDir::new().unwrap();
     let scene = cornell();
     let output = kdray(directory.path(), &["render", &scene, "--size", "64x48", "--validate", "-q", "-o", "x.png"])
-        .env("VK_LAYER_ENABLES", "VK_VALIDATION_FEATURE_ENABLE_BEST_PRACTICES_EXT")
+        .env(COMPLAINTS.0, COMPLAINTS.1)
         .output()
         .unwrap();
     let text = stderr(&output);

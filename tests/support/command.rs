@@ -14,6 +14,13 @@ use std::{
 /// Pictures that take seconds alone have taken more than two minutes beside ten busy programs on two cores.
 pub const PATIENCE: Duration = Duration::from_secs(600);
 
+/// An environment variable that makes the validation layer complain of what is no error, and its value: advice for a
+/// vendor's GPUs, which kdray does not follow. Such a message stands in for an error.
+pub const COMPLAINTS: (&str, &str) = (
+    "VK_LAYER_ENABLES",
+    "VK_VALIDATION_FEATURE_ENABLE_BEST_PRACTICES_EXT:VALIDATION_CHECK_ENABLE_VENDOR_SPECIFIC_NVIDIA",
+);
+
 /// Returns the command with arguments, to be run in a directory.
 pub fn kdray(directory: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_kdray"));

@@ -19,7 +19,7 @@ use std::{
 
 use serde_json::Value;
 use support::{
-    command::{PATIENCE, cornell, kdray, names, stderr, stdout, succeed},
+    command::{COMPLAINTS, PATIENCE, cornell, kdray, names, stderr, stdout, succeed},
     display::{Display, Screen},
 };
 use tempfile::TempDir;
@@ -343,7 +343,7 @@ fn usage_mistakes_are_refused_before_there_is_a_window() {
 fn a_validation_message_fails() {
     let (directory, display) = (TempDir::new().unwrap(), Display::start(320, 240));
     let mut command = kdray(directory.path(), &["view", &cornell(), "--frames", "1", "--validate", "-q"]);
-    command.env("DISPLAY", &display.name).env("VK_LAYER_ENABLES", "VK_VALIDATION_FEATURE_ENABLE_BEST_PRACTICES_EXT");
+    command.env("DISPLAY", &display.name).env(COMPLAINTS.0, COMPLAINTS.1);
     let output = command.output().unwrap();
     let text = stderr(&output);
     assert_eq!(output.status.code(), Some(4), "{text}");
