@@ -136,7 +136,7 @@ fn refused_options_change_nothing() {
     let mut renderer = Renderer::new(context.clone(), &world, &options(40, 30, 3)).expect("a renderer");
     let before = sampled(&mut renderer, 1);
     let refused = renderer.resize(1 << 20, 1);
-    assert!(matches!(refused, Err(GpuError::Limit { .. })), "{:?}", refused.err());
+    assert!(matches!(refused, Err(GpuError::BadOptions(_))), "{:?}", refused.err());
     assert!(identical(&before, &sampled(&mut renderer, 1)));
     assert_silent(&context);
 }
