@@ -1,6 +1,8 @@
 //! Changes between frames: of the camera, the size, the crop and the options. The scene and its acceleration
 //! structure stay on the device; a change of the traversal adds the links that it reads.
 
+use std::sync::Arc;
+
 use super::{Renderer, in_use, lanes_to_share, schedule::Schedule};
 use crate::{
     buffers::{Needs, Resources},
@@ -102,7 +104,7 @@ impl Renderer {
         match room {
             None => self.resources.set_constants(&constants),
             Some((resources, schedule)) => {
-                if !std::ptr::eq(resources.pixels.pixel_display.any(), self.resources.pixels.pixel_display.any()) {
+                if !Arc::ptr_eq(resources.pixels.pixel_display.any(), self.resources.pixels.pixel_display.any()) {
                     self.displayed = None;
                 }
                 self.reset_samples();
