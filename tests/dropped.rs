@@ -30,17 +30,6 @@ const MAY_COPY: u64 = 2;
 const COPIED: u64 = 3;
 const READ: u64 = 4;
 
-const MARKS: DeviceOverrides = DeviceOverrides {
-    storage_range: None,
-    n_texels: None,
-    n_lanes: None,
-    no_int64_atomics: false,
-    loop_limit: None,
-    marks_released: true,
-    bounds_checks: false,
-    n_stall_slots: None,
-};
-
 /// Runs an ignored test of this file in a process of its own, under the validation layer, which prints its messages.
 fn run_validated(test: &str) {
     let output = Command::new(env::current_exe().expect("this program"))
@@ -68,8 +57,9 @@ fn orders(n: usize) -> Vec<Vec<usize>> {
 /// # Safety
 /// The program outlives the device.
 unsafe fn device(program: &Program) -> Device {
+    let overrides = DeviceOverrides { marks_released: true, ..DeviceOverrides::default() };
     // SAFETY: the handles are the program's, and its queue has a lock of its own.
-    unsafe { Context::on_external(program.external(), &MARKS) }.expect("the program's device").into()
+    unsafe { Context::on_external(program.external(), &overrides) }.expect("the program's device").into()
 }
 
 #[test]

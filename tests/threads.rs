@@ -80,7 +80,7 @@ fn clones_of_an_engine_render_and_cast_at_once() {
     assert_silent(&context);
 }
 
-/// Renderers of one engine, one in each thread, keep drawing. Every second one is dropped in the middle and made anew.
+/// Renderers of one engine, one in each thread, keep drawing. Every second thread replaces its renderer halfway.
 #[test]
 fn renderers_of_an_engine_draw_at_once() {
     let context = device();

@@ -324,7 +324,7 @@ impl RenderArgs {
     /// Refuses arguments that several devices cannot serve.
     pub fn check_devices(&self, n_devices: usize) -> Result<(), CliError> {
         let refused = [(self.time.is_some(), "--time"), (self.trace.is_some(), "--trace")];
-        match refused.iter().find(|(is_external, _)| *is_external && n_devices > 1) {
+        match refused.iter().find(|(is_given, _)| *is_given && n_devices > 1) {
             Some((_, name)) => Err(CliError::Usage(format!("{name} needs a single device, and there are {n_devices}"))),
             None => Ok(()),
         }

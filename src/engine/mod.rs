@@ -117,7 +117,7 @@ impl Engine {
 
     /// Returns the kind of processor that the engine runs on.
     pub fn processor(&self) -> Processor {
-        Processor::of(self.context().map(|context| &**context))
+        Processor::of(self.context().map(Arc::as_ref))
     }
 
     /// Returns the device's own name, or the CPU with its number of threads.

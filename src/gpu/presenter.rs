@@ -92,7 +92,8 @@ impl Presenter {
         let slot = &mut self.slots[self.next_slot];
         slot.prepare()?;
         let Some(swapchain) = &self.swapchain else { return Ok(false) };
-        // A frame that fails before its image is shown leaves the image to the swapchain, which is then made anew.
+        // If the frame fails before its image is shown, the image stays acquired until a new swapchain replaces this
+        // one.
         let was_stale = std::mem::replace(&mut self.stale, true);
         let (image_ix, is_suboptimal) = match swapchain.acquire(slot.acquired)? {
             Outcome::Good(image_ix) => (image_ix, false),
@@ -154,10 +155,10 @@ impl Slot {
         Ok(Self { acquired, has_acquired: false, drawing: None, context: context.clone() })
     }
 
-    /// Waits until the slot's frame is drawn, and makes sure that `acquired` can be signalled again.
+    /// Waits until the slot's previous frame is drawn, and until no signal of `acquired` is left unwaited.
     fn prepare(&mut self) -> Result<(), GpuError> {
         if self.has_acquired {
-            // The last frame of the slot has failed after the acquire.
+            // The slot's previous frame failed after it had acquired its image.
             self.submit_after_acquire(&[], &[], Vec::new())?;
         }
         self.drawing.take().map_or(Ok(()), |drawing| self.context.wait_for(drawing))
@@ -329,7 +330,7 @@ mod tests {
         assert_eq!(context.validation_messages(), Vec::<String>::new());
     }
 
-    /// The image of a failed frame has been acquired by then, and its semaphore is signalled.
+    /// When a frame fails to record, its image is already acquired, and the semaphore of the acquire is signalled.
     #[test]
     fn frames_follow_one_that_could_not_be_recorded() {
         let window = Window::open();
