@@ -155,30 +155,17 @@ fn unusual_scenes_are_drawn() {
     textures.uvs.extend_from_within(..);
     textures.uvs[3] = [Vec2::splat(f32::NAN), Vec2::splat(f32::MAX), Vec2::splat(f32::NEG_INFINITY)];
     let last = textures.textures.len() as u32 - 1;
-    let all = [last; 10];
-    let [
-        base_colour,
-        opacity,
-        specular,
-        specular_factor,
-        emission,
-        normal,
-        roughness,
-        metallic,
-        transmission,
-        occlusion,
-    ] = all;
     let maps = MaterialMaps {
-        base_colour,
-        opacity,
-        specular,
-        specular_factor,
-        emission,
-        normal,
-        roughness,
-        metallic,
-        transmission,
-        occlusion,
+        base_colour: last,
+        opacity: last,
+        specular: last,
+        specular_factor: last,
+        emission: last,
+        normal: last,
+        roughness: last,
+        metallic: last,
+        transmission: last,
+        occlusion: last,
         flags: u32::MAX,
         ..textures.material_maps[2]
     };
