@@ -57,10 +57,10 @@ fn scene_bytes(tree: &SceneArrays, traversal: Traversal) -> Vec<u64> {
         tree.triangles.any(),
         tree.triangle_materials.any(),
         tree.kd_nodes.any(),
-        tree.kd_parents.any(),
         tree.leaf_triangles.any(),
     ];
     // An array that the kernels would not read is empty.
+    buffers.extend((!tree.kd_parents.is_empty()).then(|| tree.kd_parents.any()));
     buffers.extend((!tree.leaf_planes.is_empty()).then(|| tree.leaf_planes.any()));
     buffers.extend((!tree.kd_slabs.is_empty()).then(|| tree.kd_slabs.any()));
     let has_boxes = matches!(traversal, Traversal::MaskBoxes | Traversal::Backtrack);
