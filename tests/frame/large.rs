@@ -53,12 +53,8 @@ pub fn large_world() -> World {
 
 /// Returns the size in bytes of each array that grows with the scene, including those that only this traversal needs.
 fn scene_bytes(tree: &SceneArrays, traversal: Traversal) -> Vec<u64> {
-    let mut buffers = vec![
-        tree.triangles.any(),
-        tree.triangle_materials.any(),
-        tree.kd_nodes.any(),
-        tree.leaf_triangles.any(),
-    ];
+    let mut buffers =
+        vec![tree.triangles.any(), tree.triangle_materials.any(), tree.kd_nodes.any(), tree.leaf_triangles.any()];
     // An array that the kernels would not read is empty.
     buffers.extend((!tree.kd_parents.is_empty()).then(|| tree.kd_parents.any()));
     buffers.extend((!tree.leaf_planes.is_empty()).then(|| tree.leaf_planes.any()));
