@@ -86,11 +86,12 @@ impl Presenter {
         size: (u32, u32),
         body: impl FnOnce(&Commands, &WindowImage) -> Result<(), GpuError>,
     ) -> Result<bool, GpuError> {
+        // Also before a swapchain is replaced: its acquired image may have a signal that nothing waits for yet.
+        self.slots[self.next_slot].prepare()?;
         if self.stale {
             self.renew(size)?;
         }
         let slot = &mut self.slots[self.next_slot];
-        slot.prepare()?;
         let Some(swapchain) = &self.swapchain else { return Ok(false) };
         // If the frame fails before its image is shown, the image stays acquired until a new swapchain replaces this
         // one.
