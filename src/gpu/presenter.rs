@@ -86,7 +86,8 @@ impl Presenter {
         size: (u32, u32),
         body: impl FnOnce(&Commands, &WindowImage) -> Result<(), GpuError>,
     ) -> Result<bool, GpuError> {
-        // Also before a swapchain is replaced: its acquired image may have a signal that nothing waits for yet.
+        // A frame that failed may have left its semaphore signalled. The device waits for that signal before the
+        // swapchain that gave it is replaced.
         self.slots[self.next_slot].prepare()?;
         if self.stale {
             self.renew(size)?;

@@ -56,11 +56,12 @@ fn scene_bytes(tree: &SceneArrays, traversal: Traversal) -> Vec<u64> {
     let mut buffers =
         vec![tree.triangles.any(), tree.triangle_materials.any(), tree.kd_nodes.any(), tree.leaf_triangles.any()];
     // An array that the kernels would not read is empty.
-    buffers.extend((!tree.kd_parents.is_empty()).then(|| tree.kd_parents.any()));
     buffers.extend((!tree.leaf_planes.is_empty()).then(|| tree.leaf_planes.any()));
     buffers.extend((!tree.kd_slabs.is_empty()).then(|| tree.kd_slabs.any()));
     let has_boxes = matches!(traversal, Traversal::MaskBoxes | Traversal::Backtrack);
     buffers.extend(has_boxes.then(|| tree.kd_boxes.any()));
+    // The traversals that read boxes also walk up. The others need parents only where rays are suspended.
+    buffers.extend((has_boxes || !tree.kd_parents.is_empty()).then(|| tree.kd_parents.any()));
     buffers.extend((traversal == Traversal::Ropes).then(|| tree.kd_ropes.any()));
     buffers.iter().map(|buffer| buffer.bytes()).collect()
 }
