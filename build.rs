@@ -1,5 +1,5 @@
 //! Compiles `glsl/{passes,probes,driver}/*` to SPIR-V, and turns `glsl/shared/{layout,scene_arrays}.glsl` into Rust.
-//! Both go into `$OUT_DIR`.
+//! Both go into `$OUT_DIR`. A module whose text has not changed is not compiled again, whatever features are on.
 
 #[path = "src/layout/scene_arrays.rs"]
 mod scene_arrays;
@@ -10,7 +10,9 @@ use std::{
     collections::BTreeSet,
     env,
     fmt::Write,
-    fs, iter,
+    fs,
+    hash::{DefaultHasher, Hash, Hasher},
+    io, iter,
     path::{Path, PathBuf},
     sync::{
         Mutex,
@@ -56,6 +58,9 @@ fn main() {
     fs::write(out_dir.join("layout.rs"), layout).expect("write layout.rs");
     fs::write(out_dir.join("searching_modules.rs"), table_of_searching_modules()).expect("write searching_modules.rs");
 
+    let compiler_name = name_of_compiler();
+    println!("cargo::rustc-env=KDRAY_SPIRV_COMPILER={compiler_name}");
+    let cache = Cache::open(&compiler_name);
     let modules = modules();
     let n_threads = thread::available_parallelism().map_or(1, usize::from);
     let next_ix = AtomicUsize::new(0);
@@ -65,7 +70,7 @@ fn main() {
             scope.spawn(|| {
                 let compiler = shaderc::Compiler::new().expect("shaderc");
                 while let Some(module) = modules.get(next_ix.fetch_add(1, Ordering::Relaxed)) {
-                    let spirv = compile(&compiler, module);
+                    let spirv = cache.get_or_compile(&compiler, module);
                     compiled.lock().expect("no thread has panicked").push((&module.name, spirv));
                 }
             });
@@ -76,10 +81,7 @@ fn main() {
     let mut errors: Vec<String> = Vec::new();
     for (name, spirv) in compiled {
         match spirv {
-            Ok(spirv) => {
-                name_compiler(&spirv);
-                fs::write(out_dir.join(format!("{name}.spv")), spirv).expect("write SPIR-V");
-            }
+            Ok(spirv) => fs::write(out_dir.join(format!("{name}.spv")), spirv).expect("write SPIR-V"),
             Err(error) => {
                 let new: Vec<_> = error.lines().filter(|line| errors.iter().all(|known| known != line)).collect();
                 errors.extend(new.into_iter().map(str::to_owned));
@@ -132,11 +134,60 @@ fn with_includes(path: &Path) -> BTreeSet<PathBuf> {
     files
 }
 
-/// Tells the crate which compiler made the kernels: its SPIR-V version and its generator word (tool and its version),
-/// both from SPIR-V's header.
-fn name_compiler(spirv: &[u8]) {
-    let word = |ix: usize| u32::from_le_bytes(spirv[4 * ix..][..4].try_into().expect("SPIR-V has a header"));
-    println!("cargo::rustc-env=KDRAY_SPIRV_COMPILER=SPIR-V {:#x}, generator {:#010x}", word(1), word(2));
+/// Returns the compiler's SPIR-V version and its generator word (tool and its version), both from SPIR-V's header.
+fn name_of_compiler() -> String {
+    let compiler = shaderc::Compiler::new().expect("shaderc");
+    let source = "#version 460\nvoid main() {}";
+    let spirv = compiler.compile_into_spirv(source, shaderc::ShaderKind::Compute, "empty", "main", Some(&options(&[])));
+    let spirv = spirv.expect("the compiler accepts an empty shader");
+    let header = spirv.as_binary();
+    format!("SPIR-V {:#x}, generator {:#010x}", header[1], header[2])
+}
+
+/// SPIR-V of earlier runs of this program, one file per module and text. It lies beside the build scripts' folders, so
+/// that all sets of features share it, and hot reload too.
+struct Cache {
+    folder: PathBuf,
+    /// Hash of what determines SPIR-V beside a module's text: the compiler, and this file, which has the options.
+    state: DefaultHasher,
+}
+
+impl Cache {
+    fn open(compiler_name: &str) -> Self {
+        let program = env::current_exe().expect("this program's path");
+        let folder = program.ancestors().nth(2).expect("cargo builds in a folder per crate").join("kdray-spirv");
+        fs::create_dir_all(&folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
+        let mut state = DefaultHasher::new();
+        (compiler_name, include_str!("build.rs")).hash(&mut state);
+        Self { folder, state }
+    }
+
+    /// Returns a module's SPIR-V.
+    ///
+    /// # Errors
+    /// The compiler's output. A file that cannot be read or written is an error too.
+    fn get_or_compile(&self, compiler: &shaderc::Compiler, module: &Module) -> Result<Vec<u8>, String> {
+        let Source { name, text, kind, options } = &module.source()?;
+        // Comments and unused constants are gone from this text, so their changes compile nothing.
+        let preprocessed = compiler.preprocess(text, name, "main", Some(options)).map_err(|error| error.to_string())?;
+        let mut hasher = self.state.clone();
+        preprocessed.as_text().hash(&mut hasher);
+        let path = self.folder.join(format!("{}-{:016x}.spv", module.name, hasher.finish()));
+        if let Ok(spirv) = fs::read(&path) {
+            return Ok(spirv);
+        }
+        let artifact = compiler.compile_into_spirv(text, *kind, name, "main", Some(options));
+        let spirv = artifact.map_err(|error| error.to_string())?.as_binary_u8().to_vec();
+        write_whole(&path, &spirv).map_err(|error| format!("{}: {error}", path.display()))?;
+        Ok(spirv)
+    }
+}
+
+/// Writes a file so that no other process sees a part of it.
+fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let partial = path.with_extension(std::process::id().to_string());
+    fs::write(&partial, bytes)?;
+    fs::rename(partial, path)
 }
 
 /// Returns all modules, in a fixed order.
@@ -189,19 +240,36 @@ fn shaders_in_order() -> Vec<PathBuf> {
     shaders
 }
 
-/// Compiles a module for Vulkan 1.3, optimized. `#include "x.glsl"` reads from glsl/shared.
-fn compile(compiler: &shaderc::Compiler, module: &Module) -> Result<Vec<u8>, String> {
-    let Module { name, path, macros } = module;
-    let kind = match path.extension().and_then(|e| e.to_str()) {
-        Some("comp") => shaderc::ShaderKind::Compute,
-        Some("vert") => shaderc::ShaderKind::Vertex,
-        Some("frag") => shaderc::ShaderKind::Fragment,
-        Some("rgen") => shaderc::ShaderKind::RayGeneration,
-        Some("rmiss") => shaderc::ShaderKind::Miss,
-        Some("rchit") => shaderc::ShaderKind::ClosestHit,
-        _ => return Err(format!("{name}: a shader ends in .comp, .vert, .frag, .rgen, .rmiss or .rchit")),
-    };
-    let mut options = shaderc::CompileOptions::new().map_err(|e| e.to_string())?;
+/// What the compiler gets of a module.
+struct Source {
+    /// Path of the shader's file, by which the compiler's messages name it.
+    name: String,
+    text: String,
+    kind: shaderc::ShaderKind,
+    options: shaderc::CompileOptions<'static>,
+}
+
+impl Module {
+    fn source(&self) -> Result<Source, String> {
+        let Self { name, path, macros } = self;
+        let kind = match path.extension().and_then(|e| e.to_str()) {
+            Some("comp") => shaderc::ShaderKind::Compute,
+            Some("vert") => shaderc::ShaderKind::Vertex,
+            Some("frag") => shaderc::ShaderKind::Fragment,
+            Some("rgen") => shaderc::ShaderKind::RayGeneration,
+            Some("rmiss") => shaderc::ShaderKind::Miss,
+            Some("rchit") => shaderc::ShaderKind::ClosestHit,
+            _ => return Err(format!("{name}: a shader ends in .comp, .vert, .frag, .rgen, .rmiss or .rchit")),
+        };
+        let name = path.display().to_string();
+        let text = fs::read_to_string(path).map_err(|error| format!("{name}: {error}"))?;
+        Ok(Source { name, text, kind, options: options(macros) })
+    }
+}
+
+/// Returns the compiler's options: Vulkan 1.3, optimized. `#include "x.glsl"` reads from glsl/shared.
+fn options(macros: &[(&str, Option<String>)]) -> shaderc::CompileOptions<'static> {
+    let mut options = shaderc::CompileOptions::new().expect("shaderc");
     options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
     options.set_optimization_level(shaderc::OptimizationLevel::Performance);
     options.set_warnings_as_errors();
@@ -210,14 +278,10 @@ fn compile(compiler: &shaderc::Compiler, module: &Module) -> Result<Vec<u8>, Str
     }
     options.set_include_callback(|include, _, _, _| {
         let path = Path::new("glsl/shared").join(include);
-        let content = fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+        let content = fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
         Ok(shaderc::ResolvedInclude { resolved_name: path.display().to_string(), content })
     });
-    let source = fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
-    let artifact = compiler
-        .compile_into_spirv(&source, kind, &path.display().to_string(), "main", Some(&options))
-        .map_err(|e| e.to_string())?;
-    Ok(artifact.as_binary_u8().to_vec())
+    options
 }
 
 /// Generates Rust constants and structs from layout.glsl.
