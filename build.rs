@@ -44,13 +44,8 @@ fn main() {
     let out_dir = env::var("OUT_DIR").expect("cargo sets OUT_DIR");
     let out_dir = Path::new(&out_dir);
     println!("cargo::rerun-if-changed=glsl");
-    // With the feature `hot-reload`, a running kdray starts this program to compile changed shaders. So this file has
-    // the only compiler call, with the only set of options.
-    if env::var_os("CARGO_FEATURE_HOT_RELOAD").is_some() {
-        let compiler = env::current_exe().expect("this program's path");
-        println!("cargo::rustc-env=KDRAY_SHADER_COMPILER={}", compiler.display());
-    }
-
+    // `kdray view --shaders` starts this program to compile changed shaders, so this file has the only compiler call,
+    // with the only set of options.
     let layout = layout_in_rust().unwrap_or_else(|error| {
         println!("cargo::error={error}");
         std::process::exit(1);

@@ -38,7 +38,6 @@
 //! - `cli`: the command `kdray`.
 //! - `view`: windows, for `kdray view`.
 //! - `bench`: measurements and their charts, for `kdray bench`.
-//! - `hot-reload`: `kdray view` compiles the shaders again when they change, and swaps them in.
 //! - `shaderc-from-source`: the build compiles the GLSL compiler shaderc from its C++ source.
 //!
 //! The first three are on by default. A program that only renders or casts needs none of them.

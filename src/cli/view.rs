@@ -32,6 +32,7 @@ const SAMPLES_AT_REST: u32 = 256;
 pub fn run(args: &ViewArgs) -> Result<(), CliError> {
     args.picture.check()?;
     check_scene(args)?;
+    check_shaders(args)?;
     check_outputs(args)?;
     set_threads(args.threads)?;
     let display = Display::open()?;
@@ -66,6 +67,7 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
             screenshot: args.screenshot.clone(),
             record: args.record.clone(),
             opener: opener(args, processor),
+            shaders: args.shaders.clone(),
             // The window stays open even if the terminal is gone.
             print: |text| drop(print(text)),
         },
@@ -202,6 +204,16 @@ fn check_scene(args: &ViewArgs) -> Result<(), CliError> {
         return Err(CliError::Usage("--camera and --scene choose a part of SCENE, which is missing".into()));
     }
     Ok(())
+}
+
+/// Refuses a checkout that has no shaders.
+fn check_shaders(args: &ViewArgs) -> Result<(), CliError> {
+    match &args.shaders {
+        Some(checkout) if !checkout.join("glsl").is_dir() => {
+            Err(CliError::Usage(format!("--shaders {}: there is no folder glsl in it", checkout.display())))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Refuses outputs that cannot be written, or that the command also reads.

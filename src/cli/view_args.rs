@@ -44,6 +44,9 @@ pub struct ViewArgs {
     /// Start without the panel over the picture; Tab shows it
     #[arg(long)]
     pub no_overlay: bool,
+    /// Follow changes of the kernels in this checkout of kdray: compile them again and go on with them
+    #[arg(long, value_name = "CHECKOUT")]
+    pub shaders: Option<PathBuf>,
     /// Move the camera along the keyframes of this TOML file, then exit
     #[arg(long, value_name = "FILE", requires = "scene")]
     pub path: Option<PathBuf>,

@@ -15,7 +15,7 @@ pub(super) enum Rank {
     /// Layouts of descriptor sets and pipelines.
     Layouts,
     /// Shaders that replace those of the program.
-    #[cfg(feature = "hot-reload")]
+    #[cfg(feature = "view")]
     Replacements,
     /// Command pools that are not in use.
     Pools,

@@ -60,7 +60,7 @@ pub use memory::MemoryUse;
 /// [`Context`](internal::Context), to which [`Device::context`] alone leads from outside of the crate.
 #[doc(hidden)]
 pub mod internal {
-    #[cfg(feature = "hot-reload")]
+    #[cfg(feature = "view")]
     pub use super::shader::Replacements;
     pub use super::{
         acceleration::DriverAccel,

@@ -59,7 +59,7 @@ pub(super) struct RawDevice {
     pub limits: Limits,
     pub overrides: DeviceOverrides,
     pub failure_injection: FailureInjection,
-    #[cfg(feature = "hot-reload")]
+    #[cfg(feature = "view")]
     pub replacements: Mutex<super::Replacements>,
     /// Whether the library's caller owns the device and destroys it.
     pub is_external: bool,
@@ -122,7 +122,7 @@ impl RawDevice {
             info,
             overrides: *overrides,
             failure_injection: FailureInjection::never(),
-            #[cfg(feature = "hot-reload")]
+            #[cfg(feature = "view")]
             replacements: Mutex::default(),
             limits: Limits::of(&instance, physical).reduced_to(overrides),
             is_external,

@@ -4,7 +4,7 @@ use std::io::Cursor;
 
 use ash::vk;
 
-#[cfg(feature = "hot-reload")]
+#[cfg(feature = "view")]
 use super::lock::{Rank, lock_anyway};
 use super::{GpuError, raw_device::RawDevice};
 
@@ -18,10 +18,10 @@ pub struct Shader {
 }
 
 /// SPIR-V modules that replace those compiled into the program. The key is [`Shader::file`].
-#[cfg(feature = "hot-reload")]
+#[cfg(feature = "view")]
 pub type Replacements = std::collections::HashMap<String, Vec<u8>>;
 
-#[cfg(feature = "hot-reload")]
+#[cfg(feature = "view")]
 impl super::Context {
     /// Sets the replacements from which later pipelines are made, and returns the earlier replacements.
     pub fn replace_shaders(&self, replacements: Replacements) -> Replacements {
@@ -38,7 +38,7 @@ pub(super) struct ShaderModule<'a> {
 
 impl<'a> ShaderModule<'a> {
     pub(super) fn new(device: &'a RawDevice, shader: Shader) -> Result<Self, GpuError> {
-        #[cfg(feature = "hot-reload")]
+        #[cfg(feature = "view")]
         {
             let replacements = lock_anyway(Rank::Replacements, &device.replacements);
             if let Some(spirv) = replacements.get(shader.file) {

@@ -77,7 +77,7 @@ impl Renderer {
     ///
     /// # Errors
     /// The driver refuses a shader. Then all kernels are as before.
-    #[cfg(feature = "hot-reload")]
+    #[cfg(feature = "view")]
     pub fn remake_passes(&mut self) -> Result<(), GpuError> {
         let passes = crate::passes::FramePasses::new(&self.context, &self.resources.bindings, &self.in_use)?;
         self.reset_samples();

@@ -214,8 +214,7 @@ impl App {
             Ok(gpu) => {
                 self.is_reopened = true;
                 // Replaced shaders were lost with the device, so they are compiled again.
-                #[cfg(feature = "hot-reload")]
-                self.reloader.shaders.compile();
+                self.reloader.compile_shaders();
                 self.shown = Some(Shown { gpu, ui: Ui::new(&window), window });
             }
             Err(error) => self.end(event_loop, Err(error.into())),
@@ -320,15 +319,13 @@ impl ApplicationHandler<Wake> for App {
                     window.request_redraw();
                 }
             }
-            #[cfg(feature = "hot-reload")]
-            Wake::ShadersChanged => self.reloader.shaders.compile(),
-            #[cfg(feature = "hot-reload")]
+            Wake::ShadersChanged => self.reloader.compile_shaders(),
             Wake::Compiled(shaders) => {
                 if let Some(Shown { gpu, window, .. }) = &mut self.shown {
                     self.session.replace_shaders(gpu, shaders);
                     window.request_redraw();
                 }
-                self.reloader.shaders.done();
+                self.reloader.shaders_compiled();
             }
         }
     }

@@ -36,6 +36,8 @@ pub struct ViewOptions {
     pub record: Option<PathBuf>,
     /// Loads the files that the user opens.
     pub opener: Opener,
+    /// Checkout of kdray whose shaders are compiled again when they change.
+    pub shaders: Option<PathBuf>,
     /// Prints text to the terminal.
     pub print: fn(&str),
 }
@@ -96,7 +98,8 @@ impl Display {
     pub fn view(self, loaded: LoadedScene, options: ViewOptions) -> Result<ViewReport, ViewError> {
         let script =
             (options.tour.clone()).map(|tour| Script::new(tour, options.record.clone(), options.screenshot.clone()));
-        let reloader = Reloader::new(&loaded, options.opener.clone(), self.event_loop.create_proxy());
+        let (opener, shaders) = (options.opener.clone(), options.shaders.as_deref());
+        let reloader = Reloader::new(&loaded, opener, shaders, self.event_loop.create_proxy());
         let proxy = self.event_loop.create_proxy();
         // An error means that the viewer has ended; then nothing needs to be woken.
         let saver = Saver::new(move || drop(proxy.send_event(Wake::Saved)));

@@ -140,7 +140,6 @@ impl GpuSession {
     ///
     /// # Errors
     /// The driver refuses a shader.
-    #[cfg(feature = "hot-reload")]
     pub fn replace_shaders(&mut self, shaders: crate::gpu::Replacements) -> Result<(), GpuError> {
         self.context.wait_for_all()?;
         let before = self.context.replace_shaders(shaders);

@@ -10,7 +10,6 @@ const SHOWN_FOR: Duration = Duration::from_secs(8);
 pub enum Topic {
     Device,
     Scene,
-    #[cfg(feature = "hot-reload")]
     Shaders,
     Settings,
     File,

@@ -24,7 +24,6 @@ mod reload;
 mod saver;
 mod script;
 mod session;
-#[cfg(feature = "hot-reload")]
 mod shaders;
 pub mod tour;
 mod ui;

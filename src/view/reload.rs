@@ -16,6 +16,7 @@ use super::{
     message::Topic,
     opened::{Opened, Opener},
     session::Session,
+    shaders::Shaders,
     watch::Watch,
 };
 use crate::{
@@ -36,10 +37,8 @@ pub enum Wake {
     /// A file that the user opens was loaded, or could not be loaded.
     Opened(Box<Result<Opened, String>>),
     /// A shader has changed.
-    #[cfg(feature = "hot-reload")]
     ShadersChanged,
     /// The shaders were compiled again, or could not be compiled.
-    #[cfg(feature = "hot-reload")]
     Compiled(Result<crate::gpu::Replacements, String>),
 }
 
@@ -80,18 +79,18 @@ pub struct Reloader {
     is_changed: bool,
     /// The file that the user has opened last, until its loading begins.
     to_open: Option<PathBuf>,
-    #[cfg(feature = "hot-reload")]
-    pub shaders: super::shaders::Shaders,
+    /// None unless shaders are compiled again when they change.
+    shaders: Option<Shaders>,
 }
 
 impl Reloader {
-    pub fn new(loaded: &LoadedScene, opener: Opener, proxy: EventLoopProxy<Wake>) -> Self {
+    /// `shaders`: the checkout whose shaders are compiled again when they change, if there is one.
+    pub fn new(loaded: &LoadedScene, opener: Opener, shaders: Option<&Path>, proxy: EventLoopProxy<Wake>) -> Self {
         let mut reloader = Self {
             path: loaded.path.clone(),
             load_options: loaded.load_options.clone(),
             files: BTreeSet::new(),
-            #[cfg(feature = "hot-reload")]
-            shaders: super::shaders::Shaders::new(proxy.clone()),
+            shaders: shaders.map(|checkout| Shaders::new(checkout, proxy.clone())),
             proxy,
             _watch: None,
             opener,
@@ -124,6 +123,16 @@ impl Reloader {
     pub fn load(&mut self) {
         self.is_changed = true;
         self.start();
+    }
+
+    /// Starts to compile the shaders again, if they are those of a checkout.
+    pub fn compile_shaders(&mut self) {
+        self.shaders.iter_mut().for_each(Shaders::compile);
+    }
+
+    /// Notes that a compilation has ended, and starts the one that is due.
+    pub fn shaders_compiled(&mut self) {
+        self.shaders.iter_mut().for_each(Shaders::compiled);
     }
 
     /// Starts to load another file, or does so when the reading that is under way has ended. Of several files, the

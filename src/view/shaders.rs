@@ -3,11 +3,11 @@
 
 use std::{
     collections::BTreeSet,
-    fs,
+    env, fs,
     path::{Path, PathBuf},
     process::{Command, Output, Stdio},
     thread,
-    time::Instant,
+    time::{Instant, SystemTime},
 };
 
 use tempfile::TempDir;
@@ -22,8 +22,6 @@ use super::{
 };
 use crate::gpu::Replacements;
 
-/// Path of the build script's program, which compiles the shaders.
-const COMPILER: &str = env!("KDRAY_SHADER_COMPILER");
 /// The Rust code that was generated from layout.glsl when this program was built.
 const LAYOUT: &str = include_str!(concat!(env!("OUT_DIR"), "/layout.rs"));
 
@@ -37,11 +35,8 @@ pub struct Shaders {
 }
 
 impl Shaders {
-    /// Watches the shaders of the working directory if it is a checkout, else those of the checkout that the program
-    /// was built in.
-    pub fn new(proxy: EventLoopProxy<Wake>) -> Self {
-        let here = Path::new(".");
-        let checkout = if here.join("glsl").is_dir() { here } else { Path::new(env!("CARGO_MANIFEST_DIR")) };
+    /// Watches the shaders of a checkout of kdray.
+    pub fn new(checkout: &Path, proxy: EventLoopProxy<Wake>) -> Self {
         let waker = proxy.clone();
         // An error means that the viewer has ended; then nothing needs to be woken.
         let changed = move || drop(waker.send_event(Wake::ShadersChanged));
@@ -60,7 +55,7 @@ impl Shaders {
     }
 
     /// Notes that a compilation has ended, and starts the one that is due.
-    pub fn done(&mut self) {
+    pub fn compiled(&mut self) {
         if self.compiling.end() {
             self.compile();
         }
@@ -96,6 +91,26 @@ fn shader_files(checkout: &Path) -> BTreeSet<PathBuf> {
     files
 }
 
+/// Returns the compiler: the program of build.rs, which cargo leaves beside what it builds. Of several, the latest.
+///
+/// # Errors
+/// This program does not lie where cargo has built it.
+fn compiler() -> Result<PathBuf, String> {
+    let program = env::current_exe().map_err(|error| format!("shaders: {error}"))?;
+    let name = format!("build-script-build{}", env::consts::EXE_SUFFIX);
+    // Programs of tests lie one folder below the others.
+    let folders = program.ancestors().skip(1).take(2).filter_map(|folder| fs::read_dir(folder.join("build")).ok());
+    let of_kdray =
+        folders.flatten().flatten().filter(|entry| entry.file_name().to_string_lossy().starts_with("kdray-"));
+    let built = of_kdray.map(|entry| entry.path().join(&name)).filter_map(|path| Some((modified(&path)?, path)));
+    let latest = built.max().map(|(_, path)| path);
+    latest.ok_or_else(|| format!("--shaders needs {name}, which cargo leaves in the folder `build` beside kdray"))
+}
+
+fn modified(path: &Path) -> Option<SystemTime> {
+    fs::metadata(path).and_then(|it| it.modified()).ok()
+}
+
 /// Compiles all shaders of the checkout.
 ///
 /// # Errors
@@ -103,13 +118,14 @@ fn shader_files(checkout: &Path) -> BTreeSet<PathBuf> {
 /// the one that this program was built with.
 fn compile(checkout: &Path) -> Result<Replacements, String> {
     let out_dir = TempDir::new().map_err(|error| format!("shaders: {error}"))?;
-    let output = Command::new(COMPILER)
+    let compiler = compiler()?;
+    let output = Command::new(&compiler)
         .current_dir(checkout)
         .env("OUT_DIR", out_dir.path())
         .env("RUST_BACKTRACE", "0")
         .stdin(Stdio::null())
         .output()
-        .map_err(|error| format!("{COMPILER}: {error}"))?;
+        .map_err(|error| format!("{}: {error}", compiler.display()))?;
     if !output.status.success() {
         return Err(complaints(&output));
     }

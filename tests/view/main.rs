@@ -7,6 +7,7 @@ mod support;
 mod failures;
 mod files;
 mod motion;
+mod shaders;
 mod slow;
 
 use std::{

@@ -1,7 +1,4 @@
 //! Tests that the viewer goes on with shaders that change while its window is open.
-#![cfg(all(feature = "hot-reload", target_os = "linux"))]
-
-mod support;
 
 use std::{
     fs,
@@ -9,13 +6,15 @@ use std::{
     process::{Command, Stdio},
 };
 
-use support::{
-    command::{Messages, cornell, kdray, succeed},
-    display::{Display, Screen},
-};
 use tempfile::TempDir;
 
-const SIZE: &str = "160x120";
+use super::{
+    SIZE,
+    support::{
+        command::{Messages, cornell, kdray, succeed},
+        display::{Display, Screen},
+    },
+};
 
 /// Copies this checkout's shaders.
 fn copy_shaders(to: &Path) {
@@ -51,7 +50,7 @@ fn changed_shaders_draw_and_broken_ones_do_not() {
     let path = |file: &str| directory.path().join(file);
     succeed(directory.path(), &["render", &cornell(), "--size", SIZE, "-q", "-o", "x.png"]);
     let picture = Screen::load(&path("x.png"));
-    let arguments = ["view", &cornell(), "--size", SIZE, "--spp", "1", "--no-overlay", "--validate"];
+    let arguments = ["view", &cornell(), "--size", SIZE, "--spp", "1", "--no-overlay", "--validate", "--shaders", "."];
     let mut viewer = kdray(directory.path(), &arguments)
         .env("DISPLAY", &display.name)
         .env_remove("WAYLAND_DISPLAY")
