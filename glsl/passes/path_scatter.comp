@@ -37,7 +37,7 @@ uint step_of(uint path_ix) {
     PathState state = PathState(words.xyz, words.w);
     Segment segment;
     bool goes_on = step_path(key_of_path(path_ix, pixel), batch.depth, hits[path_ix], ray, state, segment);
-    path_states[path_ix] = vec4(state.radiance, state.density);
+    path_states[path_ix] = vec4(state.radiance, state.pdf);
     // A path without a segment has none already: path_trace.comp has cleared the last one.
     if (segment.state != SEGMENT_NONE) store_segment(path_ix, segment);
     if (goes_on) store_ray(path_ix, ray);

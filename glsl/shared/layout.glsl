@@ -611,11 +611,11 @@ struct Ray {
 // A path of a picture, 16 bytes: what is known of it beside its ray.
 //
 // - `radiance`: the light that the path has brought to its pixel so far.
-// - `density`: of the direction in which the path goes on, among those that could have been sampled (per steradian). 0
+// - `pdf`: of the direction in which the path goes on, among those that could have been sampled (per steradian). 0
 //   if no light can be sampled in its place: the ray comes from the camera or from a perfectly smooth surface.
 struct PathState {
     vec3 radiance;
-    float density;
+    float pdf;
 };
 
 // A segment from a hit of a path to a sampled light, 48 bytes. If nothing is in between, its light is added to the
@@ -641,7 +641,7 @@ struct Segment {
 // `Segment.state`: the segment has not been traced yet.
 #define SEGMENT_WAITS 1u
 
-// Values of `Frame.pixel_filter`: the density of samples around the centre of their pixel.
+// Values of `Frame.pixel_filter`: the pdf of samples around the centre of their pixel.
 //
 // The square of the pixel.
 #define FILTER_BOX 0u
@@ -659,9 +659,9 @@ struct Segment {
 #define MOST_NOISE_TILES 4096u
 // `Frame.window_x` if the window is a column of noise tiles (noise_tiles.glsl).
 #define WINDOW_OF_TILES 0xffffffffu
-// The least density, per steradian, with which a lobe samples a direction in which it sees the studio. That of matt
+// The least pdf, per steradian, with which a lobe samples a direction in which it sees the studio. That of matt
 // surfaces is at most 1 / pi.
-#define STUDIO_LEAST_DENSITY 1.0
+#define STUDIO_LEAST_PDF 1.0
 // Number of the layers of light (path_layers.comp).
 #define LIGHT_LAYERS 3u
 // The bounce of a path, counted from 0, from which on it may end by Russian roulette.
@@ -890,7 +890,7 @@ struct Guide {
 // - `area_lights_begin`, `n_area_lights`, `n_suns`: index in `texture_words` of the first `AreaLight`, number of those
 //   that are no suns, and number of suns, which follow them.
 // - `environment_begin`: index in `texture_words` of the environment's map: pairs of a threshold and an alias, first
-//   for each row and then for each texel, and the texels. A texel is a linear colour, and the density with which its
+//   for each row and then for each texel, and the texels. A texel is a linear colour, and the pdf with which its
 //   directions are picked if the environment is picked, per steradian. `NO_WORDS`: there is no map.
 // - `light_nodes_begin`: index in `texture_words` of the first `LightNode`. `NO_WORDS`: there is no light tree.
 // - `environment_width`, `environment_height`: size of the map, texels.
@@ -1181,7 +1181,7 @@ struct GridBuild {
     uint greatest_y;
     uint greatest_z;
     uint n_triangles;
-    // What the host requires. *_density: cells for each triangle. max_references: the most pairs of a level, and also
+    // What the host requires. *_pdf: cells for each triangle. max_references: the most pairs of a level, and also
     // the most cells of the lower level. max_columns: the most columns.
     float upper_density;
     float lower_density;

@@ -16,7 +16,7 @@ vec2 on_circle(float turn) {
     return vec2(cos(angle), sin(angle));
 }
 
-// The offset of a sample from the centre of its pixel, pixels. Its density is the pixel's filter, so all samples have
+// The offset of a sample from the centre of its pixel, pixels. Its pdf is the pixel's filter, so all samples have
 // the same weight (Ernst, Stamminger, Greiner: Filter Importance Sampling, 2006).
 vec2 filter_offset(vec2 u) {
     if (frame.pixel_filter == FILTER_BOX) return u - 0.5;

@@ -27,17 +27,17 @@ layout(std430, set = 0, binding = BIND_LIGHTS) readonly buffer LightsBlock { Lig
 // The number of pairs for each hit.
 #define PAIRS_OF_HIT 4u
 
-// The share of a way of sampling, whose density is the first one, beside another way.
-float power_share(float density, float other) {
-    // Densities are divided by the larger one, since their squares could overflow.
-    float largest = max(density, other);
-    float own = density / largest, others = other / largest;
+// The share of a way of sampling, whose pdf is the first one, beside another way.
+float power_share(float pdf, float other) {
+    // Pdfs are divided by the larger one, since their squares could overflow.
+    float largest = max(pdf, other);
+    float own = pdf / largest, others = other / largest;
     return own * own / (own * own + others * others);
 }
 
-// The share of light that a path meets on its way, and that could have been sampled with the density `of_lights`.
+// The share of light that a path meets on its way, and that could have been sampled with the pdf `of_lights`.
 float share_of_met(PathState state, float of_lights) {
-    return state.density > 0.0 ? power_share(state.density, of_lights) : 1.0;
+    return state.pdf > 0.0 ? power_share(state.pdf, of_lights) : 1.0;
 }
 
 // Light that is added to the path: bounded after the first hit, and nothing if it is not a number.
@@ -53,9 +53,9 @@ vec3 added_light(vec3 light, uint depth) {
 vec3 met_environment(PathRay ray, PathState state, uint depth) {
     SeenEnvironment seen = seen_environment(ray.direction);
     vec3 radiance = seen.radiance;
-    if (state.density > 0.0) radiance += ambient_radiance(ray.direction);
-    vec3 met = radiance * share_of_met(state, seen.density);
-    bool mirrors = depth > 0u && (state.density == 0.0 || state.density > STUDIO_LEAST_DENSITY);
+    if (state.pdf > 0.0) radiance += ambient_radiance(ray.direction);
+    vec3 met = radiance * share_of_met(state, seen.pdf);
+    bool mirrors = depth > 0u && (state.pdf == 0.0 || state.pdf > STUDIO_LEAST_PDF);
     return mirrors ? met + studio_radiance(ray.direction) : met;
 }
 
@@ -70,7 +70,7 @@ Segment segment_to_light(
     if (pick.light == vec3(0.0)) return segment;
     BsdfValue scattered = value_at(terms, surface, pick.direction);
     if (!any(greaterThan(scattered.value, vec3(0.0)))) return segment;
-    float share = pick.density > 0.0 ? power_share(pick.density, scattered.density) : 1.0;
+    float share = pick.pdf > 0.0 ? power_share(pick.pdf, scattered.pdf) : 1.0;
     vec3 light = added_light(throughput * scattered.value * pick.light * share, depth + 1u);
     if (!any(greaterThan(light, vec3(0.0)))) return segment;
     float side = dot(pick.direction, surface.geometric) < 0.0 ? -surface.clearance : surface.clearance;
@@ -104,7 +104,7 @@ bool step_path(
     float infinity = uintBitsToFloat(0x7f800000u);
     SeenLight seen = seen_light(ray.origin, ray.direction, is_miss ? infinity : hit.t);
     if (seen.t < infinity) {
-        vec3 light = seen.radiance * share_of_met(state, seen.density);
+        vec3 light = seen.radiance * share_of_met(state, seen.pdf);
         state.radiance += added_light(ray.throughput * light, depth);
         return false;
     }
@@ -118,7 +118,7 @@ bool step_path(
     vec3 throughput = ray.throughput * unabsorbed(material, surface, hit.t);
     if (is_unlit(material) || any(greaterThan(material.ke, vec3(0.0)))) {
         vec3 light = is_unlit(material) ? emitted(material) : emission_at(hit.triangle_ix, hit.u, hit.v);
-        float share = share_of_met(state, emission_density(hit.triangle_ix, ray.origin, ray.direction, hit.t));
+        float share = share_of_met(state, emission_pdf(hit.triangle_ix, ray.origin, ray.direction, hit.t));
         state.radiance += added_light(throughput * light * share, depth);
     }
     // The last ray of a path only meets light.
@@ -132,7 +132,7 @@ bool step_path(
     throughput *= next.weight;
     if (!any(greaterThan(throughput, vec3(0.0))) || !survives(depth, choices.y, throughput)) return false;
     ray = ray_from(surface, next.direction, hit.triangle_ix, ray, throughput);
-    state.density = next.is_delta ? 0.0 : next.density;
+    state.pdf = next.is_delta ? 0.0 : next.pdf;
     return true;
 }
 

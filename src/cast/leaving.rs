@@ -11,7 +11,7 @@ use crate::{
 };
 
 /// Returns one ray for each hit, in the order of the hits, with a pseudorandom direction in the hemisphere above the
-/// hit. The density of directions is proportional to the cosine. Misses give no ray.
+/// hit. The pdf of directions is proportional to the cosine. Misses give no ray.
 pub fn diffuse_rays(triangles: &[Triangle], rays: &[PathRay], hits: &[Hit]) -> Vec<PathRay> {
     rays_from_hits(triangles, rays, hits, |ray, surface| {
         leaving(surface, ray, cosine_distributed(surface.geometric, uniform_pair(ray.pixel_ix)))
@@ -37,7 +37,7 @@ pub fn leaving(surface: &Surface, parent: &PathRay, direction: Vec3) -> PathRay 
     surface.ray_from(direction, NO_TRIANGLE, parent, Vec3::ONE)
 }
 
-/// Maps two uniform numbers from 0 to 1 to a unit vector around a unit normal, with a density of cosine / pi.
+/// Maps two uniform numbers from 0 to 1 to a unit vector around a unit normal, with a pdf of cosine / pi.
 fn cosine_distributed(normal: Vec3, [u, v]: [f32; 2]) -> Vec3 {
     let (tangent, bitangent) = normal.any_orthonormal_pair();
     let (sin_azimuth, cos_azimuth) = (TAU * v).sin_cos();
@@ -78,7 +78,7 @@ mod tests {
         assert!(cells.iter().all(|n| n.abs_diff(N / 64) < 160), "{cells:?}");
     }
 
-    /// For a density of cosine / pi, the mean cosine is 2/3, the mean squared cosine is 1/2, and no azimuth is
+    /// For a pdf of cosine / pi, the mean cosine is 2/3, the mean squared cosine is 1/2, and no azimuth is
     /// preferred.
     #[test]
     fn diffuse_directions_have_the_moments_of_the_cosine() {

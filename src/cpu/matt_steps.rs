@@ -28,7 +28,7 @@ pub struct Picks {
     direction: Vec3sSoa,
     distance: [f32; LANES],
     light: Vec3sSoa,
-    density: [f32; LANES],
+    pdf: [f32; LANES],
 }
 
 /// The segments to lights, and the rays with which paths go on.
@@ -43,7 +43,7 @@ pub struct MattSteps {
     origin: Vec3sSoa,
     direction: Vec3sSoa,
     throughput: Vec3sSoa,
-    pub density: [f32; LANES],
+    pub pdf: [f32; LANES],
     pub go_on: LaneMask,
 }
 
@@ -52,7 +52,7 @@ impl Picks {
     pub fn set(&mut self, lane: usize, pick: &LightPick) {
         set(&mut self.direction, lane, pick.direction);
         set(&mut self.light, lane, pick.light);
-        (self.distance[lane], self.density[lane]) = (pick.distance, pick.density);
+        (self.distance[lane], self.pdf[lane]) = (pick.distance, pick.pdf);
     }
 }
 
@@ -147,18 +147,18 @@ fn set_segments<S: Simd>(
 ) {
     let simd = surfaces.clearance.simd;
     let (direction, distance) = (Vec3x16::load(simd, &picks.direction), f32x16::load_array_ref(simd, &picks.distance));
-    let (light, pick_density) = (Vec3x16::load(simd, &picks.light), f32x16::load_array_ref(simd, &picks.density));
+    let (light, pick_pdf) = (Vec3x16::load(simd, &picks.light), f32x16::load_array_ref(simd, &picks.pdf));
     let z = direction.dot(surfaces.normal);
     let mut exist = surfaces.is_above(direction, z);
     if !bounce.shapes.is_empty() {
         exist &= !meets_light(bounce.shapes, surfaces.point_world, direction, distance * LIGHT_HIDES_UP_TO);
     }
-    let density = z / PI;
-    let value = surfaces.kd * density;
-    let largest = greater(pick_density, density);
-    let (own, other) = (pick_density / largest, density / largest);
+    let pdf = z / PI;
+    let value = surfaces.kd * pdf;
+    let largest = greater(pick_pdf, pdf);
+    let (own, other) = (pick_pdf / largest, pdf / largest);
     let one = f32x16::splat(simd, 1.0);
-    let share = pick_density.simd_gt(0.0).select(own * own / (own * own + other * other), one);
+    let share = pick_pdf.simd_gt(0.0).select(own * own / (own * own + other * other), one);
     let arriving = throughput.times(value).times(light) * share;
     let arriving = arriving.min(f32x16::splat(simd, bounce.clamp));
     exist &= value.any_positive() & arriving.all_below(1.0e30) & arriving.any_positive();
@@ -184,10 +184,10 @@ fn set_rays<S: Simd>(
     let simd = surfaces.clearance.simd;
     let [x, y, z] = local.0;
     let direction = surfaces.tangent * x + surfaces.bitangent * y + surfaces.normal * z;
-    let density = z / PI;
-    let weight = surfaces.kd * density / density;
+    let pdf = z / PI;
+    let weight = surfaces.kd * pdf / pdf;
     let mut throughput = throughput.times(weight);
-    let mut go_on = surfaces.is_above(direction, z) & density.simd_gt(0.0) & throughput.any_positive();
+    let mut go_on = surfaces.is_above(direction, z) & pdf.simd_gt(0.0) & throughput.any_positive();
     if depth >= ROULETTE_DEPTH {
         let survival = throughput.max_element();
         let survival = lesser(f32x16::splat(simd, 1.0), greater(f32x16::splat(simd, LEAST_SURVIVAL), survival));
@@ -197,7 +197,7 @@ fn set_rays<S: Simd>(
     steps.origin = (surfaces.point_world + surfaces.offset(direction)).to_arrays();
     steps.direction = direction.to_arrays();
     steps.throughput = throughput.to_arrays();
-    steps.density = density.to_array();
+    steps.pdf = pdf.to_array();
     steps.go_on = go_on.to_bitmask() as LaneMask;
 }
 

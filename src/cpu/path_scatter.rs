@@ -249,7 +249,7 @@ impl BounceOfPaths<'_> {
             if goes_on {
                 let ray = paths.rays.of_path(path_ix);
                 *ray = steps.ray(lane, triangle_ix, ray);
-                paths.states.of_path(path_ix).density = steps.density[lane];
+                paths.states.of_path(path_ix).pdf = steps.pdf[lane];
             }
         }
     }
@@ -348,7 +348,7 @@ mod tests {
             };
             Self {
                 rays: (0..n).map(|_| ray(random)).collect(),
-                states: (0..n).map(|_| PathState { radiance: random.point(), density: random.point().x }).collect(),
+                states: (0..n).map(|_| PathState { radiance: random.point(), pdf: random.point().x }).collect(),
                 segments: vec![Segment::zeroed(); n],
                 kinds: vec![9; n],
                 blocks: vec![[9; 2]; n.div_ceil(BLOCK_SIZE)],

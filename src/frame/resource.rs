@@ -48,7 +48,7 @@ pub enum Resource {
     Counters,
     /// States of stalled rays: rays that have spent the loop turns of a dispatch and go on in a further dispatch.
     Stalls,
-    /// What is known of each path beside its ray: the light that it has brought, the density of its direction.
+    /// What is known of each path beside its ray: the light that it has brought, the pdf of its direction.
     PathStates,
     /// The segment of each path from its last hit to a sampled light.
     Segments,

@@ -1,4 +1,4 @@
-//! A test of sampled directions against their density, for the tests of surfaces and of emitters.
+//! A test of sampled directions against their pdf, for the tests of surfaces and of emitters.
 
 use std::f32::consts::{PI, TAU};
 
@@ -17,8 +17,8 @@ fn cell_of(direction: Vec3) -> usize {
     row.min(N_COSINES - 1) * N_AZIMUTHS + column.min(N_AZIMUTHS - 1)
 }
 
-/// Returns the integral of a density over each cell, by `n` x `n` points.
-pub fn probabilities(n: usize, density: &dyn Fn(Vec3) -> f32) -> Vec<f64> {
+/// Returns the integral of a pdf over each cell, by `n` x `n` points.
+pub fn probabilities(n: usize, pdf: &dyn Fn(Vec3) -> f32) -> Vec<f64> {
     let point = |cell: usize, i: usize| {
         let (row, column) = (cell / N_AZIMUTHS, cell % N_AZIMUTHS);
         let part = |ix: usize, sub: usize, of: usize| (ix as f32 + (sub as f32 + 0.5) / n as f32) / of as f32;
@@ -28,7 +28,7 @@ pub fn probabilities(n: usize, density: &dyn Fn(Vec3) -> f32) -> Vec<f64> {
         vec3(sine * azimuth.cos(), sine * azimuth.sin(), z)
     };
     let cell_angle = f64::from(4.0 * PI) / (N_COSINES * N_AZIMUTHS) as f64;
-    let mean = |cell: usize| (0..n * n).map(|i| f64::from(density(point(cell, i)))).sum::<f64>() / (n * n) as f64;
+    let mean = |cell: usize| (0..n * n).map(|i| f64::from(pdf(point(cell, i)))).sum::<f64>() / (n * n) as f64;
     (0..N_COSINES * N_AZIMUTHS).map(|cell| mean(cell) * cell_angle).collect()
 }
 
@@ -49,17 +49,17 @@ impl Uniform {
     }
 }
 
-/// Compares directions that are sampled with their density, by Pearson's chi-square test. Cells that expect fewer than
+/// Compares directions that are sampled with their pdf, by Pearson's chi-square test. Cells that expect fewer than
 /// 10 samples are put together, and so are the delta samples and absorbed samples, which are the rest. Returns how many
 /// standard deviations chi-square is above its mean, by the cube root that is normally distributed (Wilson, Hilferty,
-/// 1931). `n`: the number of samples. `n_points`: the number of points along each side of a cell at which the density
+/// 1931). `n`: the number of samples. `n_points`: the number of points along each side of a cell at which the pdf
 /// is integrated.
 pub fn chi_square(
     (n, n_points): (usize, usize),
     sample: &mut dyn FnMut() -> Option<Vec3>,
-    density: &dyn Fn(Vec3) -> f32,
+    pdf: &dyn Fn(Vec3) -> f32,
 ) -> f64 {
-    let expected = probabilities(n_points, density);
+    let expected = probabilities(n_points, pdf);
     let mut counts = vec![0.0_f64; expected.len() + 1];
     for _ in 0..n {
         counts[sample().map_or(expected.len(), cell_of)] += 1.0;

@@ -13,7 +13,7 @@ fn on_circle(turn: f32) -> Vec2 {
     vec2(cosine, sine)
 }
 
-/// The offset of a sample from the centre of its pixel, pixels. Its density is the pixel's filter.
+/// The offset of a sample from the centre of its pixel, pixels. Its pdf is the pixel's filter.
 pub fn filter_offset(frame: &Frame, u: Vec2) -> Vec2 {
     match frame.pixel_filter {
         FILTER_BOX => u - 0.5,

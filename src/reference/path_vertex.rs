@@ -4,9 +4,7 @@ use glam::{Vec2, Vec3, vec3};
 
 use super::{
     bsdf::{BsdfTerms, bsdf_terms, is_smooth, sample_bsdf, value_at},
-    emitters::{
-        LightPick, ambient_radiance, emission_at, emission_density, pick_light_with, seen_environment, seen_light,
-    },
+    emitters::{LightPick, ambient_radiance, emission_at, emission_pdf, pick_light_with, seen_environment, seen_light},
     inputs::KernelInputs,
     maps::shaded_at,
     material::{emitted, is_unlit, unabsorbed},
@@ -16,7 +14,7 @@ use super::{
 };
 use crate::layout::{
     Hit, LEAST_SURVIVAL, NO_TRIANGLE, PathRay, PathState, ROULETTE_DEPTH, SEGMENT_NONE, SEGMENT_SHARE, SEGMENT_WAITS,
-    STUDIO_LEAST_DENSITY, Segment,
+    STUDIO_LEAST_PDF, Segment,
 };
 
 /// The number of pairs of random numbers that come before those of the first hit: in the pixel and in the lens.
@@ -42,16 +40,16 @@ pub fn pairs_of_hit(key: SampleKey, depth: u32) -> [Vec2; PAIRS_OF_HIT] {
     [0, 1, 2, 3].map(|place| random_pair(key, first_pair_of(depth) + place))
 }
 
-/// The share of a way of sampling, whose density is the first one, beside another way.
-pub fn power_share(density: f32, other: f32) -> f32 {
-    let largest = density.max(other);
-    let (own, others) = (density / largest, other / largest);
+/// The share of a way of sampling, whose pdf is the first one, beside another way.
+pub fn power_share(pdf: f32, other: f32) -> f32 {
+    let largest = pdf.max(other);
+    let (own, others) = (pdf / largest, other / largest);
     own * own / (own * own + others * others)
 }
 
-/// The share of light that a path meets on its way, and that could have been sampled with the density `of_lights`.
+/// The share of light that a path meets on its way, and that could have been sampled with the pdf `of_lights`.
 fn share_of_met(state: &PathState, of_lights: f32) -> f32 {
-    if state.density > 0.0 { power_share(state.density, of_lights) } else { 1.0 }
+    if state.pdf > 0.0 { power_share(state.pdf, of_lights) } else { 1.0 }
 }
 
 /// Light that is added to the path: bounded after the first hit, and nothing if it is not a number.
@@ -67,11 +65,11 @@ fn added_light(inputs: &KernelInputs, light: Vec3, depth: u32) -> Vec3 {
 fn met_environment(inputs: &KernelInputs, ray: &PathRay, state: &PathState, depth: u32) -> Vec3 {
     let seen = seen_environment(inputs, ray.direction);
     let mut radiance = seen.radiance;
-    if state.density > 0.0 {
+    if state.pdf > 0.0 {
         radiance += ambient_radiance(inputs, ray.direction);
     }
-    let met = radiance * share_of_met(state, seen.density);
-    let mirrors = depth > 0 && (state.density == 0.0 || state.density > STUDIO_LEAST_DENSITY);
+    let met = radiance * share_of_met(state, seen.pdf);
+    let mirrors = depth > 0 && (state.pdf == 0.0 || state.pdf > STUDIO_LEAST_PDF);
     if mirrors { met + studio_radiance(inputs.frame(), ray.direction) } else { met }
 }
 
@@ -109,7 +107,7 @@ fn segment_to_light(inputs: &KernelInputs, choices: &HitChoices, vertex: &Vertex
     if !scattered.value.cmpgt(Vec3::ZERO).any() {
         return NO_SEGMENT;
     }
-    let share = if pick.density > 0.0 { power_share(pick.density, scattered.density) } else { 1.0 };
+    let share = if pick.pdf > 0.0 { power_share(pick.pdf, scattered.pdf) } else { 1.0 };
     let light = added_light(inputs, throughput * scattered.value * pick.light * share, depth + 1);
     if !light.cmpgt(Vec3::ZERO).any() {
         return NO_SEGMENT;
@@ -159,7 +157,7 @@ pub fn step_path(
     let is_miss = hit.triangle_ix == NO_TRIANGLE;
     let seen = seen_light(inputs, ray.origin, ray.direction, if is_miss { f32::INFINITY } else { hit.t });
     if seen.t < f32::INFINITY {
-        let light = seen.radiance * share_of_met(state, seen.density);
+        let light = seen.radiance * share_of_met(state, seen.pdf);
         state.radiance += added_light(inputs, ray.throughput * light, depth);
         return (false, NO_SEGMENT);
     }
@@ -184,7 +182,7 @@ pub fn step_past_lights(
     if is_unlit(&material) || material.ke.cmpgt(Vec3::ZERO).any() {
         let light =
             if is_unlit(&material) { emitted(&material) } else { emission_at(inputs, hit.triangle_ix, hit.u, hit.v) };
-        let share = share_of_met(state, emission_density(inputs, hit.triangle_ix, ray.origin, ray.direction, hit.t));
+        let share = share_of_met(state, emission_pdf(inputs, hit.triangle_ix, ray.origin, ray.direction, hit.t));
         state.radiance += added_light(inputs, throughput * light * share, depth);
     }
     // The last ray of a path only meets light.
@@ -202,6 +200,6 @@ pub fn step_past_lights(
         return (false, segment);
     }
     *ray = surface.ray_from(next.direction, hit.triangle_ix, ray, throughput);
-    state.density = if next.is_delta { 0.0 } else { next.density };
+    state.pdf = if next.is_delta { 0.0 } else { next.pdf };
     (true, segment)
 }

@@ -18,7 +18,7 @@ pub struct EnvironmentMap {
     pub size: [u32; 2],
     /// By which the map is turned about +y, in turns, counter-clockwise as seen from above.
     pub turn: f32,
-    /// Linear colours, row by row from the zenith. The fourth number is the density with which the middle of the texel
+    /// Linear colours, row by row from the zenith. The fourth number is the pdf with which the middle of the texel
     /// is picked, per steradian, times the sine of the polar angle there.
     pub texels: Vec<[f32; 4]>,
     /// The table by which rows are picked.
@@ -63,7 +63,7 @@ impl EnvironmentMap {
         self.mean_luminance.max(0.0)
     }
 
-    /// Returns a texel: its colour, and its density.
+    /// Returns a texel: its colour, and its pdf.
     pub fn texel(&self, x: u32, y: u32) -> Vec4 {
         Vec4::from_array(self.texels[(y * self.size[0] + x) as usize])
     }

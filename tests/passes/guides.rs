@@ -29,7 +29,7 @@ fn drawn(stage: &mut PathStage, n_earlier: u32, before: &[Guide]) -> (Vec<Guide>
     stage.set_n_earlier(n_earlier);
     let (_, hits) = stage.rays_and_hits();
     let mut random = Random(u64::from(n_earlier));
-    let state = |_| PathState { radiance: random.in_box(Vec3::ZERO, Vec3::splat(9.0)), density: 1.0 };
+    let state = |_| PathState { radiance: random.in_box(Vec3::ZERO, Vec3::splat(9.0)), pdf: 1.0 };
     let states: Vec<_> = hits.iter().map(state).collect();
     stage.resources.queue.hits.upload(&hits).expect("hits");
     stage.paths().path_states.upload(&states).expect("path_states");
@@ -93,7 +93,7 @@ fn means_are_those_of_the_samples() {
     let stage = PathStage::with_filter(outdoors(), 4, Denoise::Edge);
     let (rays, hits) = stage.rays_and_hits();
     let batch = Batch { n_pixels: 1200, ..stage.batch() };
-    let states = vec![PathState { radiance: vec3(1.0, 0.5, 0.25), density: 0.0 }; hits.len()];
+    let states = vec![PathState { radiance: vec3(1.0, 0.5, 0.25), pdf: 0.0 }; hits.len()];
     let mut found = vec![Guide::default(); 1200];
     reference::guides::guides(&stage.inputs(), &batch, &hits, &states, &mut found);
     for in_batch in (0..1200).step_by(37) {

@@ -11,7 +11,7 @@ use crate::support::{compare, random::Random, scenes};
 
 /// Three states of the radiance of all paths, in which it grows.
 fn growing_states(n_paths: usize, random: &mut Random) -> Vec<Vec<PathState>> {
-    let mut states = vec![PathState { radiance: Vec3::ZERO, density: 1.0 }; n_paths];
+    let mut states = vec![PathState { radiance: Vec3::ZERO, pdf: 1.0 }; n_paths];
     let mut grow = |_| {
         states.iter_mut().for_each(|state| state.radiance += random.in_box(Vec3::ZERO, Vec3::splat(9.0)));
         states.clone()

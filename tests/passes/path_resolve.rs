@@ -11,7 +11,7 @@ fn agrees_with_its_twin() {
     for samples_log2 in 0..=4 {
         let stage = PathStage::new(scenes::mixed(), samples_log2);
         let mut random = Random(u64::from(samples_log2));
-        let state = |_| PathState { radiance: random.in_box(Vec3::ZERO, Vec3::splat(9.0)), density: 1.0 };
+        let state = |_| PathState { radiance: random.in_box(Vec3::ZERO, Vec3::splat(9.0)), pdf: 1.0 };
         let states: Vec<_> = (0..1200 << samples_log2).map(state).collect();
         stage.paths().path_states.upload(&states).expect("path_states");
         stage.run(|commands| stage.passes.path_resolve.record(commands, &stage.batch()));

@@ -52,7 +52,7 @@ fn check(stage: &PathStage, depth: u32, n: u32) -> (usize, u32) {
     let mut random = Random(5);
     let live: Vec<u32> = (0..n).collect();
     let states: Vec<_> = (0..n_all)
-        .map(|ix| PathState { radiance: random.in_box(Vec3::ZERO, Vec3::ONE), density: (ix % 2) as f32 })
+        .map(|ix| PathState { radiance: random.in_box(Vec3::ZERO, Vec3::ONE), pdf: (ix % 2) as f32 })
         .collect();
     let mut list = live.clone();
     list.resize(3 * n_all, u32::MAX);
@@ -87,7 +87,7 @@ fn check(stage: &PathStage, depth: u32, n: u32) -> (usize, u32) {
     let expected: Vec<_> = segments.iter().map(as_ray).collect();
     compare::rays(1e-3, n_outliers, &expected, &found).unwrap();
     let pixels =
-        |states: &[PathState]| -> Vec<_> { states.iter().map(|s| s.radiance.extend(s.density).to_array()).collect() };
+        |states: &[PathState]| -> Vec<_> { states.iter().map(|s| s.radiance.extend(s.pdf).to_array()).collect() };
     let found = paths.path_states.download().expect("path_states");
     compare::pixels(1e-3, n_outliers, &pixels(&states), &pixels(&found)).unwrap();
     let n_lit = segments.iter().filter(|segment| segment.state != SEGMENT_NONE).count();

@@ -33,7 +33,7 @@ fn agrees_with_its_twin() {
         let segments: Vec<_> = (0..1200).map(|ix| segment(&mut random, ix)).collect();
         let with_segment: Vec<u32> = (0..n).filter(|&ix| segments[ix as usize].state != SEGMENT_NONE).collect();
         let states: Vec<_> =
-            (0..1200).map(|_| PathState { radiance: random.in_box(Vec3::ZERO, Vec3::ONE), density: 0.5 }).collect();
+            (0..1200).map(|_| PathState { radiance: random.in_box(Vec3::ZERO, Vec3::ONE), pdf: 0.5 }).collect();
         let mut lists = live.clone();
         lists.resize(2400, u32::MAX);
         lists.extend(&with_segment);

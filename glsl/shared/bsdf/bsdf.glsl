@@ -14,8 +14,8 @@
 // `transmission` passes, and the rest meets the Lambertian surface. A sheet (without MATERIAL_SOLID) lets light pass
 // straight: its transmitted lobe is the reflected one, mirrored to the other side.
 //
-// A direction is sampled for one lobe, which is chosen in proportion to the lobes' albedos. Its density is that of all
-// lobes together. Perfectly smooth (delta) lobes have no density per steradian: they are sampled alone.
+// A direction is sampled for one lobe, which is chosen in proportion to the lobes' albedos. Its pdf is that of all
+// lobes together. Perfectly smooth (delta) lobes have no pdf per steradian: they are sampled alone.
 //
 // Light from a direction whose sides of the triangle and of the shading normal differ is not scattered. If the viewer
 // is behind the shading normal, the triangle's normal replaces it.

@@ -1,4 +1,4 @@
-// The sum of a surface's lobes for two directions, and the density with which sample_bsdf samples the one towards the
+// The sum of a surface's lobes for two directions, and the pdf with which sample_bsdf samples the one towards the
 // light. Twin of src/reference/bsdf/evaluate.rs.
 #ifndef KDRAY_BSDF_EVALUATE
 #define KDRAY_BSDF_EVALUATE
@@ -15,10 +15,10 @@
 #include "bsdf/terms.glsl"
 #include "bsdf/transmission.glsl"
 
-// The scattered share of light times the cosine, and the density of its direction.
+// The scattered share of light times the cosine, and the pdf of its direction.
 struct BsdfValue {
     vec3 value;
-    float density;
+    float pdf;
 };
 
 // Adds the interface's reflection.
@@ -29,7 +29,7 @@ void add_reflection(BsdfTerms terms, vec3 to_light, vec3 half_vector, inout Bsdf
     sum.value += terms.base_share * split.reflected * lobe;
     // Light that passes straight tells nothing of a microfacet, so the surface's normal decides.
     float choice = passes_straight(terms) ? terms.straight_choice : reflected_choice(split);
-    sum.density += terms.choice.x * choice * reflection_density(terms.to_viewer, half_vector, terms.width);
+    sum.pdf += terms.choice.x * choice * reflection_pdf(terms.to_viewer, half_vector, terms.width);
 }
 
 // Adds the reflection of the clear layer.
@@ -38,7 +38,7 @@ void add_clearcoat(BsdfTerms terms, vec3 to_light, vec3 half_vector, inout BsdfV
     float width = terms.coat_roughness * terms.coat_roughness;
     float lobe = evaluate_reflection(terms.to_viewer, to_light, half_vector, width);
     sum.value += terms.material.clearcoat * clearcoat_fresnel(dot(terms.to_viewer, half_vector)) * lobe;
-    sum.density += terms.choice.z * reflection_density(terms.to_viewer, half_vector, width);
+    sum.pdf += terms.choice.z * reflection_pdf(terms.to_viewer, half_vector, width);
 }
 
 // Adds the Lambertian lobe.
@@ -48,7 +48,7 @@ void add_lambert(BsdfTerms terms, vec3 to_light, inout BsdfValue sum) {
     float left = max(1.0 - dielectric_albedo(terms.dielectric, albedo), 0.0);
     vec3 reflectance = terms.below * left + terms.between * albedo.loss;
     sum.value += terms.base_share * evaluate_lambert(reflectance, to_light);
-    sum.density += terms.choice.y * lambert_density(to_light);
+    sum.pdf += terms.choice.y * lambert_pdf(to_light);
 }
 
 // Adds the sheen.
@@ -56,7 +56,7 @@ void add_sheen(BsdfTerms terms, vec3 to_light, inout BsdfValue sum) {
     if (!has_sheen(terms.material)) return;
     float lobe = evaluate_sheen(terms.to_viewer, to_light, terms.sheen_roughness) * terms.sheen_bound;
     sum.value += terms.sheen_share * terms.material.sheen_colour * lobe;
-    sum.density += terms.choice.w * sheen_density(to_light);
+    sum.pdf += terms.choice.w * sheen_pdf(to_light);
 }
 
 // Adds the light that passes through the interface.
@@ -68,16 +68,16 @@ void add_transmission(BsdfTerms terms, vec3 to_light, inout BsdfValue sum) {
         : normalize(terms.to_viewer + mirrored);
     if (terms.is_solid && !refracts_between(terms.to_viewer, to_light, half_vector)) return;
     InterfaceSplit split = split_at(terms, dot(terms.to_viewer, half_vector));
-    float lobe, density;
+    float lobe, pdf;
     if (terms.is_solid) {
         lobe = evaluate_refraction(terms.to_viewer, to_light, half_vector, terms.width, terms.eta);
-        density = refraction_density(terms.to_viewer, to_light, half_vector, terms.width, terms.eta);
+        pdf = refraction_pdf(terms.to_viewer, to_light, half_vector, terms.width, terms.eta);
     } else {
         lobe = evaluate_reflection(terms.to_viewer, mirrored, half_vector, terms.width);
-        density = reflection_density(terms.to_viewer, half_vector, terms.width);
+        pdf = reflection_pdf(terms.to_viewer, half_vector, terms.width);
     }
     sum.value += terms.base_share * split.transmitted * lobe;
-    sum.density += terms.choice.x * (1.0 - reflected_choice(split)) * density;
+    sum.pdf += terms.choice.x * (1.0 - reflected_choice(split)) * pdf;
 }
 
 // The sum of all lobes but the delta lobes. to_light: in the frame of the surface.

@@ -14,7 +14,7 @@
 
 #include "pi.glsl"
 
-// Density of normals, per steradian and area of the surface. half_vector.z is at least 0.
+// Pdf of normals, per steradian and area of the surface. half_vector.z is at least 0.
 float ggx_distribution(vec3 half_vector, float width) {
     float squared = width * width;
     float spread = dot(half_vector.xy, half_vector.xy) + half_vector.z * half_vector.z * squared;
@@ -27,8 +27,8 @@ float ggx_root(float cosine, float width) {
     return sqrt(cosine * cosine * (1.0 - squared) + squared);
 }
 
-// Density of visible normals per steradian, divided by the cosine between the viewer and the normal.
-float ggx_visible_density(vec3 to_viewer, vec3 half_vector, float width) {
+// Pdf of visible normals per steradian, divided by the cosine between the viewer and the normal.
+float ggx_visible_pdf(vec3 to_viewer, vec3 half_vector, float width) {
     return ggx_distribution(half_vector, width) * 2.0 / (to_viewer.z + ggx_root(to_viewer.z, width));
 }
 

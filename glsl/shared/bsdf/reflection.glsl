@@ -16,9 +16,9 @@ float evaluate_reflection(vec3 to_viewer, vec3 to_light, vec3 half_vector, float
     return 0.25 * ggx_distribution(half_vector, width) * visibility;
 }
 
-// Density of the light's direction, per steradian, if a visible normal reflects it.
-float reflection_density(vec3 to_viewer, vec3 half_vector, float width) {
-    return 0.25 * ggx_visible_density(to_viewer, half_vector, width);
+// Pdf of the light's direction, per steradian, if a visible normal reflects it.
+float reflection_pdf(vec3 to_viewer, vec3 half_vector, float width) {
+    return 0.25 * ggx_visible_pdf(to_viewer, half_vector, width);
 }
 
 #endif

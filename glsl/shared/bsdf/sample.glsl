@@ -16,12 +16,12 @@
 #include "bsdf/terms.glsl"
 #include "bsdf/transmission.glsl"
 
-// A sampled direction. weight: the scattered share times the cosine, divided by the density. density: of all lobes, per
-// steradian; of a delta lobe, the probability of its choice. A density of 0 means that the light is absorbed.
+// A sampled direction. weight: the scattered share times the cosine, divided by the pdf. pdf: of all lobes, per
+// steradian; of a delta lobe, the probability of its choice. A pdf of 0 means that the light is absorbed.
 struct BsdfSample {
     vec3 direction;
     vec3 weight;
-    float density;
+    float pdf;
     bool is_delta;
 };
 
@@ -109,14 +109,14 @@ BsdfSample delta_sample(BsdfTerms terms, Surface surface, LobeSample lobe) {
     return BsdfSample(direction, lobe.share / lobe.probability, lobe.probability, true);
 }
 
-// The sample of a lobe with a density. All lobes with a density scatter light to its direction.
+// The sample of a lobe with a pdf. All lobes with a pdf scatter light to its direction.
 BsdfSample rough_sample(BsdfTerms terms, Surface surface, LobeSample lobe) {
     vec3 direction = to_world(terms.frame, lobe.local);
     bool is_on_side = lobe.local.z * lobe.side > 0.0;
     if (!is_on_side || !is_consistent(surface, direction, lobe.local)) return BSDF_ABSORBED;
     BsdfValue found = value_of(terms, lobe.local);
-    if (!(found.density > 0.0)) return BSDF_ABSORBED;
-    return BsdfSample(direction, found.value / found.density, found.density, false);
+    if (!(found.pdf > 0.0)) return BSDF_ABSORBED;
+    return BsdfSample(direction, found.value / found.pdf, found.pdf, false);
 }
 
 // A direction from which light is scattered to the viewer. u: random numbers in [0, 1). u.z selects the lobe, and

@@ -8,7 +8,7 @@
 #include "pi.glsl"
 #include "bsdf/albedo.glsl"
 
-// Density of the fibres' normals. width: of the distribution.
+// Pdf of the fibres' normals. width: of the distribution.
 float sheen_distribution(vec3 half_vector, float width) {
     float sine = sqrt(clamp(dot(half_vector.xy, half_vector.xy), 0.0, 1.0));
     return (2.0 + 1.0 / width) * pow(max(sine, 1.0e-6), 1.0 / width) / (2.0 * PI);
@@ -47,7 +47,7 @@ vec3 sample_sheen(vec2 u) {
     return vec3(sine * cos(azimuth), sine * sin(azimuth), u.x);
 }
 
-float sheen_density(vec3 to_light) {
+float sheen_pdf(vec3 to_light) {
     return to_light.z > 0.0 ? 0.5 / PI : 0.0;
 }
 

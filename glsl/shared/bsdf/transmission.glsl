@@ -29,8 +29,8 @@ bool refracts_between(vec3 to_viewer, vec3 to_light, vec3 half_vector) {
     return dot(to_viewer, half_vector) > 0.0 && dot(to_light, half_vector) < 0.0;
 }
 
-// Solid angle of directions to the light for each steradian of normals, as its inverse: density of directions for a
-// density 1 of normals.
+// Solid angle of directions to the light for each steradian of normals, as its inverse: pdf of directions for a
+// pdf 1 of normals.
 float refraction_jacobian(vec3 to_viewer, vec3 to_light, vec3 half_vector, float eta) {
     float cos_light = dot(to_light, half_vector);
     float sum = cos_light + eta * dot(to_viewer, half_vector);
@@ -44,9 +44,9 @@ float evaluate_refraction(vec3 to_viewer, vec3 to_light, vec3 half_vector, float
     return eta * eta * visibility * cos_viewer * refraction_jacobian(to_viewer, to_light, half_vector, eta);
 }
 
-// Density of the light's direction, per steradian, if a visible normal refracts it.
-float refraction_density(vec3 to_viewer, vec3 to_light, vec3 half_vector, float width, float eta) {
-    float of_normal = ggx_visible_density(to_viewer, half_vector, width) * dot(to_viewer, half_vector);
+// Pdf of the light's direction, per steradian, if a visible normal refracts it.
+float refraction_pdf(vec3 to_viewer, vec3 to_light, vec3 half_vector, float width, float eta) {
+    float of_normal = ggx_visible_pdf(to_viewer, half_vector, width) * dot(to_viewer, half_vector);
     return of_normal * refraction_jacobian(to_viewer, to_light, half_vector, eta);
 }
 

@@ -14,12 +14,12 @@
 #include "emitters/sphere.glsl"
 #include "emitters/tree.glsl"
 
-// What a ray sees of the area lights. t: distance of the nearest one, infinity if it meets none. density: with which
+// What a ray sees of the area lights. t: distance of the nearest one, infinity if it meets none. pdf: with which
 // pick_light picks the direction, per steradian.
 struct SeenLight {
     float t;
     vec3 radiance;
-    float density;
+    float pdf;
 };
 
 vec3 load_vector(uint at) {
@@ -44,13 +44,13 @@ float hit_area_light(AreaLight light, vec3 origin, vec3 direction) {
     return uintBitsToFloat(0x7f800000u);
 }
 
-// The density with which a pick of the light gives the direction in which it is hit at a distance, per steradian.
-float shape_density(AreaLight light, vec3 origin, vec3 direction, float distance) {
+// The pdf with which a pick of the light gives the direction in which it is hit at a distance, per steradian.
+float shape_pdf(AreaLight light, vec3 origin, vec3 direction, float distance) {
     if (has_shapes(AREA_RECTANGLE) && light.kind == AREA_RECTANGLE) {
-        return rectangle_density(light, origin, direction, distance);
+        return rectangle_pdf(light, origin, direction, distance);
     }
-    if (has_shapes(AREA_DISK) && light.kind == AREA_DISK) return flat_density(light, direction, distance);
-    return has_shapes(AREA_SPHERE) ? sphere_density(light, origin) : 0.0;
+    if (has_shapes(AREA_DISK) && light.kind == AREA_DISK) return flat_pdf(light, direction, distance);
+    return has_shapes(AREA_SPHERE) ? sphere_pdf(light, origin) : 0.0;
 }
 
 // The nearest rectangle, disk or sphere that the ray meets between 0 and t_max. direction: a unit vector. The backs of
@@ -70,7 +70,7 @@ SeenLight seen_light(vec3 origin, vec3 direction, float t_max) {
     AreaLight light = area_light_at(nearest_ix);
     float probability = light.probability;
     if (has_emitters(EMITTER_TREE)) probability *= tree_probability(origin, light.leaf_ix);
-    return SeenLight(nearest, light.radiance, probability * shape_density(light, origin, direction, nearest));
+    return SeenLight(nearest, light.radiance, probability * shape_pdf(light, origin, direction, nearest));
 }
 
 // probability: with which this light is picked.

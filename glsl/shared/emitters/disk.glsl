@@ -26,8 +26,8 @@ vec2 disk_point(vec2 u) {
 LightPick pick_disk(AreaLight light, vec3 point_world, vec2 u) {
     vec2 place = light.radius * disk_point(u);
     Towards way = towards(point_world, light.position + place.x * light.edge_u + place.y * light.edge_v);
-    float density = light.probability * flat_density(light, way.direction, way.distance);
-    return pick_of_point(way, light.radiance, density);
+    float pdf = light.probability * flat_pdf(light, way.direction, way.distance);
+    return pick_of_point(way, light.radiance, pdf);
 }
 
 #endif

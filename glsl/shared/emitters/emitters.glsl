@@ -60,9 +60,9 @@ LightPick pick_light(vec3 point_world, vec3 u) {
     return pick;
 }
 
-// The density with which pick_light picks the point of a triangle that is seen from a point in a direction at a
+// The pdf with which pick_light picks the point of a triangle that is seen from a point in a direction at a
 // distance, per steradian; 0 for a triangle that is never picked. direction: a unit vector.
-float emission_density(uint triangle_ix, vec3 point_world, vec3 direction, float distance) {
+float emission_pdf(uint triangle_ix, vec3 point_world, vec3 direction, float distance) {
     if (!has_emitters(EMITTER_TRIANGLE)) return 0.0;
     uint low = accel.first_triangle_emitter, end = low + accel.n_triangle_emitters;
     // The first entry whose triangle has this index or a larger one.
@@ -79,7 +79,7 @@ float emission_density(uint triangle_ix, vec3 point_world, vec3 direction, float
     Emitter emitter = emitter_at(low);
     if (emitter.ix != triangle_ix) return 0.0;
     if (has_emitters(EMITTER_TREE)) emitter.probability *= tree_probability(point_world, emitter.alias_ix);
-    return emitter.probability * area_density(triangle_at(triangle_ix), direction, distance);
+    return emitter.probability * area_pdf(triangle_at(triangle_ix), direction, distance);
 }
 
 #endif

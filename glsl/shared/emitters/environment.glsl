@@ -7,7 +7,7 @@
 // The map is bilinear between the middles of texels, and directions are picked in proportion to its luminance. Such a
 // map is a sum of tents: each texel has one, which falls from the texel's middle to those of its neighbours. A row is
 // picked first, and then a texel of the row, each by an alias table, and at last a place below the texel's tent. The
-// density in the map is therefore bilinear, too. Per steradian, it is divided by the sine of the polar angle.
+// pdf in the map is therefore bilinear, too. Per steradian, it is divided by the sine of the polar angle.
 //
 // Needs the words of textures (texture_words.glsl).
 #ifndef KDRAY_ENVIRONMENT
@@ -21,10 +21,10 @@
 #include "emitters/pick.glsl"
 #include "emitters/sun.glsl"
 
-// Lower bound of the sine by which the density in the map is divided. At the poles, the sine is 0.
+// Lower bound of the sine by which the pdf in the map is divided. At the poles, the sine is 0.
 const float LEAST_MAP_SINE = 1.0e-6;
 
-// A texel: colour, and the density in the map.
+// A texel: colour, and the pdf in the map.
 vec4 environment_texel(uint x, uint y) {
     uint n_rows = accel.environment_height, n_columns = accel.environment_width;
     uint at = accel.environment_begin + 2u * (n_rows + n_rows * n_columns) + 4u * (y * n_columns + x);
@@ -39,11 +39,11 @@ vec2 environment_place(vec3 direction, float aside) {
     return place * vec2(accel.environment_width, accel.environment_height) - 0.5;
 }
 
-// What the map has in a direction: its colour, and the density with which the direction is picked if the environment
+// What the map has in a direction: its colour, and the pdf with which the direction is picked if the environment
 // without the suns is picked, per steradian.
 struct MapValue {
     vec3 radiance;
-    float density;
+    float pdf;
 };
 
 // The map's value at a place. aside: the sine of the place's polar angle.
@@ -63,18 +63,18 @@ MapValue map_value(vec2 place, float aside) {
     return MapValue(value.rgb, value.a / max(aside, LEAST_MAP_SINE));
 }
 
-// What a ray that leaves the scene meets: the environment and its suns. density: with which pick_light picks the
+// What a ray that leaves the scene meets: the environment and its suns. pdf: with which pick_light picks the
 // direction because of them, per steradian.
 struct SeenEnvironment {
     vec3 radiance;
-    float density;
+    float pdf;
 };
 
 // Adds the suns to what the environment has in a direction.
 SeenEnvironment with_suns(MapValue value, vec3 direction) {
     SeenSuns suns = seen_suns(direction);
-    float density = accel.environment_probability * value.density + suns.density;
-    return SeenEnvironment(value.radiance + suns.radiance, density);
+    float pdf = accel.environment_probability * value.pdf + suns.pdf;
+    return SeenEnvironment(value.radiance + suns.radiance, pdf);
 }
 
 // What a ray in this direction meets beyond the scene.
@@ -132,7 +132,7 @@ MapPick pick_any_direction(vec2 u) {
 // The pick of a direction beyond the scene.
 LightPick pick_beyond(vec3 direction, SeenEnvironment seen) {
     Towards way = Towards(direction, uintBitsToFloat(0x7f800000u));
-    return pick_of_point(way, seen.radiance + ambient_radiance(direction), seen.density);
+    return pick_of_point(way, seen.radiance + ambient_radiance(direction), seen.pdf);
 }
 
 LightPick pick_environment(vec2 u) {

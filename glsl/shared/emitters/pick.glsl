@@ -5,7 +5,7 @@
 #include "layout.glsl"
 
 const float EMITTER_PI = 3.14159265;
-// A number beyond which a density or a weight counts as infinite.
+// A number beyond which a pdf or a weight counts as infinite.
 const float MOST_LIGHT = 1.0e30;
 
 // A direction from which light may come.
@@ -14,12 +14,12 @@ struct LightPick {
     // beyond the scene).
     vec3 direction;
     float distance;
-    // Radiance divided by `density`. Of lights without a size: irradiance on a facing surface, divided by the
+    // Radiance divided by `pdf`. Of lights without a size: irradiance on a facing surface, divided by the
     // probability of the pick. Either is multiplied by f |cos| to give the reflected radiance. 0: there is no light.
     vec3 light;
-    // Density of the direction, per steradian, the probability of the emitter included. It is 0 for lights without a
+    // Pdf of the direction, per steradian, the probability of the emitter included. It is 0 for lights without a
     // size, which no ray can hit.
-    float density;
+    float pdf;
 };
 
 LightPick no_pick() {
@@ -40,9 +40,9 @@ Towards towards(vec3 from, vec3 to) {
 }
 
 // The pick of a point from which light of this radiance comes.
-LightPick pick_of_point(Towards way, vec3 radiance, float density) {
-    if (!(density > 0.0 && density < MOST_LIGHT)) return no_pick();
-    return LightPick(way.direction, way.distance, radiance / density, density);
+LightPick pick_of_point(Towards way, vec3 radiance, float pdf) {
+    if (!(pdf > 0.0 && pdf < MOST_LIGHT)) return no_pick();
+    return LightPick(way.direction, way.distance, radiance / pdf, pdf);
 }
 
 // A vector that is `cosine` along the axis, and `sine` aside of it at an azimuth in turns. The three axes are

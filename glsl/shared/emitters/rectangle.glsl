@@ -21,8 +21,8 @@ float hit_rectangle(AreaLight light, vec3 origin, vec3 direction) {
     return abs(u) <= 1.0 && abs(v) <= 1.0 ? t : uintBitsToFloat(0x7f800000u);
 }
 
-// Density per steradian of a direction in which a flat light is seen at a distance, if its points are picked uniformly.
-float flat_density(AreaLight light, vec3 direction, float distance) {
+// Pdf per steradian of a direction in which a flat light is seen at a distance, if its points are picked uniformly.
+float flat_pdf(AreaLight light, vec3 direction, float distance) {
     float facing = -dot(light.axis, direction) * light.area;
     return facing > 0.0 ? distance * distance / facing : 0.0;
 }
@@ -99,11 +99,11 @@ vec3 vector_to_rectangle(AreaLight light, SeenRectangle seen, vec2 u) {
     return x * normalize(light.edge_u) + y * normalize(light.edge_v) - seen.height * light.axis;
 }
 
-// Density per steradian with which pick_rectangle picks a direction in which the rectangle is seen at a distance,
+// Pdf per steradian with which pick_rectangle picks a direction in which the rectangle is seen at a distance,
 // without the probability of the light.
-float rectangle_density(AreaLight light, vec3 point_world, vec3 direction, float distance) {
+float rectangle_pdf(AreaLight light, vec3 point_world, vec3 direction, float distance) {
     SeenRectangle seen = seen_rectangle(light, point_world);
-    return seen.solid_angle > 0.0 ? 1.0 / seen.solid_angle : flat_density(light, direction, distance);
+    return seen.solid_angle > 0.0 ? 1.0 / seen.solid_angle : flat_pdf(light, direction, distance);
 }
 
 LightPick pick_rectangle(AreaLight light, vec3 point_world, vec2 u) {
@@ -114,8 +114,8 @@ LightPick pick_rectangle(AreaLight light, vec3 point_world, vec2 u) {
     }
     vec3 point = light.position + (2.0 * u.x - 1.0) * light.edge_u + (2.0 * u.y - 1.0) * light.edge_v;
     Towards way = towards(point_world, point);
-    float density = light.probability * flat_density(light, way.direction, way.distance);
-    return pick_of_point(way, light.radiance, density);
+    float pdf = light.probability * flat_pdf(light, way.direction, way.distance);
+    return pick_of_point(way, light.radiance, pdf);
 }
 
 #endif

@@ -25,8 +25,8 @@ float sphere_versine(AreaLight light, vec3 to_centre) {
     return squared_sine < 1.0 ? squared_sine / (1.0 + sqrt(1.0 - squared_sine)) : 0.0;
 }
 
-// Density per steradian of the directions in which the sphere is seen; 0 from inside.
-float sphere_density(AreaLight light, vec3 point_world) {
+// Pdf per steradian of the directions in which the sphere is seen; 0 from inside.
+float sphere_pdf(AreaLight light, vec3 point_world) {
     float versine = sphere_versine(light, light.position - point_world);
     return versine > 0.0 ? 1.0 / (2.0 * EMITTER_PI * versine) : 0.0;
 }
@@ -47,7 +47,7 @@ LightPick pick_sphere(AreaLight light, vec3 point_world, vec2 u) {
     float half_chord = sqrt(max(light.radius * light.radius - aside * aside, 0.0));
     float distance = max(to_centre.distance * (1.0 - versine) - half_chord, 0.0);
     return pick_of_point(
-        Towards(direction, distance), light.radiance, light.probability * sphere_density(light, point_world)
+        Towards(direction, distance), light.radiance, light.probability * sphere_pdf(light, point_world)
     );
 }
 

@@ -9,11 +9,11 @@
 #include "emitters/pick.glsl"
 #include "emitters/area_light.glsl"
 
-// What the suns add to the environment in a direction. density: with which pick_light picks the direction because of
+// What the suns add to the environment in a direction. pdf: with which pick_light picks the direction because of
 // the suns, per steradian.
 struct SeenSuns {
     vec3 radiance;
-    float density;
+    float pdf;
 };
 
 SeenSuns seen_suns(vec3 direction) {
@@ -25,7 +25,7 @@ SeenSuns seen_suns(vec3 direction) {
         vec3 aside = direction - sun.position;
         if (dot(aside, aside) > 2.0 * sun.radius) continue;
         seen.radiance += sun.radiance;
-        seen.density += sun.probability / sun.area;
+        seen.pdf += sun.probability / sun.area;
     }
     return seen;
 }

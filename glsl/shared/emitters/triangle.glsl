@@ -26,12 +26,12 @@ vec3 emission_at(uint triangle_ix, float u, float v) {
     return emitted * max(sample_finest(map, uv_at(triangle_ix, uv_set_of(map), u, v)).rgb, 0.0);
 }
 
-// Density per steradian of a direction in which the triangle is seen at a distance, if its points are picked uniformly.
-float area_density(Triangle t, vec3 direction, float distance) {
+// Pdf per steradian of a direction in which the triangle is seen at a distance, if its points are picked uniformly.
+float area_pdf(Triangle t, vec3 direction, float distance) {
     // Twice the area, times the cosine.
     float facing = abs(dot(cross(t.v1 - t.v0, t.v2 - t.v0), direction));
-    float density = 2.0 * distance * distance / facing;
-    return density < MOST_LIGHT ? density : 0.0;
+    float pdf = 2.0 * distance * distance / facing;
+    return pdf < MOST_LIGHT ? pdf : 0.0;
 }
 
 // Barycentric weights of a triangle's second and third corner, uniform on its area (Heitz: A Low-Distortion Map Between
@@ -46,8 +46,8 @@ LightPick pick_triangle(uint triangle_ix, vec3 point_world, vec2 u, float probab
     vec2 weights = triangle_weights(u);
     vec3 point = t.v0 + weights.x * (t.v1 - t.v0) + weights.y * (t.v2 - t.v0);
     Towards way = towards(point_world, point);
-    float density = probability * area_density(t, way.direction, way.distance);
-    return pick_of_point(way, emission_at(triangle_ix, weights.x, weights.y), density);
+    float pdf = probability * area_pdf(t, way.direction, way.distance);
+    return pick_of_point(way, emission_at(triangle_ix, weights.x, weights.y), pdf);
 }
 
 #endif

@@ -1,4 +1,4 @@
-//! The sum of a surface's lobes for two directions, and the density with which
+//! The sum of a surface's lobes for two directions, and the pdf with which
 //! [`sample_bsdf`](super::sample::sample_bsdf) samples the one towards the light. Twin of `bsdf/evaluate.glsl`.
 
 use glam::{Vec3, Vec3Swizzles, Vec4};
@@ -6,21 +6,21 @@ use glam::{Vec3, Vec3Swizzles, Vec4};
 use super::{
     albedo::ggx_albedo,
     clearcoat::clearcoat_fresnel,
-    lambert::{evaluate_lambert, lambert_density},
+    lambert::{evaluate_lambert, lambert_pdf},
     lobes::{has_clearcoat, has_sheen},
     local_frame::to_local,
-    reflection::{evaluate_reflection, reflection_density},
-    sheen::{evaluate_sheen, sheen_density},
+    reflection::{evaluate_reflection, reflection_pdf},
+    sheen::{evaluate_sheen, sheen_pdf},
     terms::{BsdfTerms, NO_ALBEDO, dielectric_albedo, passes_straight, reflected_choice, split_at},
-    transmission::{evaluate_refraction, refracting_normal, refraction_density, refracts_between},
+    transmission::{evaluate_refraction, refracting_normal, refraction_pdf, refracts_between},
 };
 use crate::reference::surface::Surface;
 
-/// The scattered share of light times the cosine, and the density of its direction.
+/// The scattered share of light times the cosine, and the pdf of its direction.
 #[derive(Clone, Copy, Debug)]
 pub struct BsdfValue {
     pub value: Vec3,
-    pub density: f32,
+    pub pdf: f32,
 }
 
 /// Adds the interface's reflection.
@@ -33,7 +33,7 @@ fn add_reflection(terms: &BsdfTerms, to_light: Vec3, half_vector: Vec3, sum: &mu
     sum.value += terms.base_share * split.reflected * lobe;
     // Light that passes straight tells nothing of a microfacet, so the surface's normal decides.
     let choice = if passes_straight(terms) { terms.straight_choice } else { reflected_choice(&split) };
-    sum.density += terms.choice.x * choice * reflection_density(terms.to_viewer, half_vector, terms.width);
+    sum.pdf += terms.choice.x * choice * reflection_pdf(terms.to_viewer, half_vector, terms.width);
 }
 
 /// Adds the reflection of the clear layer.
@@ -44,7 +44,7 @@ fn add_clearcoat(terms: &BsdfTerms, to_light: Vec3, half_vector: Vec3, sum: &mut
     let width = terms.coat_roughness * terms.coat_roughness;
     let lobe = evaluate_reflection(terms.to_viewer, to_light, half_vector, width);
     sum.value += terms.material.clearcoat * clearcoat_fresnel(terms.to_viewer.dot(half_vector)) * lobe;
-    sum.density += terms.choice.z * reflection_density(terms.to_viewer, half_vector, width);
+    sum.pdf += terms.choice.z * reflection_pdf(terms.to_viewer, half_vector, width);
 }
 
 /// Adds the Lambertian lobe.
@@ -57,7 +57,7 @@ fn add_lambert(terms: &BsdfTerms, to_light: Vec3, sum: &mut BsdfValue) {
     let left = (1.0 - dielectric_albedo(terms.dielectric, albedo)).max(0.0);
     let reflectance = terms.below * left + terms.between * albedo.loss;
     sum.value += terms.base_share * evaluate_lambert(reflectance, to_light);
-    sum.density += terms.choice.y * lambert_density(to_light);
+    sum.pdf += terms.choice.y * lambert_pdf(to_light);
 }
 
 /// Adds the sheen.
@@ -67,7 +67,7 @@ fn add_sheen(terms: &BsdfTerms, to_light: Vec3, sum: &mut BsdfValue) {
     }
     let lobe = evaluate_sheen(terms.to_viewer, to_light, terms.sheen_roughness) * terms.sheen_bound;
     sum.value += terms.sheen_share * terms.material.sheen_colour * lobe;
-    sum.density += terms.choice.w * sheen_density(to_light);
+    sum.pdf += terms.choice.w * sheen_pdf(to_light);
 }
 
 /// Adds the light that passes through the interface.
@@ -85,23 +85,23 @@ fn add_transmission(terms: &BsdfTerms, to_light: Vec3, sum: &mut BsdfValue) {
         return;
     }
     let split = split_at(terms, to_viewer.dot(half_vector));
-    let (lobe, density) = match terms.is_solid {
+    let (lobe, pdf) = match terms.is_solid {
         true => (
             evaluate_refraction(to_viewer, to_light, half_vector, width, eta),
-            refraction_density(to_viewer, to_light, half_vector, width, eta),
+            refraction_pdf(to_viewer, to_light, half_vector, width, eta),
         ),
         false => (
             evaluate_reflection(to_viewer, mirrored, half_vector, width),
-            reflection_density(to_viewer, half_vector, width),
+            reflection_pdf(to_viewer, half_vector, width),
         ),
     };
     sum.value += terms.base_share * split.transmitted * lobe;
-    sum.density += terms.choice.x * (1.0 - reflected_choice(&split)) * density;
+    sum.pdf += terms.choice.x * (1.0 - reflected_choice(&split)) * pdf;
 }
 
 /// Returns the sum of all lobes but the delta lobes. `to_light`: in the frame of the surface.
 pub(super) fn value_of(terms: &BsdfTerms, to_light: Vec3) -> BsdfValue {
-    let mut sum = BsdfValue { value: Vec3::ZERO, density: 0.0 };
+    let mut sum = BsdfValue { value: Vec3::ZERO, pdf: 0.0 };
     if to_light.z > 0.0 {
         let has_microfacets = terms.has_interface || has_clearcoat(terms.material);
         let half_vector = if has_microfacets { (terms.to_viewer + to_light).normalize() } else { Vec3::Z };
@@ -124,7 +124,7 @@ pub(super) fn is_consistent(surface: &Surface, direction: Vec3, local: Vec3) -> 
 pub fn value_at(terms: &BsdfTerms, surface: &Surface, to_light: Vec3) -> BsdfValue {
     let local = to_local(&terms.frame, to_light);
     if terms.choice == Vec4::ZERO || !is_consistent(surface, to_light, local) {
-        return BsdfValue { value: Vec3::ZERO, density: 0.0 };
+        return BsdfValue { value: Vec3::ZERO, pdf: 0.0 };
     }
     value_of(terms, local)
 }

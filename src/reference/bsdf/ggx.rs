@@ -7,7 +7,7 @@ use glam::{Vec2, Vec3, Vec3Swizzles};
 
 use crate::reference::turns::sin_cos_of_turns;
 
-/// Density of normals, per steradian and area of the surface. `half_vector.z` is at least 0.
+/// Pdf of normals, per steradian and area of the surface. `half_vector.z` is at least 0.
 pub fn ggx_distribution(half_vector: Vec3, width: f32) -> f32 {
     let squared = width * width;
     let spread = half_vector.xy().dot(half_vector.xy()) + half_vector.z * half_vector.z * squared;
@@ -20,8 +20,8 @@ pub fn ggx_root(cosine: f32, width: f32) -> f32 {
     (cosine * cosine * (1.0 - squared) + squared).sqrt()
 }
 
-/// Density of visible normals per steradian, divided by the cosine between the viewer and the normal.
-pub fn ggx_visible_density(to_viewer: Vec3, half_vector: Vec3, width: f32) -> f32 {
+/// Pdf of visible normals per steradian, divided by the cosine between the viewer and the normal.
+pub fn ggx_visible_pdf(to_viewer: Vec3, half_vector: Vec3, width: f32) -> f32 {
     ggx_distribution(half_vector, width) * 2.0 / (to_viewer.z + ggx_root(to_viewer.z, width))
 }
 

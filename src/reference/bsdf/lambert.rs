@@ -7,13 +7,13 @@ use glam::{Vec2, Vec3};
 
 use crate::reference::turns::sin_cos_of_turns;
 
-/// Returns a direction with a density in proportion to its cosine.
+/// Returns a direction with a pdf in proportion to its cosine.
 pub fn sample_lambert(u: Vec2) -> Vec3 {
     let (radius, (sine, cosine)) = (u.x.sqrt(), sin_cos_of_turns(u.y));
     Vec3::new(radius * cosine, radius * sine, (1.0 - u.x).max(0.0).sqrt())
 }
 
-pub fn lambert_density(to_light: Vec3) -> f32 {
+pub fn lambert_pdf(to_light: Vec3) -> f32 {
     to_light.z.max(0.0) / PI
 }
 

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::ggx::{ggx_distribution, ggx_visibility, ggx_visible_density};
+use super::ggx::{ggx_distribution, ggx_visibility, ggx_visible_pdf};
 
 /// Returns the direction that a microfacet of this normal reflects to the viewer.
 pub fn reflected_by(to_viewer: Vec3, half_vector: Vec3) -> Vec3 {
@@ -15,7 +15,7 @@ pub fn evaluate_reflection(to_viewer: Vec3, to_light: Vec3, half_vector: Vec3, w
     0.25 * ggx_distribution(half_vector, width) * visibility
 }
 
-/// Density of the light's direction, per steradian, if a visible normal reflects it.
-pub fn reflection_density(to_viewer: Vec3, half_vector: Vec3, width: f32) -> f32 {
-    0.25 * ggx_visible_density(to_viewer, half_vector, width)
+/// Pdf of the light's direction, per steradian, if a visible normal reflects it.
+pub fn reflection_pdf(to_viewer: Vec3, half_vector: Vec3, width: f32) -> f32 {
+    0.25 * ggx_visible_pdf(to_viewer, half_vector, width)
 }

@@ -22,15 +22,15 @@ use crate::reference::{
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BsdfSample {
     pub direction: Vec3,
-    /// The scattered share times the cosine, divided by the density.
+    /// The scattered share times the cosine, divided by the pdf.
     pub weight: Vec3,
-    /// Density of all lobes, per steradian; of a delta lobe, the probability of its choice. A density of 0 means that
+    /// Pdf of all lobes, per steradian; of a delta lobe, the probability of its choice. A pdf of 0 means that
     /// the light is absorbed.
-    pub density: f32,
+    pub pdf: f32,
     pub is_delta: bool,
 }
 
-const BSDF_ABSORBED: BsdfSample = BsdfSample { direction: Vec3::Z, weight: Vec3::ZERO, density: 0.0, is_delta: false };
+const BSDF_ABSORBED: BsdfSample = BsdfSample { direction: Vec3::Z, weight: Vec3::ZERO, pdf: 0.0, is_delta: false };
 
 /// A direction that is sampled for one lobe.
 #[derive(Clone, Copy, Debug)]
@@ -123,10 +123,10 @@ fn delta_sample(terms: &BsdfTerms, surface: &Surface, local: Vec3, (share, proba
     if !(probability > 0.0) {
         return BSDF_ABSORBED;
     }
-    BsdfSample { direction, weight: share / probability, density: probability, is_delta: true }
+    BsdfSample { direction, weight: share / probability, pdf: probability, is_delta: true }
 }
 
-/// Returns the sample of a lobe with a density. All lobes with a density scatter light to its direction.
+/// Returns the sample of a lobe with a pdf. All lobes with a pdf scatter light to its direction.
 fn rough_sample(terms: &BsdfTerms, surface: &Surface, lobe: &LobeSample) -> BsdfSample {
     let direction = to_world(&terms.frame, lobe.local);
     let is_on_side = lobe.local.z * lobe.side > 0.0;
@@ -134,10 +134,10 @@ fn rough_sample(terms: &BsdfTerms, surface: &Surface, lobe: &LobeSample) -> Bsdf
         return BSDF_ABSORBED;
     }
     let found = value_of(terms, lobe.local);
-    if !(found.density > 0.0) {
+    if !(found.pdf > 0.0) {
         return BSDF_ABSORBED;
     }
-    BsdfSample { direction, weight: found.value / found.density, density: found.density, is_delta: false }
+    BsdfSample { direction, weight: found.value / found.pdf, pdf: found.pdf, is_delta: false }
 }
 
 /// Returns a direction from which light is scattered to the viewer. `u`: random numbers in [0, 1). `u.z` selects the

@@ -7,7 +7,7 @@ use glam::{FloatExt, Vec2, Vec3, Vec3Swizzles};
 
 use crate::reference::turns::sin_cos_of_turns;
 
-/// Density of the fibres' normals. `width`: of the distribution.
+/// Pdf of the fibres' normals. `width`: of the distribution.
 fn sheen_distribution(half_vector: Vec3, width: f32) -> f32 {
     let sine = half_vector.xy().dot(half_vector.xy()).clamp(0.0, 1.0).sqrt();
     (2.0 + 1.0 / width) * sine.max(1.0e-6).powf(1.0 / width) / (2.0 * PI)
@@ -49,6 +49,6 @@ pub fn sample_sheen(u: Vec2) -> Vec3 {
     Vec3::new(radius * cosine, radius * sine, u.x)
 }
 
-pub fn sheen_density(to_light: Vec3) -> f32 {
+pub fn sheen_pdf(to_light: Vec3) -> f32 {
     if to_light.z > 0.0 { 0.5 / PI } else { 0.0 }
 }

@@ -1,4 +1,4 @@
-//! Tests of the surfaces of the path tracer: energy, reciprocity, and that samples have the densities that are stated.
+//! Tests of the surfaces of the path tracer: energy, reciprocity, and that samples have the pdfs that are stated.
 
 use std::f32::consts::TAU;
 
@@ -8,7 +8,7 @@ use super::{
     albedo::{ggx_albedo, mean_ggx_albedo, sheen_albedo},
     bsdf_terms,
     conductor::conductor_reflectance,
-    ggx::{ggx_root, ggx_visible_density, sample_ggx},
+    ggx::{ggx_root, ggx_visible_pdf, sample_ggx},
     is_smooth,
     reflection::{evaluate_reflection, reflected_by},
     sample::BsdfSample,
@@ -39,8 +39,8 @@ fn evaluate_bsdf(material: &Material, surface: &Surface, to_viewer: Vec3, to_lig
     value_at(&bsdf_terms(&mut material.clone(), surface, to_viewer), surface, to_light).value
 }
 
-fn bsdf_density(material: &Material, surface: &Surface, to_viewer: Vec3, to_light: Vec3) -> f32 {
-    value_at(&bsdf_terms(&mut material.clone(), surface, to_viewer), surface, to_light).density
+fn bsdf_pdf(material: &Material, surface: &Surface, to_viewer: Vec3, to_light: Vec3) -> f32 {
+    value_at(&bsdf_terms(&mut material.clone(), surface, to_viewer), surface, to_light).pdf
 }
 
 /// The triangle and the normals of the surface, with the normal z.
@@ -206,11 +206,11 @@ fn no_surface_gains_light() {
     }
 }
 
-/// The visible normals fill the viewer's view: their density integrates to 1, without shadowing (the weak white
+/// The visible normals fill the viewer's view: their pdf integrates to 1, without shadowing (the weak white
 /// furnace; Heitz 2014).
 #[test]
 fn visible_normals_integrate_to_one() {
-    let integral = |density: &dyn Fn(Vec3) -> f32| {
+    let integral = |pdf: &dyn Fn(Vec3) -> f32| {
         let n = 300;
         let mut sum = 0.0_f64;
         for i in 0..n * n {
@@ -219,14 +219,14 @@ fn visible_normals_integrate_to_one() {
             let z = 1.0 - a * a;
             let sine = (1.0 - z * z).sqrt();
             let normal = vec3(sine * (b * TAU).cos(), sine * (b * TAU).sin(), z);
-            sum += f64::from(density(normal) * 2.0 * a * TAU);
+            sum += f64::from(pdf(normal) * 2.0 * a * TAU);
         }
         sum / (n * n) as f64
     };
     for width in [0.1_f32, 0.4, 1.0] {
         for cosine in VIEW_COSINES {
             let to_viewer = view(cosine);
-            let of_normal = |normal| ggx_visible_density(to_viewer, normal, width) * to_viewer.dot(normal).max(0.0);
+            let of_normal = |normal| ggx_visible_pdf(to_viewer, normal, width) * to_viewer.dot(normal).max(0.0);
             let found = integral(&of_normal);
             assert!((found - 1.0).abs() < 0.01, "{width}, {cosine}: {found}");
             // Normals of which none is masked are too many, except for a view along the normal of a smooth surface.
@@ -287,7 +287,7 @@ fn scattering_is_reciprocal() {
 }
 
 #[test]
-fn samples_have_the_stated_density() {
+fn samples_have_the_stated_pdf() {
     let surfaces = [flat(false), flat(true), bent(vec3(0.3, -0.2, 0.9).normalize(), false)];
     for (ix, material) in rough_materials().iter().enumerate() {
         let surface = &surfaces[ix % 3];
@@ -296,34 +296,34 @@ fn samples_have_the_stated_density() {
             let mut random = Uniform(ix as u64);
             let mut sample = || {
                 let sample = sample_bsdf(material, surface, to_viewer, random.point());
-                (sample.density > 0.0 && !sample.is_delta).then_some(sample.direction)
+                (sample.pdf > 0.0 && !sample.is_delta).then_some(sample.direction)
             };
-            let density = |direction| bsdf_density(material, surface, to_viewer, direction);
-            let found = chi_square((30_000, 8), &mut sample, &density);
+            let pdf = |direction| bsdf_pdf(material, surface, to_viewer, direction);
+            let found = chi_square((30_000, 8), &mut sample, &pdf);
             assert!(found < LARGEST_DEVIATION, "{found} deviations at {cosine} for {material:?}");
-            // A density that is 15 % higher on one side is noticed.
-            let skewed = |direction: Vec3| density(direction) * (1.0 + 0.15 * direction.x.signum());
+            // A pdf that is 15 % higher on one side is noticed.
+            let skewed = |direction: Vec3| pdf(direction) * (1.0 + 0.15 * direction.x.signum());
             assert!(chi_square((30_000, 8), &mut sample, &skewed) > LARGEST_DEVIATION, "{cosine} for {material:?}");
         }
     }
 }
 
-/// A sample's weight and density are those of its direction.
+/// A sample's weight and pdf are those of its direction.
 #[test]
-fn weights_are_values_divided_by_densities() {
+fn weights_are_values_divided_by_pdfs() {
     for material in rough_materials() {
         for surface in [flat(false), flat(true), bent(vec3(0.3, -0.2, 0.9).normalize(), false)] {
             for i in 0..200 {
                 let to_viewer = view(0.05 + 0.9 * point(i + 999).x);
                 let sample = sample_bsdf(&material, &surface, to_viewer, point(i));
-                if sample.density == 0.0 || sample.is_delta {
+                if sample.pdf == 0.0 || sample.is_delta {
                     continue;
                 }
-                let density = bsdf_density(&material, &surface, to_viewer, sample.direction);
+                let pdf = bsdf_pdf(&material, &surface, to_viewer, sample.direction);
                 let value = evaluate_bsdf(&material, &surface, to_viewer, sample.direction);
-                assert!((density - sample.density).abs() <= 2e-3 * density, "{density} {sample:?} {material:?}");
+                assert!((pdf - sample.pdf).abs() <= 2e-3 * pdf, "{pdf} {sample:?} {material:?}");
                 let least = 2e-3 * value.max_element();
-                assert!((value - sample.weight * density).abs().max_element() <= least, "{sample:?} {material:?}");
+                assert!((value - sample.weight * pdf).abs().max_element() <= least, "{sample:?} {material:?}");
             }
         }
     }
@@ -384,7 +384,7 @@ fn albedos_are_those_of_the_lobes() {
                 let to_light = reflected_by(to_viewer, half_vector);
                 if to_light.z > 0.0 {
                     let value = evaluate_reflection(to_viewer, to_light, half_vector, width);
-                    let weight = value / (0.25 * ggx_visible_density(to_viewer, half_vector, width));
+                    let weight = value / (0.25 * ggx_visible_pdf(to_viewer, half_vector, width));
                     whole += weight / n as f32;
                     grazing += weight * (1.0 - to_viewer.dot(half_vector)).powi(5) / n as f32;
                 }
@@ -462,7 +462,7 @@ fn inconsistent_sides_carry_nothing() {
     for material in rough_materials() {
         for direction in [above, below] {
             assert_eq!(evaluate_bsdf(&material, &surface, Vec3::Z, direction), Vec3::ZERO, "{material:?}");
-            assert_eq!(bsdf_density(&material, &surface, Vec3::Z, direction), 0.0, "{material:?}");
+            assert_eq!(bsdf_pdf(&material, &surface, Vec3::Z, direction), 0.0, "{material:?}");
         }
     }
 }
@@ -492,14 +492,14 @@ fn extremes_give_finite_numbers() {
                 for u in us {
                     let sample = sample_bsdf(material, &surface, to_viewer, u);
                     let is_right = sample.weight.is_finite() && sample.weight.min_element() >= 0.0;
-                    assert!(is_right && sample.density.is_finite(), "{sample:?} at {to_viewer} for {material:?}");
+                    assert!(is_right && sample.pdf.is_finite(), "{sample:?} at {to_viewer} for {material:?}");
                     assert!((sample.direction.length() - 1.0).abs() < 1e-3, "{sample:?} for {material:?}");
                 }
                 for direction in directions {
                     let value = evaluate_bsdf(material, &surface, to_viewer, direction);
-                    let density = bsdf_density(material, &surface, to_viewer, direction);
-                    let is_right = value.is_finite() && value.min_element() >= 0.0 && density >= 0.0;
-                    assert!(is_right && density.is_finite(), "{value} {density} {direction} {material:?}");
+                    let pdf = bsdf_pdf(material, &surface, to_viewer, direction);
+                    let is_right = value.is_finite() && value.min_element() >= 0.0 && pdf >= 0.0;
+                    assert!(is_right && pdf.is_finite(), "{value} {pdf} {direction} {material:?}");
                 }
             }
         }
@@ -528,7 +528,7 @@ fn a_surface_without_an_interface_is_the_limit_of_one_with_it() {
             let (to_viewer, u) = (view(0.1 + 0.8 * point(i).x), point(i + 64));
             let [a, b] = [&without, &with].map(|material| sample_bsdf(material, &surface, to_viewer, u));
             assert!((a.weight - b.weight).abs().max_element() < 1.0e-6, "{a:?} {b:?}");
-            assert!((a.density - b.density).abs() < 1.0e-6 && (a.direction - b.direction).length() < 1.0e-6);
+            assert!((a.pdf - b.pdf).abs() < 1.0e-6 && (a.direction - b.direction).length() < 1.0e-6);
         }
     }
 }

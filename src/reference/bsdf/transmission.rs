@@ -7,7 +7,7 @@ use glam::Vec3;
 
 use super::{
     super::fresnel::refraction_cosine,
-    ggx::{ggx_distribution, ggx_visibility, ggx_visible_density},
+    ggx::{ggx_distribution, ggx_visibility, ggx_visible_pdf},
 };
 
 /// Returns the direction that a microfacet of this normal refracts to the viewer. There must be no total reflection.
@@ -28,8 +28,8 @@ pub fn refracts_between(to_viewer: Vec3, to_light: Vec3, half_vector: Vec3) -> b
     to_viewer.dot(half_vector) > 0.0 && to_light.dot(half_vector) < 0.0
 }
 
-/// Solid angle of directions to the light for each steradian of normals, as its inverse: density of directions for a
-/// density 1 of normals.
+/// Solid angle of directions to the light for each steradian of normals, as its inverse: pdf of directions for a
+/// pdf 1 of normals.
 pub fn refraction_jacobian(to_viewer: Vec3, to_light: Vec3, half_vector: Vec3, eta: f32) -> f32 {
     let cos_light = to_light.dot(half_vector);
     let sum = cos_light + eta * to_viewer.dot(half_vector);
@@ -43,8 +43,8 @@ pub fn evaluate_refraction(to_viewer: Vec3, to_light: Vec3, half_vector: Vec3, w
     eta * eta * visibility * cos_viewer * refraction_jacobian(to_viewer, to_light, half_vector, eta)
 }
 
-/// Density of the light's direction, per steradian, if a visible normal refracts it.
-pub fn refraction_density(to_viewer: Vec3, to_light: Vec3, half_vector: Vec3, width: f32, eta: f32) -> f32 {
-    let of_normal = ggx_visible_density(to_viewer, half_vector, width) * to_viewer.dot(half_vector);
+/// Pdf of the light's direction, per steradian, if a visible normal refracts it.
+pub fn refraction_pdf(to_viewer: Vec3, to_light: Vec3, half_vector: Vec3, width: f32, eta: f32) -> f32 {
+    let of_normal = ggx_visible_pdf(to_viewer, half_vector, width) * to_viewer.dot(half_vector);
     of_normal * refraction_jacobian(to_viewer, to_light, half_vector, eta)
 }

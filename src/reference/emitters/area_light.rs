@@ -6,8 +6,8 @@ use glam::{Vec2, Vec3};
 use super::{
     disk::{hit_disk, pick_disk},
     pick::LightPick,
-    rectangle::{flat_density, hit_rectangle, pick_rectangle, rectangle_density},
-    sphere::{hit_sphere, pick_sphere, sphere_density},
+    rectangle::{flat_pdf, hit_rectangle, pick_rectangle, rectangle_pdf},
+    sphere::{hit_sphere, pick_sphere, sphere_pdf},
     tree::tree_probability,
 };
 use crate::{
@@ -22,8 +22,8 @@ pub struct SeenLight {
     pub t: f32,
     /// Radiance that it emits.
     pub radiance: Vec3,
-    /// Density with which [`pick_light`](super::pick_light) picks the direction, per steradian.
-    pub density: f32,
+    /// Pdf with which [`pick_light`](super::pick_light) picks the direction, per steradian.
+    pub pdf: f32,
 }
 
 /// Distance at which a ray meets an area light, world units; infinity if it does not.
@@ -46,14 +46,14 @@ pub fn seen_light(inputs: &KernelInputs, origin: Vec3, direction: Vec3, t_max: f
             (nearest, seen) = (t, Some(light));
         }
     }
-    let Some(light) = seen else { return SeenLight { t: nearest, radiance: Vec3::ZERO, density: 0.0 } };
-    let density = match light.kind {
-        AREA_RECTANGLE => rectangle_density(light, origin, direction, nearest),
-        AREA_DISK => flat_density(light, direction, nearest),
-        _ => sphere_density(light, origin),
+    let Some(light) = seen else { return SeenLight { t: nearest, radiance: Vec3::ZERO, pdf: 0.0 } };
+    let pdf = match light.kind {
+        AREA_RECTANGLE => rectangle_pdf(light, origin, direction, nearest),
+        AREA_DISK => flat_pdf(light, direction, nearest),
+        _ => sphere_pdf(light, origin),
     };
     let probability = light.probability * tree_probability(nodes, origin, light.leaf_ix);
-    SeenLight { t: nearest, radiance: light.radiance, density: probability * density }
+    SeenLight { t: nearest, radiance: light.radiance, pdf: probability * pdf }
 }
 
 /// `probability`: with which this light is picked.

@@ -16,9 +16,9 @@ use crate::{
     world::{Emitters, EnvironmentMap},
 };
 
-/// Density of directions that are uniform on the sphere.
+/// Pdf of directions that are uniform on the sphere.
 const UNIFORM: f32 = 1.0 / (4.0 * PI);
-/// Lower bound of the sine by which the density in the map is divided. At the poles, the sine is 0.
+/// Lower bound of the sine by which the pdf in the map is divided. At the poles, the sine is 0.
 const LEAST_MAP_SINE: f32 = 1.0e-6;
 
 /// Where a direction is in the map, texels to the right and down from the middle of the first one. `aside`: the sine of
@@ -34,8 +34,8 @@ fn environment_place(map: &EnvironmentMap, direction: Vec3, aside: f32) -> Vec2 
 #[derive(Clone, Copy)]
 struct MapValue {
     radiance: Vec3,
-    /// Density with which the direction is picked if the environment without the suns is picked, per steradian.
-    density: f32,
+    /// Pdf with which the direction is picked if the environment without the suns is picked, per steradian.
+    pdf: f32,
 }
 
 /// The map's value at a place. `aside`: the sine of the place's polar angle.
@@ -57,15 +57,15 @@ fn map_value(map: &EnvironmentMap, place: Vec2, aside: f32) -> MapValue {
     };
     let upper = row(0);
     let value = upper + (row(1) - upper) * weight.y;
-    MapValue { radiance: value.truncate(), density: value.w / aside.max(LEAST_MAP_SINE) }
+    MapValue { radiance: value.truncate(), pdf: value.w / aside.max(LEAST_MAP_SINE) }
 }
 
 /// What a ray that leaves the scene meets: the environment and its suns.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SeenEnvironment {
     pub radiance: Vec3,
-    /// Density with which [`pick_light`](super::pick_light) picks the direction because of them, per steradian.
-    pub density: f32,
+    /// Pdf with which [`pick_light`](super::pick_light) picks the direction because of them, per steradian.
+    pub pdf: f32,
 }
 
 /// What a ray in this direction meets beyond the scene.
@@ -79,7 +79,7 @@ fn seen_beyond(emitters: &Emitters, direction: Vec3) -> SeenEnvironment {
             let aside = (direction.x * direction.x + direction.z * direction.z).sqrt();
             map_value(map, environment_place(map, direction, aside), aside)
         }
-        None => MapValue { radiance: emitters.background, density: UNIFORM },
+        None => MapValue { radiance: emitters.background, pdf: UNIFORM },
     };
     with_suns(emitters, value, direction)
 }
@@ -89,7 +89,7 @@ fn with_suns(emitters: &Emitters, value: MapValue, direction: Vec3) -> SeenEnvir
     let suns = seen_suns(emitters, direction);
     SeenEnvironment {
         radiance: value.radiance + suns.radiance,
-        density: emitters.environment_probability * value.density + suns.density,
+        pdf: emitters.environment_probability * value.pdf + suns.pdf,
     }
 }
 
@@ -135,7 +135,7 @@ fn pick_any_direction(u: Vec2) -> Vec3 {
 /// The pick of a direction beyond the scene.
 fn pick_beyond(emitters: &Emitters, direction: Vec3, seen: SeenEnvironment) -> LightPick {
     let way = Towards { direction, distance: f32::INFINITY };
-    pick_of_point(way, seen.radiance + ambient_from(emitters, direction), seen.density)
+    pick_of_point(way, seen.radiance + ambient_from(emitters, direction), seen.pdf)
 }
 
 /// The pick of a direction whose place in the map is known. `aside`: the sine of the place's polar angle.
@@ -148,7 +148,7 @@ pub fn pick_environment(emitters: &Emitters, u: Vec2) -> LightPick {
     if let Some(map) = &emitters.environment {
         return pick_in_map(emitters, map, u);
     }
-    let (direction, value) = (pick_any_direction(u), MapValue { radiance: emitters.background, density: UNIFORM });
+    let (direction, value) = (pick_any_direction(u), MapValue { radiance: emitters.background, pdf: UNIFORM });
     pick_beyond(emitters, direction, with_suns(emitters, value, direction))
 }
 

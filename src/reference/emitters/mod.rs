@@ -24,7 +24,7 @@ use self::{
     environment::pick_sun,
     punctual::pick_punctual,
     tree::{pick_in_tree, tree_probability},
-    triangle::{area_density, pick_triangle},
+    triangle::{area_pdf, pick_triangle},
 };
 pub use self::{
     area_light::{SeenLight, seen_light},
@@ -87,15 +87,9 @@ pub fn pick_emitter(
     }
 }
 
-/// The density with which [`pick_light`] picks the point of a triangle that is seen from a point in a direction at a
+/// The pdf with which [`pick_light`] picks the point of a triangle that is seen from a point in a direction at a
 /// distance, per steradian; 0 for a triangle that is never picked. `direction`: a unit vector.
-pub fn emission_density(
-    inputs: &KernelInputs,
-    triangle_ix: u32,
-    point_world: Vec3,
-    direction: Vec3,
-    distance: f32,
-) -> f32 {
+pub fn emission_pdf(inputs: &KernelInputs, triangle_ix: u32, point_world: Vec3, direction: Vec3, distance: f32) -> f32 {
     let Some(emitters) = inputs.emitters else { return 0.0 };
     let triangles = emitters.triangles();
     let Ok(ix) = triangles.binary_search_by_key(&triangle_ix, |emitter| emitter.ix) else { return 0.0 };
@@ -103,5 +97,5 @@ pub fn emission_density(
     if emitters.has_tree() {
         probability *= tree_probability(&emitters.light_nodes, point_world, alias_ix);
     }
-    probability * area_density(&inputs.triangles[triangle_ix as usize], direction, distance)
+    probability * area_pdf(&inputs.triangles[triangle_ix as usize], direction, distance)
 }

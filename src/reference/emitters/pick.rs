@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::reference::turns::sin_cos_of_turns;
 
-/// A number beyond which a density or a weight counts as infinite.
+/// A number beyond which a pdf or a weight counts as infinite.
 pub(super) const MOST_LIGHT: f32 = 1.0e30;
 
 /// A direction from which light may come.
@@ -14,17 +14,17 @@ pub struct LightPick {
     pub direction: Vec3,
     /// Distance up to which the way must be free, world units (infinity for what is beyond the scene).
     pub distance: f32,
-    /// Radiance divided by `density`. Of lights without a size: irradiance on a facing surface, divided by the
+    /// Radiance divided by `pdf`. Of lights without a size: irradiance on a facing surface, divided by the
     /// probability of the pick. Either is multiplied by f |cos| to give the reflected radiance. 0: there is no light.
     pub light: Vec3,
-    /// Density of the direction, per steradian, the probability of the emitter included. It is 0 for lights without a
+    /// Pdf of the direction, per steradian, the probability of the emitter included. It is 0 for lights without a
     /// size, which no ray can hit.
-    pub density: f32,
+    pub pdf: f32,
 }
 
 impl LightPick {
     /// The pick where there is no light.
-    pub const NONE: Self = Self { direction: Vec3::ZERO, distance: 0.0, light: Vec3::ZERO, density: 0.0 };
+    pub const NONE: Self = Self { direction: Vec3::ZERO, distance: 0.0, light: Vec3::ZERO, pdf: 0.0 };
 }
 
 /// Unit vector and distance to a point; the distance is 0 if there is no direction.
@@ -45,11 +45,11 @@ pub(super) fn towards(from: Vec3, to: Vec3) -> Towards {
 }
 
 /// The pick of a point from which light of this radiance comes.
-pub(super) fn pick_of_point(way: Towards, radiance: Vec3, density: f32) -> LightPick {
-    if !(density > 0.0 && density < MOST_LIGHT) {
+pub(super) fn pick_of_point(way: Towards, radiance: Vec3, pdf: f32) -> LightPick {
+    if !(pdf > 0.0 && pdf < MOST_LIGHT) {
         return LightPick::NONE;
     }
-    LightPick { direction: way.direction, distance: way.distance, light: radiance / density, density }
+    LightPick { direction: way.direction, distance: way.distance, light: radiance / pdf, pdf }
 }
 
 /// A vector that is `cosine` along the first of three orthonormal axes, and `sine` aside of it at an azimuth in turns.

@@ -15,5 +15,5 @@ pub fn pick_punctual(light: &Light, point_world: Vec3, probability: f32) -> Ligh
         return LightPick::NONE;
     }
     let light = arriving.irradiance * (PI / probability);
-    LightPick { direction: arriving.direction, distance: arriving.distance, light, density: 0.0 }
+    LightPick { direction: arriving.direction, distance: arriving.distance, light, pdf: 0.0 }
 }

@@ -21,9 +21,9 @@ pub(super) fn hit_rectangle(light: &AreaLight, origin: Vec3, direction: Vec3) ->
     if u.abs() <= 1.0 && v.abs() <= 1.0 { t } else { f32::INFINITY }
 }
 
-/// Density per steradian of a direction in which a flat light is seen at a distance, if its points are picked
+/// Pdf per steradian of a direction in which a flat light is seen at a distance, if its points are picked
 /// uniformly.
-pub(super) fn flat_density(light: &AreaLight, direction: Vec3, distance: f32) -> f32 {
+pub(super) fn flat_pdf(light: &AreaLight, direction: Vec3, distance: f32) -> f32 {
     let facing = -light.axis.dot(direction) * light.area;
     if facing > 0.0 { distance * distance / facing } else { 0.0 }
 }
@@ -97,11 +97,11 @@ fn vector_to_rectangle(light: &AreaLight, seen: &SeenRectangle, u: Vec2) -> Vec3
     x * light.edge_u.normalize() + y * light.edge_v.normalize() - seen.height * light.axis
 }
 
-/// Density per steradian with which [`pick_rectangle`] picks a direction in which the rectangle is seen at a distance,
+/// Pdf per steradian with which [`pick_rectangle`] picks a direction in which the rectangle is seen at a distance,
 /// without the probability of the light.
-pub(super) fn rectangle_density(light: &AreaLight, point_world: Vec3, direction: Vec3, distance: f32) -> f32 {
+pub(super) fn rectangle_pdf(light: &AreaLight, point_world: Vec3, direction: Vec3, distance: f32) -> f32 {
     let seen = seen_rectangle(light, point_world);
-    if seen.solid_angle > 0.0 { 1.0 / seen.solid_angle } else { flat_density(light, direction, distance) }
+    if seen.solid_angle > 0.0 { 1.0 / seen.solid_angle } else { flat_pdf(light, direction, distance) }
 }
 
 pub(super) fn pick_rectangle(light: &AreaLight, point_world: Vec3, u: Vec2) -> LightPick {
@@ -112,6 +112,6 @@ pub(super) fn pick_rectangle(light: &AreaLight, point_world: Vec3, u: Vec2) -> L
     }
     let point = light.position + (2.0 * u.x - 1.0) * light.edge_u + (2.0 * u.y - 1.0) * light.edge_v;
     let way = towards(point_world, point);
-    let density = light.probability * flat_density(light, way.direction, way.distance);
-    pick_of_point(way, light.radiance, density)
+    let pdf = light.probability * flat_pdf(light, way.direction, way.distance);
+    pick_of_point(way, light.radiance, pdf)
 }

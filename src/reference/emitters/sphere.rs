@@ -24,8 +24,8 @@ fn sphere_versine(light: &AreaLight, to_centre: Vec3) -> f32 {
     if squared_sine < 1.0 { squared_sine / (1.0 + (1.0 - squared_sine).sqrt()) } else { 0.0 }
 }
 
-/// Density per steradian of the directions in which the sphere is seen; 0 from inside.
-pub(super) fn sphere_density(light: &AreaLight, point_world: Vec3) -> f32 {
+/// Pdf per steradian of the directions in which the sphere is seen; 0 from inside.
+pub(super) fn sphere_pdf(light: &AreaLight, point_world: Vec3) -> f32 {
     let versine = sphere_versine(light, light.position - point_world);
     if versine > 0.0 { 1.0 / (2.0 * PI * versine) } else { 0.0 }
 }
@@ -45,6 +45,6 @@ pub(super) fn pick_sphere(light: &AreaLight, point_world: Vec3, u: Vec2) -> Ligh
     let aside = to_centre.distance * sine;
     let half_chord = (light.radius * light.radius - aside * aside).max(0.0).sqrt();
     let distance = (to_centre.distance * (1.0 - versine) - half_chord).max(0.0);
-    let density = light.probability * sphere_density(light, point_world);
-    pick_of_point(Towards { direction, distance }, light.radiance, density)
+    let pdf = light.probability * sphere_pdf(light, point_world);
+    pick_of_point(Towards { direction, distance }, light.radiance, pdf)
 }

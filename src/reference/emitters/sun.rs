@@ -9,12 +9,12 @@ use crate::{layout::AreaLight, world::Emitters};
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SeenSuns {
     pub radiance: Vec3,
-    /// The suns' part of the density with which the direction is picked, per steradian.
-    pub density: f32,
+    /// The suns' part of the pdf with which the direction is picked, per steradian.
+    pub pdf: f32,
 }
 
 pub(super) fn seen_suns(emitters: &Emitters, direction: Vec3) -> SeenSuns {
-    let mut seen = SeenSuns { radiance: Vec3::ZERO, density: 0.0 };
+    let mut seen = SeenSuns { radiance: Vec3::ZERO, pdf: 0.0 };
     for sun in emitters.suns() {
         // The squared distance of two unit vectors is twice 1 - cos. It keeps small angles exact.
         let aside = direction - sun.position;
@@ -22,7 +22,7 @@ pub(super) fn seen_suns(emitters: &Emitters, direction: Vec3) -> SeenSuns {
             continue;
         }
         seen.radiance += sun.radiance;
-        seen.density += sun.probability / sun.area;
+        seen.pdf += sun.probability / sun.area;
     }
     seen
 }

@@ -1,10 +1,10 @@
-//! Tests of the emitters against closed forms, and of densities against picks.
+//! Tests of the emitters against closed forms, and of pdfs against picks.
 
 use std::{f32::consts::PI, path::Path};
 
 use glam::{DVec3, Vec3, vec3};
 
-use super::{LightPick, ambient_radiance, emission_at, emission_density, pick_light, seen_environment, seen_light};
+use super::{LightPick, ambient_radiance, emission_at, emission_pdf, pick_light, seen_environment, seen_light};
 use crate::{
     accel::kdtree::BuildOptions,
     frame::RenderOptions,
@@ -118,7 +118,7 @@ fn light_without_a_size_falls_with_the_squared_distance() {
     assert_near(irradiance(&inputs, Vec3::ZERO, Vec3::Z).x, PI * 3.0 / 4.0, 1e-4);
     assert_near(irradiance(&inputs, vec3(0.0, 0.0, -2.0), Vec3::Z).x, PI * 3.0 / 16.0, 1e-4);
     assert_eq!(pick_light(&inputs, vec3(0.0, 0.0, 2.0), Vec3::splat(0.5)), LightPick::NONE);
-    assert_eq!(pick_light(&inputs, Vec3::ZERO, Vec3::splat(0.5)).density, 0.0);
+    assert_eq!(pick_light(&inputs, Vec3::ZERO, Vec3::splat(0.5)).pdf, 0.0);
 }
 
 /// Lights, and the red irradiance that they cause at the origin on a surface that faces +z.
@@ -145,7 +145,7 @@ fn irradiance_is_that_of_closed_forms() {
     }
 }
 
-/// A wrong density shifts the irradiance beyond what the comparison allows.
+/// A wrong pdf shifts the irradiance beyond what the comparison allows.
 #[test]
 fn a_wrong_area_changes_the_irradiance() {
     let world = world(vec![disk()]);
@@ -166,8 +166,8 @@ fn solid_angle([a, b, c]: [DVec3; 3]) -> f64 {
     2.0 * a.dot(b.cross(c)).abs().atan2(below)
 }
 
-/// From nearby, all directions to a rectangle have the same density, which is that of the solid angle. From far away,
-/// and from where it is seen edge-on, the densities are those of points on its area. Both are finite.
+/// From nearby, all directions to a rectangle have the same pdf, which is that of the solid angle. From far away,
+/// and from where it is seen edge-on, the pdfs are those of points on its area. Both are finite.
 #[test]
 fn rectangles_are_picked_by_solid_angle_from_nearby() {
     let world = world(vec![rectangle()]);
@@ -182,11 +182,11 @@ fn rectangles_are_picked_by_solid_angle_from_nearby() {
         (vec3(0.0, 0.0, -14.0), false),
     ] {
         let picks: Vec<_> = numbers(500).map(|u| pick_light(&inputs, point, u)).collect();
-        let densities = picks.iter().map(|pick| pick.density).filter(|density| *density > 0.0);
-        let (least, most) = densities.fold((f32::INFINITY, 0.0_f32), |(least, most), d| (least.min(d), most.max(d)));
+        let pdfs = picks.iter().map(|pick| pick.pdf).filter(|pdf| *pdf > 0.0);
+        let (least, most) = pdfs.fold((f32::INFINITY, 0.0_f32), |(least, most), d| (least.min(d), most.max(d)));
         assert_eq!(most / least < 1.0001, is_near, "{point}: {least} to {most}");
-        for pick in picks.iter().filter(|pick| pick.density > 0.0) {
-            assert!(pick.direction.is_normalized() && (pick.density / most - 1.0).is_finite(), "{pick:?}");
+        for pick in picks.iter().filter(|pick| pick.pdf > 0.0) {
+            assert!(pick.direction.is_normalized() && (pick.pdf / most - 1.0).is_finite(), "{pick:?}");
             let at = point + pick.distance * pick.direction;
             let beyond = (at.abs() - vec3(3.0, 2.0, 2.0)).max_element();
             assert!(beyond < 1e-4 && (at.z - 2.0).abs() < 1e-4, "{point}: {at} is not on the rectangle");
@@ -201,21 +201,21 @@ fn rectangles_are_picked_by_solid_angle_from_nearby() {
 }
 
 #[test]
-fn densities_of_area_lights_are_whole() {
+fn pdfs_of_area_lights_are_whole() {
     for light in [rectangle(), disk(), sphere()] {
         let world = world(vec![light]);
         let frame = frame(&world);
         let inputs = inputs_of(&world, &frame);
         for point in [Vec3::ZERO, vec3(1.0, -0.5, 0.5)] {
-            let sum = over_sphere(|direction| seen_light(&inputs, point, direction, f32::INFINITY).density);
+            let sum = over_sphere(|direction| seen_light(&inputs, point, direction, f32::INFINITY).pdf);
             assert_near(sum, 1.0, 5e-3);
         }
     }
 }
 
-/// Picked directions are distributed by the density that is stated for rays that meet the light.
+/// Picked directions are distributed by the pdf that is stated for rays that meet the light.
 #[test]
-fn picks_have_the_stated_density() {
+fn picks_have_the_stated_pdf() {
     let worlds = [
         world(vec![rectangle()]),
         world(vec![disk()]),
@@ -232,15 +232,15 @@ fn picks_have_the_stated_density() {
                 let pick = pick_light(&inputs, point, random.point());
                 (pick != LightPick::NONE).then_some(pick.direction)
             };
-            let density = |direction| {
-                let seen = seen_light(&inputs, point, direction, f32::INFINITY).density;
-                seen + seen_environment(&inputs, direction).density
+            let pdf = |direction| {
+                let seen = seen_light(&inputs, point, direction, f32::INFINITY).pdf;
+                seen + seen_environment(&inputs, direction).pdf
             };
             // Lights have sharp edges, which many points in a cell resolve.
-            let found = chi_square((30_000, 100), &mut sample, &density);
+            let found = chi_square((30_000, 100), &mut sample, &pdf);
             assert!(found < LARGEST_DEVIATION, "{found} deviations of light {ix} at {point}");
-            // A density that is 15 % higher on one side is noticed.
-            let skewed = |direction: Vec3| density(direction) * (1.0 + 0.15 * direction.x.signum());
+            // A pdf that is 15 % higher on one side is noticed.
+            let skewed = |direction: Vec3| pdf(direction) * (1.0 + 0.15 * direction.x.signum());
             let found = chi_square((30_000, 100), &mut sample, &skewed);
             assert!(found > LARGEST_DEVIATION, "{found} deviations of light {ix} at {point}");
         }
@@ -256,7 +256,7 @@ pub(super) fn map(rotation: f32) -> Environment {
 }
 
 #[test]
-fn densities_of_environments_are_whole() {
+fn pdfs_of_environments_are_whole() {
     let of_map = |scene: &mut FlatScene| scene.environment = Some(map(40.0));
     let of_background = |scene: &mut FlatScene| scene.background = Vec3::ONE;
     for world in [
@@ -267,7 +267,7 @@ fn densities_of_environments_are_whole() {
     ] {
         let frame = frame(&world);
         let inputs = inputs_of(&world, &frame);
-        assert_near(over_sphere(|direction| seen_environment(&inputs, direction).density), 1.0, 5e-3);
+        assert_near(over_sphere(|direction| seen_environment(&inputs, direction).pdf), 1.0, 5e-3);
         // Picks find all the light that there is.
         let found = irradiance(&inputs, Vec3::ZERO, Vec3::Y).x;
         let expected = over_sphere(|it| seen_environment(&inputs, it).radiance.x * it.y.max(0.0));
@@ -296,7 +296,7 @@ fn picks_of_a_map_bring_the_same_light() {
 }
 
 #[test]
-fn picks_have_the_density_of_what_is_seen() {
+fn picks_have_the_pdf_of_what_is_seen() {
     let (radiance, radius) = (Vec3::splat(3.0), 1.0);
     let lights = vec![
         Light::Rectangle { position: vec3(-9.0, 0.0, 2.0), edge_u: 2.0 * Vec3::Y, edge_v: 3.0 * Vec3::X, radiance },
@@ -319,22 +319,22 @@ fn picks_have_the_density_of_what_is_seen() {
         if pick == LightPick::NONE {
             continue;
         }
-        let density = if pick.distance.is_infinite() {
+        let pdf = if pick.distance.is_infinite() {
             n_beyond += 1;
-            seen_environment(&inputs, pick.direction).density
+            seen_environment(&inputs, pick.direction).pdf
         } else if (seen.t - pick.distance).abs() < 1e-3 * pick.distance {
             n_shapes += 1;
-            seen.density
+            seen.pdf
         } else {
             n_triangles += 1;
-            let densities = [0, 1, 2].map(|ix| emission_density(&inputs, ix, point, pick.direction, pick.distance));
-            assert_eq!(densities[0], 0.0);
+            let pdfs = [0, 1, 2].map(|ix| emission_pdf(&inputs, ix, point, pick.direction, pick.distance));
+            assert_eq!(pdfs[0], 0.0);
             // Both triangles are in one plane and have the same size.
-            densities[1]
+            pdfs[1]
         };
-        if (density - pick.density).abs() > 1e-2 * pick.density {
+        if (pdf - pick.pdf).abs() > 1e-2 * pick.pdf {
             // At the border of two texels and of the sun, rounding decides.
-            assert!(pick.distance.is_infinite(), "{u}: {density}, {pick:?}");
+            assert!(pick.distance.is_infinite(), "{u}: {pdf}, {pick:?}");
             n_borders += 1;
         }
     }

@@ -5,7 +5,7 @@ use std::f32::consts::PI;
 use glam::{Vec3, vec3};
 
 use super::{
-    LightPick, emission_density, pick_light, seen_environment, seen_light,
+    LightPick, emission_pdf, pick_light, seen_environment, seen_light,
     tests::{assert_near, emitting_square, frame, inputs_of, irradiance, map, numbers, sun, world, world_with},
 };
 use crate::{
@@ -78,25 +78,25 @@ fn many_lights_add_up() {
     assert_near(irradiance(&inputs_of(&world, &frame), Vec3::ZERO, Vec3::Z).x, expected, 5e-3);
 }
 
-/// Returns the density of a pick's direction, as a ray that meets the light computes it.
-fn density_of_seen(world: &World, point: Vec3, pick: &LightPick) -> f32 {
+/// Returns the pdf of a pick's direction, as a ray that meets the light computes it.
+fn pdf_of_seen(world: &World, point: Vec3, pick: &LightPick) -> f32 {
     let frame = frame(world);
     let inputs = inputs_of(world, &frame);
     if pick.distance.is_infinite() {
-        return seen_environment(&inputs, pick.direction).density;
+        return seen_environment(&inputs, pick.direction).pdf;
     }
     let seen = seen_light(&inputs, point, pick.direction, f32::INFINITY);
     if (seen.t - pick.distance).abs() < 1e-3 * pick.distance {
-        return seen.density;
+        return seen.pdf;
     }
     // The triangle on whose side of the diagonal the point is.
     let at = point + pick.distance * pick.direction;
     let triangle_ix = if at.x > at.y { 1 } else { 2 };
-    emission_density(&inputs, triangle_ix, point, pick.direction, pick.distance)
+    emission_pdf(&inputs, triangle_ix, point, pick.direction, pick.distance)
 }
 
 #[test]
-fn picks_of_many_have_the_density_of_what_is_seen() {
+fn picks_of_many_have_the_pdf_of_what_is_seen() {
     let world = all_kinds();
     let frame = frame(&world);
     let inputs = inputs_of(&world, &frame);
@@ -104,11 +104,11 @@ fn picks_of_many_have_the_density_of_what_is_seen() {
     for point in [vec3(6.0, 0.2, -4.0), vec3(-0.3, 0.1, 1.5), vec3(3.0, 0.1, 2.1)] {
         for u in numbers(10_000) {
             let pick = pick_light(&inputs, point, u);
-            if pick.density == 0.0 {
+            if pick.pdf == 0.0 {
                 continue; // a light without a size, or none
             }
-            let density = density_of_seen(&world, point, &pick);
-            let is_other = (density - pick.density).abs() > 1e-2 * pick.density;
+            let pdf = pdf_of_seen(&world, point, &pick);
+            let is_other = (pdf - pick.pdf).abs() > 1e-2 * pick.pdf;
             // At the border of two texels, of two triangles and of the sun, rounding decides.
             n_borders += usize::from(is_other);
             n_beyond += usize::from(pick.distance.is_infinite());

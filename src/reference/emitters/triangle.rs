@@ -29,13 +29,13 @@ pub fn emission_at(inputs: &KernelInputs, triangle_ix: u32, u: f32, v: f32) -> V
     material.ke * sample_texture(&textures.texels, map, uv, 0.0).truncate().max(Vec3::ZERO)
 }
 
-/// Density per steradian of a direction in which the triangle is seen at a distance, if its points are picked
+/// Pdf per steradian of a direction in which the triangle is seen at a distance, if its points are picked
 /// uniformly.
-pub(super) fn area_density(t: &Triangle, direction: Vec3, distance: f32) -> f32 {
+pub(super) fn area_pdf(t: &Triangle, direction: Vec3, distance: f32) -> f32 {
     // Twice the area, times the cosine.
     let facing = (t.v1 - t.v0).cross(t.v2 - t.v0).dot(direction).abs();
-    let density = 2.0 * distance * distance / facing;
-    if density < MOST_LIGHT { density } else { 0.0 }
+    let pdf = 2.0 * distance * distance / facing;
+    if pdf < MOST_LIGHT { pdf } else { 0.0 }
 }
 
 /// Barycentric weights of a triangle's second and third corner, uniform on its area.
@@ -55,6 +55,6 @@ pub(super) fn pick_triangle(
     let weights = triangle_weights(u);
     let point = t.v0 + weights.x * (t.v1 - t.v0) + weights.y * (t.v2 - t.v0);
     let way = towards(point_world, point);
-    let density = probability * area_density(t, way.direction, way.distance);
-    pick_of_point(way, emission_at(inputs, triangle_ix, weights.x, weights.y), density)
+    let pdf = probability * area_pdf(t, way.direction, way.distance);
+    pick_of_point(way, emission_at(inputs, triangle_ix, weights.x, weights.y), pdf)
 }
