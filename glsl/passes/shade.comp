@@ -61,7 +61,7 @@ vec3 radiance_of(PathRay ray, uint ray_ix) {
     Surface surface;
     Material material;
     shaded_at(ray, hit, surface, material);
-    vec3 throughput = ray.throughput * unabsorbed(material, surface, hit.t);
+    vec3 throughput = ray.throughput * transmittance(material, surface, hit.t);
     return throughput * local_radiance(ray, ray_ix, surface, material);
 }
 

@@ -20,9 +20,9 @@ Scattering scattering_at(PathRay ray, Hit hit, out Surface surface) {
     Material material;
     shaded_at(ray, hit, surface, material);
     Scattering next = scatter(material, surface, ray.direction);
-    vec3 unabsorbed_share = unabsorbed(material, surface, hit.t);
-    next.reflected_weight = kept_weight(ray, material, next.reflected_weight * unabsorbed_share);
-    next.transmitted_weight = kept_weight(ray, material, next.transmitted_weight * unabsorbed_share);
+    vec3 transmitted = transmittance(material, surface, hit.t);
+    next.reflected_weight = kept_weight(ray, material, next.reflected_weight * transmitted);
+    next.transmitted_weight = kept_weight(ray, material, next.transmitted_weight * transmitted);
     return next;
 }
 

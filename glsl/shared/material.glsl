@@ -109,9 +109,9 @@ Scattering scatter_by_microfacets(Material material, Surface surface, vec3 direc
     return s;
 }
 
-// The share of light that is left at the end of a ray, which may have come through a solid. t: the ray's length, world
+// The transmittance of a ray, which may have come through a solid (Beer and Lambert). t: the ray's length, world
 // units.
-vec3 unabsorbed(Material material, Surface surface, float t) {
+vec3 transmittance(Material material, Surface surface, float t) {
     bool is_absorbed = is_microfacet(material) && (material.flags & MATERIAL_SOLID) != 0u && surface.from_inside;
     return is_absorbed ? exp(-material.absorption * t) : vec3(1.0);
 }

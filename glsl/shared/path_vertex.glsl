@@ -27,17 +27,17 @@ layout(std430, set = 0, binding = BIND_LIGHTS) readonly buffer LightsBlock { Lig
 // The number of pairs for each hit.
 #define PAIRS_OF_HIT 4u
 
-// The share of a way of sampling, whose pdf is the first one, beside another way.
-float power_share(float pdf, float other) {
-    // Pdfs are divided by the larger one, since their squares could overflow.
-    float largest = max(pdf, other);
-    float own = pdf / largest, others = other / largest;
-    return own * own / (own * own + others * others);
+// Power-heuristic weight of the strategy with pdf `pdf_a` against one with pdf `pdf_b` (Veach and Guibas 1995).
+float power_heuristic(float pdf_a, float pdf_b) {
+    // Divided by the larger one, since their squares could overflow.
+    float largest = max(pdf_a, pdf_b);
+    float a = pdf_a / largest, b = pdf_b / largest;
+    return a * a / (a * a + b * b);
 }
 
-// The share of light that a path meets on its way, and that could have been sampled with the pdf `of_lights`.
-float share_of_met(PathState state, float of_lights) {
-    return state.pdf > 0.0 ? power_share(state.pdf, of_lights) : 1.0;
+// MIS weight of light that the path's ray meets. light_pdf: pdf with which sample_light samples the ray's direction.
+float mis_weight(PathState state, float light_pdf) {
+    return state.pdf > 0.0 ? power_heuristic(state.pdf, light_pdf) : 1.0;
 }
 
 // Light that is added to the path: bounded after the first hit, and nothing if it is not a number.
@@ -54,7 +54,7 @@ vec3 met_environment(PathRay ray, PathState state, uint depth) {
     SeenEnvironment seen = seen_environment(ray.direction);
     vec3 radiance = seen.radiance;
     if (state.pdf > 0.0) radiance += ambient_radiance(ray.direction);
-    vec3 met = radiance * share_of_met(state, seen.pdf);
+    vec3 met = radiance * mis_weight(state, seen.pdf);
     bool mirrors = depth > 0u && (state.pdf == 0.0 || state.pdf > STUDIO_LEAST_PDF);
     return mirrors ? met + studio_radiance(ray.direction) : met;
 }
@@ -68,10 +68,10 @@ Segment segment_to_light(
     if (is_smooth(terms.material)) return segment;
     LightPick pick = pick_light(surface.point_world, u);
     if (pick.light == vec3(0.0)) return segment;
-    BsdfValue scattered = value_at(terms, surface, pick.direction);
+    BsdfEval scattered = eval_bsdf(terms, surface, pick.direction);
     if (!any(greaterThan(scattered.value, vec3(0.0)))) return segment;
-    float share = pick.pdf > 0.0 ? power_share(pick.pdf, scattered.pdf) : 1.0;
-    vec3 light = added_light(throughput * scattered.value * pick.light * share, depth + 1u);
+    float weight = pick.pdf > 0.0 ? power_heuristic(pick.pdf, scattered.pdf) : 1.0;
+    vec3 light = added_light(throughput * scattered.value * pick.light * weight, depth + 1u);
     if (!any(greaterThan(light, vec3(0.0)))) return segment;
     float side = dot(pick.direction, surface.geometric) < 0.0 ? -surface.clearance : surface.clearance;
     vec3 offset = side * surface.geometric;
@@ -104,7 +104,7 @@ bool step_path(
     float infinity = uintBitsToFloat(0x7f800000u);
     SeenLight seen = seen_light(ray.origin, ray.direction, is_miss ? infinity : hit.t);
     if (seen.t < infinity) {
-        vec3 light = seen.radiance * share_of_met(state, seen.pdf);
+        vec3 light = seen.radiance * mis_weight(state, seen.pdf);
         state.radiance += added_light(ray.throughput * light, depth);
         return false;
     }
@@ -115,11 +115,11 @@ bool step_path(
     Surface surface;
     Material material;
     shaded_at(ray, hit, surface, material);
-    vec3 throughput = ray.throughput * unabsorbed(material, surface, hit.t);
+    vec3 throughput = ray.throughput * transmittance(material, surface, hit.t);
     if (is_unlit(material) || any(greaterThan(material.ke, vec3(0.0)))) {
         vec3 light = is_unlit(material) ? emitted(material) : emission_at(hit.triangle_ix, hit.u, hit.v);
-        float share = share_of_met(state, emission_pdf(hit.triangle_ix, ray.origin, ray.direction, hit.t));
-        state.radiance += added_light(throughput * light * share, depth);
+        float weight = mis_weight(state, emission_pdf(hit.triangle_ix, ray.origin, ray.direction, hit.t));
+        state.radiance += added_light(throughput * light * weight, depth);
     }
     // The last ray of a path only meets light.
     if (is_unlit(material) || depth + 1u >= frame.max_depth) return false;

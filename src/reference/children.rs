@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::{
     inputs::KernelInputs,
     maps::shaded_at,
-    material::{Scattering, scatter, scatters_light, unabsorbed},
+    material::{Scattering, scatter, scatters_light, transmittance},
     microfacet::is_microfacet,
     surface::Surface,
 };
@@ -20,9 +20,9 @@ fn kept_weight(ray: &PathRay, material: &Material, weight: Vec3) -> Vec3 {
 fn scattering_at(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> (Surface, Scattering) {
     let (surface, material) = shaded_at(inputs, ray, hit);
     let mut next = scatter(&material, &surface, ray.direction);
-    let unabsorbed_share = unabsorbed(&material, &surface, hit.t);
-    next.reflected_weight = kept_weight(ray, &material, next.reflected_weight * unabsorbed_share);
-    next.transmitted_weight = kept_weight(ray, &material, next.transmitted_weight * unabsorbed_share);
+    let transmitted = transmittance(&material, &surface, hit.t);
+    next.reflected_weight = kept_weight(ray, &material, next.reflected_weight * transmitted);
+    next.transmitted_weight = kept_weight(ray, &material, next.transmitted_weight * transmitted);
     (surface, next)
 }
 

@@ -139,9 +139,8 @@ fn scatter_by_microfacets(material: &Material, surface: &Surface, direction: Vec
     }
 }
 
-/// Returns the share of light that is left at the end of a ray of length `t` (world units), which may have come through
-/// a solid.
-pub fn unabsorbed(material: &Material, surface: &Surface, t: f32) -> Vec3 {
+/// Returns the transmittance of a ray of length `t` (world units), which may have come through a solid.
+pub fn transmittance(material: &Material, surface: &Surface, t: f32) -> Vec3 {
     let is_absorbed = is_microfacet(material) && material.flags & MATERIAL_SOLID != 0 && surface.from_inside;
     if is_absorbed { (-material.absorption * t).exp() } else { Vec3::ONE }
 }

@@ -3,11 +3,11 @@
 use glam::{Vec2, Vec3, vec3};
 
 use super::{
-    bsdf::{BsdfTerms, bsdf_terms, is_smooth, sample_bsdf, value_at},
+    bsdf::{BsdfTerms, bsdf_terms, eval_bsdf, is_smooth, sample_bsdf},
     emitters::{LightPick, ambient_radiance, emission_at, emission_pdf, pick_light_with, seen_environment, seen_light},
     inputs::KernelInputs,
     maps::shaded_at,
-    material::{emitted, is_unlit, unabsorbed},
+    material::{emitted, is_unlit, transmittance},
     sampler::{SampleKey, random_pair},
     studio::studio_radiance,
     surface::Surface,
@@ -40,16 +40,17 @@ pub fn pairs_of_hit(key: SampleKey, depth: u32) -> [Vec2; PAIRS_OF_HIT] {
     [0, 1, 2, 3].map(|place| random_pair(key, first_pair_of(depth) + place))
 }
 
-/// The share of a way of sampling, whose pdf is the first one, beside another way.
-pub fn power_share(pdf: f32, other: f32) -> f32 {
-    let largest = pdf.max(other);
-    let (own, others) = (pdf / largest, other / largest);
-    own * own / (own * own + others * others)
+/// Power-heuristic weight of the strategy with pdf `pdf_a` against one with pdf `pdf_b`.
+pub fn power_heuristic(pdf_a: f32, pdf_b: f32) -> f32 {
+    let largest = pdf_a.max(pdf_b);
+    let (a, b) = (pdf_a / largest, pdf_b / largest);
+    a * a / (a * a + b * b)
 }
 
-/// The share of light that a path meets on its way, and that could have been sampled with the pdf `of_lights`.
-fn share_of_met(state: &PathState, of_lights: f32) -> f32 {
-    if state.pdf > 0.0 { power_share(state.pdf, of_lights) } else { 1.0 }
+/// MIS weight of light that the path's ray meets. `light_pdf`: pdf with which `sample_light` samples the ray's
+/// direction.
+fn mis_weight(state: &PathState, light_pdf: f32) -> f32 {
+    if state.pdf > 0.0 { power_heuristic(state.pdf, light_pdf) } else { 1.0 }
 }
 
 /// Light that is added to the path: bounded after the first hit, and nothing if it is not a number.
@@ -68,7 +69,7 @@ fn met_environment(inputs: &KernelInputs, ray: &PathRay, state: &PathState, dept
     if state.pdf > 0.0 {
         radiance += ambient_radiance(inputs, ray.direction);
     }
-    let met = radiance * share_of_met(state, seen.pdf);
+    let met = radiance * mis_weight(state, seen.pdf);
     let mirrors = depth > 0 && (state.pdf == 0.0 || state.pdf > STUDIO_LEAST_PDF);
     if mirrors { met + studio_radiance(inputs.frame(), ray.direction) } else { met }
 }
@@ -103,12 +104,12 @@ fn segment_to_light(inputs: &KernelInputs, choices: &HitChoices, vertex: &Vertex
     if pick.light == Vec3::ZERO {
         return NO_SEGMENT;
     }
-    let scattered = value_at(terms, surface, pick.direction);
+    let scattered = eval_bsdf(terms, surface, pick.direction);
     if !scattered.value.cmpgt(Vec3::ZERO).any() {
         return NO_SEGMENT;
     }
-    let share = if pick.pdf > 0.0 { power_share(pick.pdf, scattered.pdf) } else { 1.0 };
-    let light = added_light(inputs, throughput * scattered.value * pick.light * share, depth + 1);
+    let weight = if pick.pdf > 0.0 { power_heuristic(pick.pdf, scattered.pdf) } else { 1.0 };
+    let light = added_light(inputs, throughput * scattered.value * pick.light * weight, depth + 1);
     if !light.cmpgt(Vec3::ZERO).any() {
         return NO_SEGMENT;
     }
@@ -157,7 +158,7 @@ pub fn step_path(
     let is_miss = hit.triangle_ix == NO_TRIANGLE;
     let seen = seen_light(inputs, ray.origin, ray.direction, if is_miss { f32::INFINITY } else { hit.t });
     if seen.t < f32::INFINITY {
-        let light = seen.radiance * share_of_met(state, seen.pdf);
+        let light = seen.radiance * mis_weight(state, seen.pdf);
         state.radiance += added_light(inputs, ray.throughput * light, depth);
         return (false, NO_SEGMENT);
     }
@@ -178,12 +179,12 @@ pub fn step_past_lights(
         return (false, NO_SEGMENT);
     }
     let (surface, mut material) = shaded_at(inputs, ray, hit);
-    let mut throughput = ray.throughput * unabsorbed(&material, &surface, hit.t);
+    let mut throughput = ray.throughput * transmittance(&material, &surface, hit.t);
     if is_unlit(&material) || material.ke.cmpgt(Vec3::ZERO).any() {
         let light =
             if is_unlit(&material) { emitted(&material) } else { emission_at(inputs, hit.triangle_ix, hit.u, hit.v) };
-        let share = share_of_met(state, emission_pdf(inputs, hit.triangle_ix, ray.origin, ray.direction, hit.t));
-        state.radiance += added_light(inputs, throughput * light * share, depth);
+        let weight = mis_weight(state, emission_pdf(inputs, hit.triangle_ix, ray.origin, ray.direction, hit.t));
+        state.radiance += added_light(inputs, throughput * light * weight, depth);
     }
     // The last ray of a path only meets light.
     if is_unlit(&material) || depth + 1 >= inputs.frame().max_depth {

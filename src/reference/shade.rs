@@ -8,7 +8,7 @@ use super::{
     inputs::KernelInputs,
     light::sample_light,
     maps::{bump_shadowing, shaded_at},
-    material::{ambient_share, emitted, local_weight, reflectance_of, unabsorbed},
+    material::{ambient_share, emitted, local_weight, reflectance_of, transmittance},
     studio::studio_radiance,
     surface::Surface,
 };
@@ -70,7 +70,7 @@ fn radiance_of(
         return ray.throughput * (background + studio_radiance(inputs.frame(), ray.direction));
     }
     let (surface, material) = shaded_at(inputs, ray, hit);
-    let throughput = ray.throughput * unabsorbed(&material, &surface, hit.t);
+    let throughput = ray.throughput * transmittance(&material, &surface, hit.t);
     throughput * local_radiance(inputs, is_lit, ray, &surface, &material)
 }
 

@@ -20,7 +20,7 @@
 // Light from a direction whose sides of the triangle and of the shading normal differ is not scattered. If the viewer
 // is behind the shading normal, the triangle's normal replaces it.
 //
-// Needs nothing. Provides `bsdf_terms` (terms.glsl), `value_at` (evaluate.glsl), `sample_bsdf` (sample.glsl), and
+// Needs nothing. Provides `bsdf_terms` (terms.glsl), `eval_bsdf` (evaluate.glsl), `sample_bsdf` (sample.glsl), and
 // `is_smooth`, `surface_albedo` and `surface_gloss` (lobes.glsl).
 #ifndef KDRAY_BSDF
 #define KDRAY_BSDF

@@ -16,13 +16,13 @@
 #include "bsdf/transmission.glsl"
 
 // The scattered share of light times the cosine, and the pdf of its direction.
-struct BsdfValue {
+struct BsdfEval {
     vec3 value;
     float pdf;
 };
 
 // Adds the interface's reflection.
-void add_reflection(BsdfTerms terms, vec3 to_light, vec3 half_vector, inout BsdfValue sum) {
+void add_reflection(BsdfTerms terms, vec3 to_light, vec3 half_vector, inout BsdfEval sum) {
     if (terms.width == 0.0 || !terms.has_interface) return;
     float lobe = evaluate_reflection(terms.to_viewer, to_light, half_vector, terms.width);
     InterfaceSplit split = split_at(terms, dot(terms.to_viewer, half_vector));
@@ -33,7 +33,7 @@ void add_reflection(BsdfTerms terms, vec3 to_light, vec3 half_vector, inout Bsdf
 }
 
 // Adds the reflection of the clear layer.
-void add_clearcoat(BsdfTerms terms, vec3 to_light, vec3 half_vector, inout BsdfValue sum) {
+void add_clearcoat(BsdfTerms terms, vec3 to_light, vec3 half_vector, inout BsdfEval sum) {
     if (!has_clearcoat(terms.material) || terms.coat_roughness == 0.0) return;
     float width = terms.coat_roughness * terms.coat_roughness;
     float lobe = evaluate_reflection(terms.to_viewer, to_light, half_vector, width);
@@ -42,7 +42,7 @@ void add_clearcoat(BsdfTerms terms, vec3 to_light, vec3 half_vector, inout BsdfV
 }
 
 // Adds the Lambertian lobe.
-void add_lambert(BsdfTerms terms, vec3 to_light, inout BsdfValue sum) {
+void add_lambert(BsdfTerms terms, vec3 to_light, inout BsdfEval sum) {
     GgxAlbedo albedo = NO_ALBEDO;
     if (terms.has_interface) albedo = ggx_albedo(to_light.z, sqrt(terms.width));
     float left = max(1.0 - dielectric_albedo(terms.dielectric, albedo), 0.0);
@@ -52,7 +52,7 @@ void add_lambert(BsdfTerms terms, vec3 to_light, inout BsdfValue sum) {
 }
 
 // Adds the sheen.
-void add_sheen(BsdfTerms terms, vec3 to_light, inout BsdfValue sum) {
+void add_sheen(BsdfTerms terms, vec3 to_light, inout BsdfEval sum) {
     if (!has_sheen(terms.material)) return;
     float lobe = evaluate_sheen(terms.to_viewer, to_light, terms.sheen_roughness) * terms.sheen_bound;
     sum.value += terms.sheen_share * terms.material.sheen_colour * lobe;
@@ -60,7 +60,7 @@ void add_sheen(BsdfTerms terms, vec3 to_light, inout BsdfValue sum) {
 }
 
 // Adds the light that passes through the interface.
-void add_transmission(BsdfTerms terms, vec3 to_light, inout BsdfValue sum) {
+void add_transmission(BsdfTerms terms, vec3 to_light, inout BsdfEval sum) {
     if (!scene_has_lobe(LOBE_TRANSMISSION) || terms.width == 0.0 || passes_straight(terms)) return;
     vec3 mirrored = vec3(to_light.xy, -to_light.z);
     vec3 half_vector = terms.is_solid
@@ -81,8 +81,8 @@ void add_transmission(BsdfTerms terms, vec3 to_light, inout BsdfValue sum) {
 }
 
 // The sum of all lobes but the delta lobes. to_light: in the frame of the surface.
-BsdfValue value_of(BsdfTerms terms, vec3 to_light) {
-    BsdfValue sum = BsdfValue(vec3(0.0), 0.0);
+BsdfEval eval_lobes(BsdfTerms terms, vec3 to_light) {
+    BsdfEval sum = BsdfEval(vec3(0.0), 0.0);
     if (to_light.z > 0.0) {
         vec3 half_vector = normalize(terms.to_viewer + to_light);
         add_reflection(terms, to_light, half_vector, sum);
@@ -101,10 +101,10 @@ bool is_consistent(Surface surface, vec3 direction, vec3 local) {
 }
 
 // The sum of all lobes but the delta lobes, at a surface.
-BsdfValue value_at(BsdfTerms terms, Surface surface, vec3 to_light) {
+BsdfEval eval_bsdf(BsdfTerms terms, Surface surface, vec3 to_light) {
     vec3 local = to_local(terms.frame, to_light);
-    if (terms.choice == vec4(0.0) || !is_consistent(surface, to_light, local)) return BsdfValue(vec3(0.0), 0.0);
-    return value_of(terms, local);
+    if (terms.choice == vec4(0.0) || !is_consistent(surface, to_light, local)) return BsdfEval(vec3(0.0), 0.0);
+    return eval_lobes(terms, local);
 }
 
 #endif

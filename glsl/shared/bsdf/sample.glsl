@@ -114,7 +114,7 @@ BsdfSample rough_sample(BsdfTerms terms, Surface surface, LobeSample lobe) {
     vec3 direction = to_world(terms.frame, lobe.local);
     bool is_on_side = lobe.local.z * lobe.side > 0.0;
     if (!is_on_side || !is_consistent(surface, direction, lobe.local)) return BSDF_ABSORBED;
-    BsdfValue found = value_of(terms, lobe.local);
+    BsdfEval found = eval_lobes(terms, lobe.local);
     if (!(found.pdf > 0.0)) return BSDF_ABSORBED;
     return BsdfSample(direction, found.value / found.pdf, found.pdf, false);
 }

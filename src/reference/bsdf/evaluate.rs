@@ -18,13 +18,13 @@ use crate::reference::surface::Surface;
 
 /// The scattered share of light times the cosine, and the pdf of its direction.
 #[derive(Clone, Copy, Debug)]
-pub struct BsdfValue {
+pub struct BsdfEval {
     pub value: Vec3,
     pub pdf: f32,
 }
 
 /// Adds the interface's reflection.
-fn add_reflection(terms: &BsdfTerms, to_light: Vec3, half_vector: Vec3, sum: &mut BsdfValue) {
+fn add_reflection(terms: &BsdfTerms, to_light: Vec3, half_vector: Vec3, sum: &mut BsdfEval) {
     if terms.width == 0.0 || !terms.has_interface {
         return;
     }
@@ -37,7 +37,7 @@ fn add_reflection(terms: &BsdfTerms, to_light: Vec3, half_vector: Vec3, sum: &mu
 }
 
 /// Adds the reflection of the clear layer.
-fn add_clearcoat(terms: &BsdfTerms, to_light: Vec3, half_vector: Vec3, sum: &mut BsdfValue) {
+fn add_clearcoat(terms: &BsdfTerms, to_light: Vec3, half_vector: Vec3, sum: &mut BsdfEval) {
     if !has_clearcoat(terms.material) || terms.coat_roughness == 0.0 {
         return;
     }
@@ -48,7 +48,7 @@ fn add_clearcoat(terms: &BsdfTerms, to_light: Vec3, half_vector: Vec3, sum: &mut
 }
 
 /// Adds the Lambertian lobe.
-fn add_lambert(terms: &BsdfTerms, to_light: Vec3, sum: &mut BsdfValue) {
+fn add_lambert(terms: &BsdfTerms, to_light: Vec3, sum: &mut BsdfEval) {
     // The Lambertian lobe of metals and glass is often black. Its probability is then 0, and it adds nothing.
     if terms.below == Vec3::ZERO && terms.between == Vec3::ZERO {
         return;
@@ -61,7 +61,7 @@ fn add_lambert(terms: &BsdfTerms, to_light: Vec3, sum: &mut BsdfValue) {
 }
 
 /// Adds the sheen.
-fn add_sheen(terms: &BsdfTerms, to_light: Vec3, sum: &mut BsdfValue) {
+fn add_sheen(terms: &BsdfTerms, to_light: Vec3, sum: &mut BsdfEval) {
     if !has_sheen(terms.material) {
         return;
     }
@@ -71,7 +71,7 @@ fn add_sheen(terms: &BsdfTerms, to_light: Vec3, sum: &mut BsdfValue) {
 }
 
 /// Adds the light that passes through the interface.
-fn add_transmission(terms: &BsdfTerms, to_light: Vec3, sum: &mut BsdfValue) {
+fn add_transmission(terms: &BsdfTerms, to_light: Vec3, sum: &mut BsdfEval) {
     if terms.width == 0.0 || passes_straight(terms) {
         return;
     }
@@ -100,8 +100,8 @@ fn add_transmission(terms: &BsdfTerms, to_light: Vec3, sum: &mut BsdfValue) {
 }
 
 /// Returns the sum of all lobes but the delta lobes. `to_light`: in the frame of the surface.
-pub(super) fn value_of(terms: &BsdfTerms, to_light: Vec3) -> BsdfValue {
-    let mut sum = BsdfValue { value: Vec3::ZERO, pdf: 0.0 };
+pub(super) fn eval_lobes(terms: &BsdfTerms, to_light: Vec3) -> BsdfEval {
+    let mut sum = BsdfEval { value: Vec3::ZERO, pdf: 0.0 };
     if to_light.z > 0.0 {
         let has_microfacets = terms.has_interface || has_clearcoat(terms.material);
         let half_vector = if has_microfacets { (terms.to_viewer + to_light).normalize() } else { Vec3::Z };
@@ -121,10 +121,10 @@ pub(super) fn is_consistent(surface: &Surface, direction: Vec3, local: Vec3) -> 
 }
 
 /// Returns the sum of all lobes but the delta lobes, at a surface.
-pub fn value_at(terms: &BsdfTerms, surface: &Surface, to_light: Vec3) -> BsdfValue {
+pub fn eval_bsdf(terms: &BsdfTerms, surface: &Surface, to_light: Vec3) -> BsdfEval {
     let local = to_local(&terms.frame, to_light);
     if terms.choice == Vec4::ZERO || !is_consistent(surface, to_light, local) {
-        return BsdfValue { value: Vec3::ZERO, pdf: 0.0 };
+        return BsdfEval { value: Vec3::ZERO, pdf: 0.0 };
     }
-    value_of(terms, local)
+    eval_lobes(terms, local)
 }

@@ -20,7 +20,7 @@ mod tests;
 mod transmission;
 
 pub use self::{
-    evaluate::value_at,
+    evaluate::eval_bsdf,
     lobes::{is_smooth, surface_albedo, surface_gloss},
     sample::sample_bsdf,
     terms::{BsdfTerms, bsdf_terms},

@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3, Vec3Swizzles, Vec4};
 
 use super::{
     clearcoat::clearcoat_fresnel,
-    evaluate::{is_consistent, value_of},
+    evaluate::{eval_lobes, is_consistent},
     ggx::sample_ggx,
     lambert::sample_lambert,
     local_frame::to_world,
@@ -133,7 +133,7 @@ fn rough_sample(terms: &BsdfTerms, surface: &Surface, lobe: &LobeSample) -> Bsdf
     if !is_on_side || !is_consistent(surface, direction, lobe.local) {
         return BSDF_ABSORBED;
     }
-    let found = value_of(terms, lobe.local);
+    let found = eval_lobes(terms, lobe.local);
     if !(found.pdf > 0.0) {
         return BSDF_ABSORBED;
     }

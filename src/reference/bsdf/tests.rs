@@ -8,12 +8,12 @@ use super::{
     albedo::{ggx_albedo, mean_ggx_albedo, sheen_albedo},
     bsdf_terms,
     conductor::conductor_reflectance,
+    eval_bsdf,
     ggx::{ggx_root, ggx_visible_pdf, sample_ggx},
     is_smooth,
     reflection::{evaluate_reflection, reflected_by},
     sample::BsdfSample,
     sheen::{evaluate_sheen, sample_sheen},
-    value_at,
 };
 use crate::{
     layout::{
@@ -36,11 +36,11 @@ fn sample_bsdf(material: &Material, surface: &Surface, to_viewer: Vec3, u: Vec3)
 }
 
 fn evaluate_bsdf(material: &Material, surface: &Surface, to_viewer: Vec3, to_light: Vec3) -> Vec3 {
-    value_at(&bsdf_terms(&mut material.clone(), surface, to_viewer), surface, to_light).value
+    eval_bsdf(&bsdf_terms(&mut material.clone(), surface, to_viewer), surface, to_light).value
 }
 
 fn bsdf_pdf(material: &Material, surface: &Surface, to_viewer: Vec3, to_light: Vec3) -> f32 {
-    value_at(&bsdf_terms(&mut material.clone(), surface, to_viewer), surface, to_light).pdf
+    eval_bsdf(&bsdf_terms(&mut material.clone(), surface, to_viewer), surface, to_light).pdf
 }
 
 /// The triangle and the normals of the surface, with the normal z.
