@@ -42,7 +42,7 @@ vec3 local_radiance(PathRay ray, uint ray_ix, Surface surface, Material material
     radiance += ambient_share(material, surface.shading, -ray.direction) * ambient_at(surface.shading);
     for (uint light_ix = 0u; light_ix < frame.n_lights; ++light_ix) {
         if (light_visibility[light_ix * frame.queue_capacity + ray_ix] != LIGHT_LIT) continue;
-        LightSample to_light = sample_light(lights[light_ix], surface.point_world);
+        IncidentLight to_light = incident_light(lights[light_ix], surface.point_world);
         vec3 reflectance = reflectance_of(material, surface.shading, -ray.direction, to_light.direction);
         radiance += reflectance * bump_shadowing(surface, to_light.direction) * to_light.irradiance;
     }

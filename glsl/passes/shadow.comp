@@ -31,7 +31,7 @@ layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock
 bool shadow_segment(PathRay ray, Hit hit, Light light, out PathRay segment) {
     Triangle t = triangle_at(hit.triangle_ix);
     Surface surface = surface_at(ray, hit, t);
-    LightSample to_light = sample_light(light, surface.point_world);
+    IncidentLight to_light = incident_light(light, surface.point_world);
     if (!(dot(surface.interpolated, to_light.direction) > 0.0)) return false;
     Material material = material_at(ray, hit, t, surface);
     if (!can_show(material, surface.shading, -ray.direction, to_light.direction)) return false;

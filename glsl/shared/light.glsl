@@ -5,7 +5,7 @@
 #include "layout.glsl"
 
 // What arrives from a light at a point.
-struct LightSample {
+struct IncidentLight {
     // Unit vector to the light, and the light's distance in world units (infinity for a directional light).
     vec3 direction;
     float distance;
@@ -21,16 +21,16 @@ float spot_share(Light light, vec3 direction) {
 }
 
 // Returns what arrives from a light at a point.
-LightSample sample_light(Light light, vec3 point_world) {
+IncidentLight incident_light(Light light, vec3 point_world) {
     if (light.kind == LIGHT_DIRECTIONAL) {
-        return LightSample(light.position, uintBitsToFloat(0x7f800000u), light.intensity);
+        return IncidentLight(light.position, uintBitsToFloat(0x7f800000u), light.intensity);
     }
     vec3 to_light = light.position - point_world;
     float squared = dot(to_light, to_light);
     float distance = sqrt(squared);
     vec3 direction = to_light / distance;
     float cone = light.kind == LIGHT_SPOT ? spot_share(light, direction) : 1.0;
-    return LightSample(direction, distance, light.intensity * cone / squared);
+    return IncidentLight(direction, distance, light.intensity * cone / squared);
 }
 
 #endif

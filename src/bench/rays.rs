@@ -10,7 +10,7 @@ use crate::{
     cast::leaving::{diffuse_rays, leaving, rays_from_hits},
     cpu::trace,
     layout::{Hit, PathRay},
-    reference::{light::sample_light, primary_hit::primary_rays, surface::Surface},
+    reference::{light::incident_light, primary_hit::primary_rays, surface::Surface},
 };
 
 /// Purpose of the rays of a set.
@@ -65,7 +65,7 @@ pub fn ray_sets(stage: &Stage) -> [RaySet; 4] {
 
     let triangles = bindings.triangles;
     let shadow = rays_from_hits(triangles, &primary, &hits, |ray, surface| {
-        let to_light = sample_light(&stage.light, surface.point_world);
+        let to_light = incident_light(&stage.light, surface.point_world);
         PathRay { t_max: to_light.distance, ..leaving(surface, ray, to_light.direction) }
     });
     let mirror = rays_from_hits(triangles, &primary, &hits, |ray, surface| {

@@ -6,7 +6,7 @@ use crate::layout::{LIGHT_DIRECTIONAL, LIGHT_SPOT, Light};
 
 /// What arrives from a light at a point.
 #[derive(Clone, Copy, Debug)]
-pub struct LightSample {
+pub struct IncidentLight {
     /// Unit vector to the light.
     pub direction: Vec3,
     /// The light's distance, world units (infinity for a directional light).
@@ -23,14 +23,14 @@ fn spot_share(light: &Light, direction: Vec3) -> f32 {
 }
 
 /// Returns what arrives from a light at a point.
-pub fn sample_light(light: &Light, point_world: Vec3) -> LightSample {
+pub fn incident_light(light: &Light, point_world: Vec3) -> IncidentLight {
     if light.kind == LIGHT_DIRECTIONAL {
-        return LightSample { direction: light.position, distance: f32::INFINITY, irradiance: light.intensity };
+        return IncidentLight { direction: light.position, distance: f32::INFINITY, irradiance: light.intensity };
     }
     let to_light = light.position - point_world;
     let squared = to_light.dot(to_light);
     let distance = squared.sqrt();
     let direction = to_light / distance;
     let cone = if light.kind == LIGHT_SPOT { spot_share(light, direction) } else { 1.0 };
-    LightSample { direction, distance, irradiance: light.intensity * cone / squared }
+    IncidentLight { direction, distance, irradiance: light.intensity * cone / squared }
 }

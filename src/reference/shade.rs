@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::{
     RAYS_PER_TASK,
     inputs::KernelInputs,
-    light::sample_light,
+    light::incident_light,
     maps::{bump_shadowing, shaded_at},
     material::{ambient_share, emitted, local_weight, reflectance_of, transmittance},
     studio::studio_radiance,
@@ -49,7 +49,7 @@ fn local_radiance(
         if !is_lit(light_ix) {
             continue;
         }
-        let to_light = sample_light(light, surface.point_world);
+        let to_light = incident_light(light, surface.point_world);
         let reflectance = reflectance_of(material, surface.shading, -ray.direction, to_light.direction);
         radiance += reflectance * bump_shadowing(inputs, surface, to_light.direction) * to_light.irradiance;
     }

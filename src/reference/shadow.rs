@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::{
     RAYS_PER_TASK,
     inputs::KernelInputs,
-    light::sample_light,
+    light::incident_light,
     maps::shaded_at,
     material::can_show,
     search_ray::SearchRay,
@@ -23,7 +23,7 @@ use crate::{
 /// The segment to the light, or none if the surface faces away from the light or would not show it.
 pub(crate) fn shadow_segment(inputs: &KernelInputs, ray: &PathRay, hit: &Hit, light: &Light) -> Option<PathRay> {
     let (surface, material) = shaded_at(inputs, ray, hit);
-    let to_light = sample_light(light, surface.point_world);
+    let to_light = incident_light(light, surface.point_world);
     // Not `<=`: a NaN is unlit.
     if !(surface.interpolated.dot(to_light.direction) > 0.0) {
         return None;

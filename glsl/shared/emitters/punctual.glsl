@@ -10,7 +10,7 @@
 
 // probability: with which this light is picked.
 LightPick pick_punctual(Light light, vec3 point_world, float probability) {
-    LightSample arriving = sample_light(light, point_world);
+    IncidentLight arriving = incident_light(light, point_world);
     // Not `<=`: at the light itself, there are NaNs.
     if (!(arriving.distance > 0.0)) return no_pick();
     return LightPick(arriving.direction, arriving.distance, arriving.irradiance * (EMITTER_PI / probability), 0.0);

@@ -5,11 +5,11 @@ use std::f32::consts::PI;
 use glam::Vec3;
 
 use super::pick::LightPick;
-use crate::{layout::Light, reference::light::sample_light};
+use crate::{layout::Light, reference::light::incident_light};
 
 /// `probability`: with which this light is picked.
 pub fn pick_punctual(light: &Light, point_world: Vec3, probability: f32) -> LightPick {
-    let arriving = sample_light(light, point_world);
+    let arriving = incident_light(light, point_world);
     // Not `<=`: at the light itself, there are NaNs.
     if !(arriving.distance > 0.0) {
         return LightPick::NONE;
