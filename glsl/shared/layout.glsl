@@ -451,13 +451,13 @@ struct Light {
     float outer_cos;
 };
 
-// What emits light and can be picked by the path tracer, 20 bytes: an entry of an alias table. If there is a light
+// What emits light and can be sampled by the path tracer, 20 bytes: an entry of an alias table. If there is a light
 // tree, its lights follow the table's entries. They have no threshold, `alias_ix` is the index of their leaf, and
 // `probability` is that of the tree.
 //
-// - `threshold`: the share of the entry's picks that stay with it, 0 to 1.
-// - `alias_ix`: the entry that gets the other picks.
-// - `probability`: with which the entry is picked in the end.
+// - `threshold`: the share of the entry's samples that stay with it, 0 to 1.
+// - `alias_ix`: the entry that gets the other samples.
+// - `probability`: with which the entry is sampled in the end.
 // - `kind`: `EMITTER_LIGHT` and its like.
 // - `ix`: index of the light, the area light, the sun or the triangle; 0 for the environment and for the tree.
 struct Emitter {
@@ -479,7 +479,7 @@ struct Emitter {
 #define EMITTER_TRIANGLE 3u
 // What is seen beyond the scene.
 #define EMITTER_ENVIRONMENT 4u
-// The light tree: one of its lights is picked.
+// The light tree: one of its lights is sampled.
 #define EMITTER_TREE 5u
 
 // A node of the light tree, 48 bytes: what its lights send where. Nodes are in preorder: the left child of an inner
@@ -518,7 +518,7 @@ struct LightNode {
 // - `area`: square world units. Of a sun, the disk's solid angle.
 // - `edge_u`, `edge_v`: from the centre of a rectangle to the middle of an edge. Of a disk and a sun, unit vectors.
 //   They are at right angles to one another and to the axis.
-// - `probability`: with which the light is picked, or the light tree if the light is in it.
+// - `probability`: with which the light is sampled, or the light tree if the light is in it.
 // - `leaf_ix`: index of the light's node in the light tree. 0: the light is in no tree, or is alone in it.
 struct AreaLight {
     vec3 position;
@@ -883,7 +883,7 @@ struct Guide {
 // - `background`: radiance of the environment if it has no map.
 // - `ambient`, `ground_ambient`: radiance that neither the camera nor mirrors see, from above and from below.
 //   `up_axis`: index of the coordinate that points up, 1 or 2.
-// - `environment_probability`: with which the environment is picked as a light.
+// - `environment_probability`: with which the environment is sampled as a light.
 // - `n_emitters`, `emitters_begin`: number of entries of the alias table of emitters, and index in `texture_words` of
 //   the first `Emitter`.
 // - `first_triangle_emitter`, `n_triangle_emitters`: index and number of the entries of triangles.
@@ -891,7 +891,7 @@ struct Guide {
 //   that are no suns, and number of suns, which follow them.
 // - `environment_begin`: index in `texture_words` of the environment's map: pairs of a threshold and an alias, first
 //   for each row and then for each texel, and the texels. A texel is a linear colour, and the pdf with which its
-//   directions are picked if the environment is picked, per steradian. `NO_WORDS`: there is no map.
+//   directions are sampled if the environment is sampled, per steradian. `NO_WORDS`: there is no map.
 // - `light_nodes_begin`: index in `texture_words` of the first `LightNode`. `NO_WORDS`: there is no light tree.
 // - `environment_width`, `environment_height`: size of the map, texels.
 // - `environment_turn`: by which the map is turned about +y, in turns, counter-clockwise as seen from above.

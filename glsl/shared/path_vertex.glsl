@@ -59,27 +59,27 @@ vec3 met_environment(PathRay ray, PathState state, uint depth) {
     return mirrors ? met + studio_radiance(ray.direction) : met;
 }
 
-// The segment to a light that is picked at a hit.
+// The segment to a light that is sampled at a hit.
 Segment segment_to_light(
     uint depth, vec3 u, Surface surface, BsdfTerms terms, uint triangle_ix, vec3 throughput
 ) {
     Segment segment;
     segment.state = SEGMENT_NONE;
     if (is_smooth(terms.material)) return segment;
-    LightPick pick = pick_light(surface.point_world, u);
-    if (pick.light == vec3(0.0)) return segment;
-    BsdfEval scattered = eval_bsdf(terms, surface, pick.direction);
+    LightSample light_sample = sample_light(surface.point_world, u);
+    if (light_sample.light == vec3(0.0)) return segment;
+    BsdfEval scattered = eval_bsdf(terms, surface, light_sample.direction);
     if (!any(greaterThan(scattered.value, vec3(0.0)))) return segment;
-    float weight = pick.pdf > 0.0 ? power_heuristic(pick.pdf, scattered.pdf) : 1.0;
-    vec3 light = added_light(throughput * scattered.value * pick.light * weight, depth + 1u);
+    float weight = light_sample.pdf > 0.0 ? power_heuristic(light_sample.pdf, scattered.pdf) : 1.0;
+    vec3 light = added_light(throughput * scattered.value * light_sample.light * weight, depth + 1u);
     if (!any(greaterThan(light, vec3(0.0)))) return segment;
-    float side = dot(pick.direction, surface.geometric) < 0.0 ? -surface.clearance : surface.clearance;
+    float side = dot(light_sample.direction, surface.geometric) < 0.0 ? -surface.clearance : surface.clearance;
     vec3 offset = side * surface.geometric;
     vec3 origin = surface.point_world + offset;
-    segment = Segment(origin, SEGMENT_WAITS, pick.direction, triangle_ix, light, pick.distance);
-    if (isinf(pick.distance)) return segment;
-    // From its start beside the surface, the segment still goes to the point that was picked.
-    vec3 to_light = pick.distance * pick.direction - offset;
+    segment = Segment(origin, SEGMENT_WAITS, light_sample.direction, triangle_ix, light, light_sample.distance);
+    if (isinf(light_sample.distance)) return segment;
+    // From its start beside the surface, the segment still goes to the point that was sampled.
+    vec3 to_light = light_sample.distance * light_sample.direction - offset;
     float distance = length(to_light);
     segment.direction = to_light / distance;
     segment.t_max = SEGMENT_SHARE * distance;

@@ -16,15 +16,15 @@ use super::{
 use crate::{
     layout::{AreaLight, LEAST_SURVIVAL, PathRay, ROULETTE_DEPTH, SEGMENT_SHARE, SEGMENT_WAITS, Segment},
     reference::{
-        emitters::{LIGHT_HIDES_UP_TO, LightPick},
+        emitters::{LIGHT_HIDES_UP_TO, LightSample},
         path_vertex::PAIRS_OF_HIT,
     },
 };
 
-/// The lights that are picked.
+/// The lights that are sampled.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(64))]
-pub struct Picks {
+pub struct Samples {
     direction: Vec3sSoa,
     distance: [f32; LANES],
     light: Vec3sSoa,
@@ -47,12 +47,12 @@ pub struct MattSteps {
     pub go_on: LaneMask,
 }
 
-impl Picks {
+impl Samples {
     #[inline(always)]
-    pub fn set(&mut self, lane: usize, pick: &LightPick) {
-        set(&mut self.direction, lane, pick.direction);
-        set(&mut self.light, lane, pick.light);
-        (self.distance[lane], self.pdf[lane]) = (pick.distance, pick.pdf);
+    pub fn set(&mut self, lane: usize, sample: &LightSample) {
+        set(&mut self.direction, lane, sample.direction);
+        set(&mut self.light, lane, sample.light);
+        (self.distance[lane], self.pdf[lane]) = (sample.distance, sample.pdf);
     }
 }
 
@@ -136,18 +136,19 @@ pub struct BounceConstants<'a> {
     pub shapes: &'a [AreaLight],
 }
 
-/// Writes the segments to the lights that were picked, without regard to what hides them from the surfaces except other
-/// area lights.
+/// Writes the segments to the lights that were sampled, without regard to what hides them from the surfaces except
+/// other area lights.
 #[inline(always)]
 fn set_segments<S: Simd>(
     steps: &mut MattSteps,
     bounce: &BounceConstants,
     surfaces: &Surfaces<S>,
-    (throughput, picks): (Vec3x16<S>, &Picks),
+    (throughput, samples): (Vec3x16<S>, &Samples),
 ) {
     let simd = surfaces.clearance.simd;
-    let (direction, distance) = (Vec3x16::load(simd, &picks.direction), f32x16::load_array_ref(simd, &picks.distance));
-    let (light, pick_pdf) = (Vec3x16::load(simd, &picks.light), f32x16::load_array_ref(simd, &picks.pdf));
+    let (direction, distance) =
+        (Vec3x16::load(simd, &samples.direction), f32x16::load_array_ref(simd, &samples.distance));
+    let (light, sample_pdf) = (Vec3x16::load(simd, &samples.light), f32x16::load_array_ref(simd, &samples.pdf));
     let z = direction.dot(surfaces.normal);
     let mut exist = surfaces.is_above(direction, z);
     if !bounce.shapes.is_empty() {
@@ -155,10 +156,10 @@ fn set_segments<S: Simd>(
     }
     let pdf = z / PI;
     let value = surfaces.kd * pdf;
-    let largest = greater(pick_pdf, pdf);
-    let (own, other) = (pick_pdf / largest, pdf / largest);
+    let largest = greater(sample_pdf, pdf);
+    let (own, other) = (sample_pdf / largest, pdf / largest);
     let one = f32x16::splat(simd, 1.0);
-    let share = pick_pdf.simd_gt(0.0).select(own * own / (own * own + other * other), one);
+    let share = sample_pdf.simd_gt(0.0).select(own * own / (own * own + other * other), one);
     let arriving = throughput.times(value).times(light) * share;
     let arriving = arriving.min(f32x16::splat(simd, bounce.clamp));
     exist &= value.any_positive() & arriving.all_below(1.0e30) & arriving.any_positive();
@@ -217,14 +218,14 @@ pub fn matt_steps<S: Simd>(
     simd: S,
     bounce: &BounceConstants,
     (hits, surfaces): (&MattHits, &MattSurfaces),
-    (picks, random_pairs): (&Picks, &[PairsSoa; PAIRS_OF_HIT]),
+    (samples, random_pairs): (&Samples, &[PairsSoa; PAIRS_OF_HIT]),
 ) -> MattSteps {
     let surfaces = Surfaces::load(simd, hits, surfaces);
     let throughput = Vec3x16::load(simd, &hits.throughput);
     let [_, choices, to_next, _] = random_pairs;
     let local = lambert_samples(simd, to_next);
     let mut steps = MattSteps::default();
-    set_segments(&mut steps, bounce, &surfaces, (throughput, picks));
+    set_segments(&mut steps, bounce, &surfaces, (throughput, samples));
     let choices = f32x16::load_array_ref(simd, &choices[1]);
     set_rays(&mut steps, bounce.depth, &surfaces, (throughput, local, choices));
     steps

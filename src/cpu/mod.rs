@@ -8,7 +8,7 @@
 //!   paths    the passes of a batch of paths
 //!     path_begin, path_scatter   the rays of paths, and their steps at hits
 //!       sampler                  the random numbers of sixteen paths
-//!       environment_picks        the picks of sixteen directions of the environment
+//!       environment_samples        the samples of sixteen directions of the environment
 //!       matt_surfaces, matt_steps, area_lights   the steps of sixteen paths at matt surfaces
 //!       vec3x16, turns           sixteen vectors; sines and cosines of sixteen angles
 //!   timing   wall-clock times of passes
@@ -23,7 +23,7 @@
 
 mod area_lights;
 pub mod direction_bins;
-mod environment_picks;
+mod environment_samples;
 pub mod lanes;
 mod matt_steps;
 mod matt_surfaces;

@@ -9,9 +9,9 @@ use rayon::prelude::*;
 
 use super::{
     area_lights::meets_light,
-    environment_picks::environment_picks,
+    environment_samples::environment_samples,
     lanes::{LANES, LaneMask},
-    matt_steps::{BounceConstants, Picks, matt_steps},
+    matt_steps::{BounceConstants, Samples, matt_steps},
     matt_surfaces::{MattHits, matt_surfaces},
     path_begin::PixelOfBatch,
     sampler::{KeysSoa, PairsSoa, random_pairs},
@@ -21,7 +21,7 @@ use super::{
 use crate::{
     layout::{AreaLight, Batch, Hit, NO_TRIANGLE, PathRay, PathState, SCAN_GROUP_SIZE, SEGMENT_NONE, Segment},
     reference::{
-        emitters::{LightPick, pick_emitter},
+        emitters::{LightSample, sample_emitter},
         inputs::KernelInputs,
         live_paths::{Part, parts},
         maps::colour_at,
@@ -43,15 +43,15 @@ const LEAST_GROUP: usize = 4;
 #[derive(Default)]
 struct GroupChoices {
     pairs: [PairsSoa; PAIRS_OF_HIT],
-    /// The picks of the environment, if it has a map.
-    of_environment: Option<[LightPick; LANES]>,
+    /// The samples of the environment, if it has a map.
+    of_environment: Option<[LightSample; LANES]>,
 }
 
 impl GroupChoices {
     fn of_lane(&self, lane: usize) -> HitChoices {
         HitChoices {
             pairs: self.pairs.each_ref().map(|[x, y]| vec2(x[lane], y[lane])),
-            of_environment: self.of_environment.as_ref().map(|picks| picks[lane]),
+            of_environment: self.of_environment.as_ref().map(|samples| samples[lane]),
         }
     }
 }
@@ -173,7 +173,7 @@ impl BounceOfPaths<'_> {
     }
 
     /// Makes the random decisions at the hits of a group of paths. The last ray of a path only meets light, so that no
-    /// light is picked at its hit.
+    /// light is sampled at its hit.
     fn choices_of(&self, group: &[(usize, u32)]) -> GroupChoices {
         let mut keys = KeysSoa::default();
         for (lane, &(_, path_ix)) in group.iter().enumerate() {
@@ -185,7 +185,7 @@ impl BounceOfPaths<'_> {
         let emitters = self.inputs.emitters.filter(|_| depth + 1 < self.inputs.frame().max_depth);
         let of_map = |emitters: &Emitters| {
             let u = [&pairs[0][1], &pairs[1][0]];
-            emitters.environment.as_ref().map(|map| environment_picks(self.level, emitters, map, u))
+            emitters.environment.as_ref().map(|map| environment_samples(self.level, emitters, map, u))
         };
         GroupChoices { of_environment: emitters.and_then(of_map), pairs }
     }
@@ -223,17 +223,17 @@ impl BounceOfPaths<'_> {
         }
         let surfaces = dispatch!(self.level, simd => matt_surfaces(simd, &hits));
         let choices = self.choices_of(group);
-        let mut picks = Picks::default();
+        let mut samples = Samples::default();
         for (lane, &(_, path_ix)) in group.iter().enumerate() {
             let (ray, hit) = (paths.rays.of_path(path_ix), &self.hits[path_ix as usize]);
             hits.set_colour(lane, colour_at(inputs, ray, hit, surfaces.geometric(lane)));
             let HitChoices { pairs: [to_light, choice, ..], of_environment } = choices.of_lane(lane);
             let u = vec3(to_light.x, to_light.y, choice.x);
-            picks.set(lane, &pick_emitter(inputs, surfaces.point_world(lane), u, of_environment.as_ref()));
+            samples.set(lane, &sample_emitter(inputs, surfaces.point_world(lane), u, of_environment.as_ref()));
         }
         let bounce = BounceConstants { depth, clamp: frame.clamp, shapes: self.shapes() };
         let steps =
-            dispatch!(self.level, simd => matt_steps(simd, &bounce, (&hits, &surfaces), (&picks, &choices.pairs)));
+            dispatch!(self.level, simd => matt_steps(simd, &bounce, (&hits, &surfaces), (&samples, &choices.pairs)));
         let before_lights = self.before_lights(group, paths);
         for (lane, &(place, path_ix)) in group.iter().enumerate() {
             if before_lights >> lane & 1 == 1 {

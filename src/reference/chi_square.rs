@@ -69,7 +69,7 @@ pub fn chi_square(
     deviations(&counts, &expected)
 }
 
-/// Compares counts of picks with the probabilities of what was picked, as [`chi_square`] does.
+/// Compares counts of samples with the probabilities of what was sampled, as [`chi_square`] does.
 pub fn deviations(counts: &[f64], probabilities: &[f64]) -> f64 {
     let n: f64 = counts.iter().sum();
     let (mut chi, mut n_cells, mut few) = (0.0, 0.0, (0.0, 0.0));

@@ -47,7 +47,7 @@ pub struct KernelInputs<'a, R = NoCounter> {
     /// Whether rays pass through see-through surfaces at random, as often as their opacity says.
     pub random_opacity: bool,
     pub lights: &'a [Light],
-    /// What the path tracer picks lights from; `None` for rays that do not belong to a frame.
+    /// What the path tracer samples lights from; `None` for rays that do not belong to a frame.
     pub emitters: Option<&'a Emitters>,
     pub kd_nodes: CountedSlice<'a, KdNode, R>,
     /// For each pair of siblings, the index of their parent.

@@ -4,7 +4,9 @@ use glam::{Vec2, Vec3, vec3};
 
 use super::{
     bsdf::{BsdfTerms, bsdf_terms, eval_bsdf, is_smooth, sample_bsdf},
-    emitters::{LightPick, ambient_radiance, emission_at, emission_pdf, pick_light_with, seen_environment, seen_light},
+    emitters::{
+        LightSample, ambient_radiance, emission_at, emission_pdf, sample_light_with, seen_environment, seen_light,
+    },
     inputs::KernelInputs,
     maps::shaded_at,
     material::{emitted, is_unlit, transmittance},
@@ -31,8 +33,8 @@ pub fn first_pair_of(depth: u32) -> u32 {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct HitChoices {
     pub pairs: [Vec2; PAIRS_OF_HIT],
-    /// The pick of the environment that these random numbers give, if it is known already.
-    pub of_environment: Option<LightPick>,
+    /// The sample of the environment that these random numbers give, if it is known already.
+    pub of_environment: Option<LightSample>,
 }
 
 /// The random numbers of a hit.
@@ -92,7 +94,7 @@ struct Vertex<'a> {
     throughput: Vec3,
 }
 
-/// The segment to a light that is picked at a hit.
+/// The segment to a light that is sampled at a hit.
 fn segment_to_light(inputs: &KernelInputs, choices: &HitChoices, vertex: &Vertex) -> Segment {
     let &Vertex { depth, surface, terms, triangle_ix, throughput } = vertex;
     if is_smooth(terms.material) {
@@ -100,34 +102,34 @@ fn segment_to_light(inputs: &KernelInputs, choices: &HitChoices, vertex: &Vertex
     }
     let [to_light, which, ..] = choices.pairs;
     let u = vec3(to_light.x, to_light.y, which.x);
-    let pick = pick_light_with(inputs, surface.point_world, u, choices.of_environment.as_ref());
-    if pick.light == Vec3::ZERO {
+    let sample = sample_light_with(inputs, surface.point_world, u, choices.of_environment.as_ref());
+    if sample.light == Vec3::ZERO {
         return NO_SEGMENT;
     }
-    let scattered = eval_bsdf(terms, surface, pick.direction);
+    let scattered = eval_bsdf(terms, surface, sample.direction);
     if !scattered.value.cmpgt(Vec3::ZERO).any() {
         return NO_SEGMENT;
     }
-    let weight = if pick.pdf > 0.0 { power_heuristic(pick.pdf, scattered.pdf) } else { 1.0 };
-    let light = added_light(inputs, throughput * scattered.value * pick.light * weight, depth + 1);
+    let weight = if sample.pdf > 0.0 { power_heuristic(sample.pdf, scattered.pdf) } else { 1.0 };
+    let light = added_light(inputs, throughput * scattered.value * sample.light * weight, depth + 1);
     if !light.cmpgt(Vec3::ZERO).any() {
         return NO_SEGMENT;
     }
-    let side = if pick.direction.dot(surface.geometric) < 0.0 { -surface.clearance } else { surface.clearance };
+    let side = if sample.direction.dot(surface.geometric) < 0.0 { -surface.clearance } else { surface.clearance };
     let offset = side * surface.geometric;
     let mut segment = Segment {
         origin: surface.point_world + offset,
         state: SEGMENT_WAITS,
-        direction: pick.direction,
+        direction: sample.direction,
         source_triangle: triangle_ix,
         light,
-        t_max: pick.distance,
+        t_max: sample.distance,
     };
-    if pick.distance.is_infinite() {
+    if sample.distance.is_infinite() {
         return segment;
     }
-    // From its start beside the surface, the segment still goes to the point that was picked.
-    let to_light = pick.distance * pick.direction - offset;
+    // From its start beside the surface, the segment still goes to the point that was sampled.
+    let to_light = sample.distance * sample.direction - offset;
     let distance = to_light.length();
     segment.direction = to_light / distance;
     segment.t_max = SEGMENT_SHARE * distance;

@@ -1,13 +1,13 @@
-//! Alias tables, by which a device picks one of many entries in constant time (Vose: A Linear Algorithm for Generating
-//! Random Numbers with a Given Distribution, IEEE TSE 1991). The lookup is in `reference::emitters::alias`.
+//! Alias tables, by which a device samples one of many entries in constant time (Vose: A Linear Algorithm for
+//! Generating Random Numbers with a Given Distribution, IEEE TSE 1991). The lookup is in `reference::emitters::alias`.
 
 /// An entry of an alias table.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct AliasEntry {
-    /// The share of the entry's picks that stay with it, 0 to 1.
+    /// The share of the entry's samples that stay with it, 0 to 1.
     pub threshold: f32,
-    /// The entry that gets the other picks.
+    /// The entry that gets the other samples.
     pub alias_ix: u32,
 }
 
@@ -41,7 +41,7 @@ pub fn alias_table(weights: &[f64]) -> Vec<AliasEntry> {
             small.push(giver);
         }
     }
-    // Rounding is all that what is left lacks, except for an entry without weight, which must not be picked.
+    // Rounding is all that what is left lacks, except for an entry without weight, which must not be sampled.
     for ix in small.into_iter().filter(|&ix| weights[ix] == 0.0) {
         let heaviest = (0..n).max_by(|&a, &b| weights[a].total_cmp(&weights[b])).expect("some weight is above 0");
         table[ix] = AliasEntry { threshold: 0.0, alias_ix: heaviest as u32 };
@@ -49,7 +49,7 @@ pub fn alias_table(weights: &[f64]) -> Vec<AliasEntry> {
     table
 }
 
-/// Returns the probabilities with which the entries of a table are picked.
+/// Returns the probabilities with which the entries of a table are sampled.
 pub fn probabilities(table: &[AliasEntry]) -> Vec<f64> {
     let mut sums: Vec<f64> = table.iter().map(|entry| f64::from(entry.threshold)).collect();
     for entry in table {

@@ -1,4 +1,4 @@
-//! Emitters: the tables from which the path tracer picks lights (glsl/shared/emitters).
+//! Emitters: the tables from which the path tracer samples lights (glsl/shared/emitters).
 
 use std::f64::consts::PI;
 
@@ -21,11 +21,11 @@ use crate::{
     scene::{Ground, Up},
 };
 
-/// The number of lights from which on they are picked by a tree. The environment, directional lights and suns do not
+/// The number of lights from which on they are sampled by a tree. The environment, directional lights and suns do not
 /// count.
 const LEAST_TREE_LIGHTS: usize = 256;
 
-/// Everything that emits light, as the path tracer picks it.
+/// Everything that emits light, as the path tracer samples it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Emitters {
     /// An alias table, and the lights of the tree. Without a tree: point, spot and directional lights, area lights,
@@ -33,7 +33,7 @@ pub struct Emitters {
     pub entries: Vec<Emitter>,
     /// The number of entries of the alias table. With a tree, these are directional lights, suns, the environment and,
     /// as the last entry, the tree.
-    pub n_picked: usize,
+    pub n_sampled: usize,
     /// The light tree; empty if the scene has few lights.
     pub light_nodes: Vec<LightNode>,
     /// Rectangles, disks and spheres. The suns follow.
@@ -42,7 +42,7 @@ pub struct Emitters {
     pub n_suns: usize,
     /// The map of the environment.
     pub environment: Option<EnvironmentMap>,
-    /// Probability with which the environment is picked.
+    /// Probability with which the environment is sampled.
     pub environment_probability: f32,
     /// Radiance of the environment if it has no map.
     pub background: Vec3,
@@ -68,12 +68,12 @@ impl Emitters {
     pub(super) fn new(scene: &FlatScene) -> Self {
         let disk = bounding_disk(scene);
         let ground = scene.ground.unwrap_or(Ground { ambient: scene.ambient, up: Up::Y });
-        // Directions are picked as if the brighter half of the ambient light came from everywhere.
+        // Directions are sampled as if the brighter half of the ambient light came from everywhere.
         let ambient = scene.ambient.max(ground.ambient);
         let environment = scene.environment.as_ref().map(|map| EnvironmentMap::new(map, ambient));
-        // Who has no entry is never picked, whatever the scene says: the leaf ends a loop of the kernels.
-        let unpicked = |light: &AreaLight| AreaLight { probability: 0.0, leaf_ix: 0, ..*light };
-        let mut area_lights: Vec<AreaLight> = scene.area_lights.iter().map(unpicked).collect();
+        // Who has no entry is never sampled, whatever the scene says: the leaf ends a loop of the kernels.
+        let unsampled = |light: &AreaLight| AreaLight { probability: 0.0, leaf_ix: 0, ..*light };
+        let mut area_lights: Vec<AreaLight> = scene.area_lights.iter().map(unsampled).collect();
         let (lights, suns) = lights_and_suns(&scene.lights, disk);
         let of_areas = area_lights.iter().enumerate().map(|(ix, light)| Weighed {
             kind: EMITTER_AREA,
@@ -122,7 +122,7 @@ impl Emitters {
             self.set_tree(scene, &lights);
         } else {
             self.entries = table_of(&weighed);
-            self.n_picked = self.entries.len();
+            self.n_sampled = self.entries.len();
         }
         let n_shapes = self.area_lights.len() - self.n_suns;
         for emitter in &self.entries {
@@ -144,8 +144,8 @@ impl Emitters {
         let power = lights.iter().map(|light| light.power).sum();
         others.push(Weighed { kind: EMITTER_TREE, ix: 0, power });
         self.entries = table_of(&others);
-        self.n_picked = self.entries.len();
-        let probability = self.entries[self.n_picked - 1].probability;
+        self.n_sampled = self.entries.len();
+        let probability = self.entries[self.n_sampled - 1].probability;
         let entry =
             |light: &Weighed| Emitter { probability, kind: light.kind, ix: light.ix as u32, ..Emitter::default() };
         self.entries.extend(lights.iter().map(entry));
@@ -159,7 +159,7 @@ impl Emitters {
                 EMITTER_AREA => LightBounds::of_area_light(&scene.area_lights[light.ix]),
                 _ => LightBounds::of_triangle(&scene.triangles[light.ix], light.power / (2.0 * PI)),
             },
-            emitter_ix: (self.n_picked + ix) as u32,
+            emitter_ix: (self.n_sampled + ix) as u32,
         };
         self.light_nodes = light_tree(lights.iter().enumerate().map(of_light).collect());
         for (leaf_ix, node) in self.light_nodes.iter().enumerate() {
@@ -183,7 +183,7 @@ impl Emitters {
         &self.area_lights[self.area_lights.len() - self.n_suns..]
     }
 
-    /// Returns whether a tree picks the lights, and not the alias table alone.
+    /// Returns whether a tree samples the lights, and not the alias table alone.
     pub fn has_tree(&self) -> bool {
         !self.light_nodes.is_empty()
     }
@@ -192,14 +192,14 @@ impl Emitters {
     /// `EMITTERS_SHAPE << AREA_DISK` and its like.
     pub fn kinds(&self) -> u32 {
         let of_entries = self.entries.iter().map(|emitter| 1 << emitter.kind);
-        // Rays meet area lights, suns and the map even if they are never picked.
+        // Rays meet area lights, suns and the map even if they are never sampled.
         let of_shapes = self.shapes().iter().map(|light| 1 << EMITTER_AREA | EMITTERS_SHAPE << light.kind);
         let of_suns = self.suns().iter().map(|_| 1 << EMITTER_SUN);
         let of_map = self.environment.iter().map(|_| EMITTERS_MAP);
         of_entries.chain(of_shapes).chain(of_suns).chain(of_map).fold(0, |kinds, kind| kinds | kind)
     }
 
-    /// Returns the number of all that can be picked: lights, emitting triangles, suns and the environment.
+    /// Returns the number of all that can be sampled: lights, emitting triangles, suns and the environment.
     pub fn n_lights(&self) -> usize {
         // One entry of the table is the tree itself, which is no light.
         self.entries.len() - usize::from(self.has_tree())
@@ -221,7 +221,7 @@ impl Emitters {
             ambient: self.ambient,
             ground_ambient: self.ground_ambient,
             up_axis: self.up_axis as u32,
-            n_emitters: self.n_picked as u32,
+            n_emitters: self.n_sampled as u32,
             first_triangle_emitter: self.triangle_entries.0 as u32,
             n_triangle_emitters: self.triangle_entries.1 as u32,
             n_area_lights: self.shapes().len() as u32,

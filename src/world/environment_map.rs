@@ -1,4 +1,4 @@
-//! The map of the environment with the tables that pick its directions (glsl/shared/emitters/environment.glsl).
+//! The map of the environment with the tables that sample its directions (glsl/shared/emitters/environment.glsl).
 
 use std::f64::consts::PI;
 
@@ -19,25 +19,25 @@ pub struct EnvironmentMap {
     /// By which the map is turned about +y, in turns, counter-clockwise as seen from above.
     pub turn: f32,
     /// Linear colours, row by row from the zenith. The fourth number is the pdf with which the middle of the texel
-    /// is picked, per steradian, times the sine of the polar angle there.
+    /// is sampled, per steradian, times the sine of the polar angle there.
     pub texels: Vec<[f32; 4]>,
-    /// The table by which rows are picked.
+    /// The table by which rows are sampled.
     pub rows: Vec<AliasEntry>,
-    /// For each row, the table by which its texels are picked.
+    /// For each row, the table by which its texels are sampled.
     pub columns: Vec<AliasEntry>,
     mean_luminance: f64,
 }
 
 impl EnvironmentMap {
-    /// Makes the tables on the current rayon pool. Directions are picked by the luminance of the map and of the ambient
-    /// light together.
+    /// Makes the tables on the current rayon pool. Directions are sampled by the luminance of the map and of the
+    /// ambient light together.
     pub(super) fn new(environment: &Environment, ambient: Vec3) -> Self {
         let [width, height] = environment.size();
         let (n_columns, n_rows) = (width as usize, height as usize);
         let colours = environment.colours();
         let ambient = luminance(ambient);
         let brightness: Vec<f64> = colours.par_iter().map(|colour| luminance(*colour) + ambient).collect();
-        // A black map is picked evenly.
+        // A black map is sampled evenly.
         let is_dark = !brightness.par_iter().any(|brightness| *brightness > 0.0);
         let sine = |row: usize| (PI * (row as f64 + 0.5) / n_rows as f64).sin();
         let weight = |ix: usize| sine(ix / n_columns) * if is_dark { 1.0 } else { brightness[ix] };

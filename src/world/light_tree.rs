@@ -1,6 +1,6 @@
-//! The light tree: a hierarchy of the lights of a scene with many of them, from which the path tracer picks a light by
-//! what it may send to a point (Conty Estevez, Kulla: Importance Sampling of Many Lights with Adaptive Tree Splitting,
-//! HPG 2018). The descent is in `reference::emitters::tree`.
+//! The light tree: a hierarchy of the lights of a scene with many of them, from which the path tracer samples a light
+//! by what it may send to a point (Conty Estevez, Kulla: Importance Sampling of Many Lights with Adaptive Tree
+//! Splitting, HPG 2018). The descent is in `reference::emitters::tree`.
 
 use std::f32::consts::FRAC_PI_2;
 

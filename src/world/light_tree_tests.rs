@@ -1,4 +1,4 @@
-//! Tests of light trees: their structure, and the probabilities with which lights are picked from them.
+//! Tests of light trees: their structure, and the probabilities with which lights are sampled from them.
 
 use std::f32::consts::FRAC_PI_2;
 
@@ -12,7 +12,7 @@ use crate::{
     layout::{LIGHT_NODE_LEAF, LIGHT_NODE_TWO_SIDED, LightNode, Triangle},
     reference::{
         chi_square::{LARGEST_DEVIATION, Uniform, deviations},
-        emitters::tree::{pick_in_tree, tree_probability},
+        emitters::tree::{sample_in_tree, tree_probability},
     },
 };
 
@@ -153,30 +153,30 @@ fn trees_are_not_deep() {
     assert_eq!(depth(&light_tree(points(&[Vec3::ONE; 1024])), 0), 11);
 }
 
-/// Picks `n` lights at a point. Returns how often each was picked. Each pick has the probability that is computed from
-/// the leaf.
+/// Samples `n` lights at a point. Returns how often each was sampled. Each sample has the probability that is computed
+/// from the leaf.
 fn counts(nodes: &[LightNode], n_lights: usize, point: Vec3, n: usize) -> Vec<f64> {
     let (leaves, mut random) = (leaves(nodes, n_lights), Uniform(3));
     let mut counts = vec![0.0; n_lights];
     for _ in 0..n {
         let u = random.point();
-        let pick = pick_in_tree(nodes, point, u.x, u.y);
-        let light_ix = pick.emitter_ix as usize - 5;
-        assert_eq!(pick.probability, tree_probability(nodes, point, leaves[light_ix]));
+        let sample = sample_in_tree(nodes, point, u.x, u.y);
+        let light_ix = sample.emitter_ix as usize - 5;
+        assert_eq!(sample.probability, tree_probability(nodes, point, leaves[light_ix]));
         counts[light_ix] += 1.0;
     }
     counts
 }
 
 #[test]
-fn lights_are_picked_as_often_as_stated() {
+fn lights_are_sampled_as_often_as_stated() {
     let nodes = light_tree(lights(100));
     for point in receivers(&nodes) {
         let stated = probabilities(&nodes, 100, point);
         let counts = counts(&nodes, 100, point, 100_000);
         let found = deviations(&counts, &stated);
         assert!(found < LARGEST_DEVIATION, "{found} deviations from {point}");
-        // Lights whose probability is 0 are never picked.
+        // Lights whose probability is 0 are never sampled.
         assert!(counts.iter().zip(&stated).all(|(count, stated)| *count == 0.0 || *stated > 0.0));
         // A tree whose left half is a tenth brighter has other probabilities.
         let mut other = nodes.clone();
@@ -188,31 +188,31 @@ fn lights_are_picked_as_often_as_stated() {
     }
 }
 
-/// A float has 24 bits, of which a pick among many lights that are alike needs more.
+/// A float has 24 bits, of which a sample among many lights that are alike needs more.
 #[test]
-fn rare_lights_are_picked() {
+fn rare_lights_are_sampled() {
     let nodes = light_tree(points(&vec![Vec3::ONE; 1 << 14]));
     // Numbers that differ only in the digits that continue the first number.
-    let picks = [0.1, 0.9].map(|more| pick_in_tree(&nodes, Vec3::ZERO, 0.3, more));
-    assert_eq!(picks[0].probability, 1.0 / (1 << 14) as f32);
+    let samples = [0.1, 0.9].map(|more| sample_in_tree(&nodes, Vec3::ZERO, 0.3, more));
+    assert_eq!(samples[0].probability, 1.0 / (1 << 14) as f32);
     let deep = light_tree(points(&vec![Vec3::ONE; 1 << 17]));
     let mut found: Vec<u32> =
-        (0..64).map(|ix| pick_in_tree(&deep, Vec3::ZERO, 0.3, ix as f32 / 64.0).emitter_ix).collect();
+        (0..64).map(|ix| sample_in_tree(&deep, Vec3::ZERO, 0.3, ix as f32 / 64.0).emitter_ix).collect();
     found.dedup();
     assert_eq!(found.len(), 1, "24 bits tell 2^17 lights apart");
     let mut nodes = deep;
     // The light is in the half that has the share 2^-10.
     nodes[1].intensity /= 1024.0;
-    let picks = (0..64).map(|ix| pick_in_tree(&nodes, Vec3::ZERO, 0.0003, ix as f32 / 64.0).emitter_ix);
-    let mut found: Vec<u32> = picks.collect();
+    let samples = (0..64).map(|ix| sample_in_tree(&nodes, Vec3::ZERO, 0.0003, ix as f32 / 64.0).emitter_ix);
+    let mut found: Vec<u32> = samples.collect();
     found.sort_unstable();
     found.dedup();
     assert!(found.len() > 4, "{found:?}");
 }
 
-/// A light that shines at a point can be picked there, from near and from afar.
+/// A light that shines at a point can be sampled there, from near and from afar.
 #[test]
-fn what_shines_can_be_picked() {
+fn what_shines_can_be_sampled() {
     let lights = lights(400);
     let nodes = light_tree(lights.clone());
     let mut n_dark = 0;
@@ -227,11 +227,11 @@ fn what_shines_can_be_picked() {
             n_dark += usize::from(probability == 0.0);
         }
     }
-    assert!(n_dark > 1000, "lights that shine elsewhere are not picked: {n_dark}");
+    assert!(n_dark > 1000, "lights that shine elsewhere are not sampled: {n_dark}");
 }
 
 #[test]
-fn near_lights_are_picked_more_often() {
+fn near_lights_are_sampled_more_often() {
     let nodes = light_tree(points(&[vec3(1.0, 0.0, 0.0), vec3(0.0, 10.0, 0.0)]));
     let stated = probabilities(&nodes, 2, Vec3::ZERO);
     assert!((stated[0] / stated[1] - 100.0).abs() < 0.01, "{stated:?}");

@@ -57,7 +57,7 @@ struct Parts {
     scene: FlatScene,
     accel: Accel,
     accel_options: AccelOptions,
-    /// The tables from which lights are picked. Like the next two fields, they are made when they are first needed.
+    /// The tables from which lights are sampled. Like the next two fields, they are made when they are first needed.
     emitters: OnceLock<Emitters>,
     /// The wide hierarchy. There is none if the structure is a grid.
     wide_bvh: OnceLock<Option<WideBvh>>,
@@ -139,7 +139,7 @@ impl World {
         &self.0.scene
     }
 
-    /// The tables from which the path tracer picks lights. They are made at the first call.
+    /// The tables from which the path tracer samples lights. They are made at the first call.
     pub fn emitters(&self) -> &Emitters {
         made_once(&self.0.emitters, || Emitters::new(&self.0.scene))
     }

@@ -1,4 +1,4 @@
-//! Tests of so many lamps that a tree picks them: what a floor shows of them against closed forms.
+//! Tests of so many lamps that a tree samples them: what a floor shows of them against closed forms.
 
 use std::f32::consts::PI;
 

@@ -53,7 +53,7 @@ float passing_share(Material material) {
     return material.transmission * (1.0 - material.metallic);
 }
 
-// Whether all of the surface's lobes are perfectly smooth. Lights cannot be picked for it.
+// Whether all of the surface's lobes are perfectly smooth. Lights cannot be sampled for it.
 bool is_smooth(Material material) {
     if ((material.flags & MATERIAL_UNLIT) != 0u) return true;
     bool has_lambert = largest_of(material.kd) * (1.0 - material.metallic) * (1.0 - material.transmission) > 0.0;

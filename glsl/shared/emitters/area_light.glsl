@@ -8,14 +8,14 @@
 #include "layout.glsl"
 #include "texture_words.glsl"
 #include "emitters/kinds.glsl"
-#include "emitters/pick.glsl"
+#include "emitters/light_sample.glsl"
 #include "emitters/rectangle.glsl"
 #include "emitters/disk.glsl"
 #include "emitters/sphere.glsl"
 #include "emitters/tree.glsl"
 
 // What a ray sees of the area lights. t: distance of the nearest one, infinity if it meets none. pdf: with which
-// pick_light picks the direction, per steradian.
+// sample_light samples the direction, per steradian.
 struct SeenLight {
     float t;
     vec3 radiance;
@@ -44,7 +44,7 @@ float hit_area_light(AreaLight light, vec3 origin, vec3 direction) {
     return uintBitsToFloat(0x7f800000u);
 }
 
-// The pdf with which a pick of the light gives the direction in which it is hit at a distance, per steradian.
+// The pdf with which a sample of the light gives the direction in which it is hit at a distance, per steradian.
 float shape_pdf(AreaLight light, vec3 origin, vec3 direction, float distance) {
     if (has_shapes(AREA_RECTANGLE) && light.kind == AREA_RECTANGLE) {
         return rectangle_pdf(light, origin, direction, distance);
@@ -73,14 +73,14 @@ SeenLight seen_light(vec3 origin, vec3 direction, float t_max) {
     return SeenLight(nearest, light.radiance, probability * shape_pdf(light, origin, direction, nearest));
 }
 
-// probability: with which this light is picked.
-LightPick pick_area_light(uint light_ix, vec3 point_world, vec2 u, float probability) {
+// probability: with which this light is sampled.
+LightSample sample_area_light(uint light_ix, vec3 point_world, vec2 u, float probability) {
     AreaLight light = area_light_at(light_ix);
     light.probability = probability;
-    if (has_shapes(AREA_RECTANGLE) && light.kind == AREA_RECTANGLE) return pick_rectangle(light, point_world, u);
-    if (has_shapes(AREA_DISK) && light.kind == AREA_DISK) return pick_disk(light, point_world, u);
-    if (has_shapes(AREA_SPHERE)) return pick_sphere(light, point_world, u);
-    return no_pick();
+    if (has_shapes(AREA_RECTANGLE) && light.kind == AREA_RECTANGLE) return sample_rectangle(light, point_world, u);
+    if (has_shapes(AREA_DISK) && light.kind == AREA_DISK) return sample_disk(light, point_world, u);
+    if (has_shapes(AREA_SPHERE)) return sample_sphere(light, point_world, u);
+    return no_sample();
 }
 
 #endif

@@ -1,9 +1,9 @@
-// Disks that shine to one side. A point is picked uniformly on the area. Twin of src/reference/emitters/disk.rs.
+// Disks that shine to one side. A point is sampled uniformly on the area. Twin of src/reference/emitters/disk.rs.
 #ifndef KDRAY_DISK
 #define KDRAY_DISK
 
 #include "layout.glsl"
-#include "emitters/pick.glsl"
+#include "emitters/light_sample.glsl"
 #include "emitters/rectangle.glsl"
 
 // Distance at which a ray meets the disk's front, in lengths of its direction; infinity if it does not.
@@ -23,11 +23,11 @@ vec2 disk_point(vec2 u) {
     return is_wide ? radius * vec2(cos(eighth), sin(eighth)) : radius * vec2(sin(eighth), cos(eighth));
 }
 
-LightPick pick_disk(AreaLight light, vec3 point_world, vec2 u) {
+LightSample sample_disk(AreaLight light, vec3 point_world, vec2 u) {
     vec2 place = light.radius * disk_point(u);
     Towards way = towards(point_world, light.position + place.x * light.edge_u + place.y * light.edge_v);
     float pdf = light.probability * flat_pdf(light, way.direction, way.distance);
-    return pick_of_point(way, light.radiance, pdf);
+    return sample_of_point(way, light.radiance, pdf);
 }
 
 #endif

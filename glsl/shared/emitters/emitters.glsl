@@ -1,6 +1,6 @@
-// The emitters of the path tracer: what a point of a surface may get light from. One emitter is picked with a
+// The emitters of the path tracer: what a point of a surface may get light from. One emitter is sampled with a
 // probability by its power or, where there are many, by what it may send to the point. Then a direction towards it is
-// picked. Twin of src/reference/emitters/mod.rs.
+// sampled. Twin of src/reference/emitters/mod.rs.
 //
 // Needs the bindings `lights` and `materials` (material.glsl), and the words of textures.
 #ifndef KDRAY_EMITTERS
@@ -13,7 +13,7 @@
 #include "emitters/area_light.glsl"
 #include "emitters/environment.glsl"
 #include "emitters/kinds.glsl"
-#include "emitters/pick.glsl"
+#include "emitters/light_sample.glsl"
 #include "emitters/punctual.glsl"
 #include "emitters/tree.glsl"
 #include "emitters/triangle.glsl"
@@ -29,39 +29,39 @@ Emitter emitter_at(uint emitter_ix) {
     );
 }
 
-// Picks a direction from which light may come to a point. u: in [0, 1); u.x selects the emitter. What hides the light
+// Samples a direction from which light may come to a point. u: in [0, 1); u.x selects the emitter. What hides the light
 // is not asked, except for rectangles, disks and spheres, which only seen_light knows.
-LightPick pick_light(vec3 point_world, vec3 u) {
-    if (accel.n_emitters == 0u) return no_pick();
-    // Tables of many entries need more bits than u.x has. The lowest bits of u.y hardly move the point that is picked.
+LightSample sample_light(vec3 point_world, vec3 u) {
+    if (accel.n_emitters == 0u) return no_sample();
+    // Tables of many entries need more bits than u.x has. The lowest bits of u.y hardly move the point that is sampled.
     float more = fract(u.y * 4096.0);
-    AliasPick picked = pick_alias(accel.emitters_begin, 5u, accel.n_emitters, u.x, more);
-    Emitter emitter = emitter_at(picked.ix);
+    AliasSample sampled = sample_alias(accel.emitters_begin, 5u, accel.n_emitters, u.x, more);
+    Emitter emitter = emitter_at(sampled.ix);
     if (has_emitters(EMITTER_TREE) && emitter.kind == EMITTER_TREE) {
-        TreePick light = pick_in_tree(point_world, picked.rest, more);
+        TreeSample light = sample_in_tree(point_world, sampled.rest, more);
         emitter = emitter_at(light.emitter_ix);
         emitter.probability *= light.probability;
     }
-    LightPick pick = no_pick();
+    LightSample light_sample = no_sample();
     if (has_emitters(EMITTER_LIGHT) && emitter.kind == EMITTER_LIGHT) {
-        pick = pick_punctual(lights[emitter.ix], point_world, emitter.probability);
+        light_sample = sample_punctual(lights[emitter.ix], point_world, emitter.probability);
     } else if (has_emitters(EMITTER_AREA) && emitter.kind == EMITTER_AREA) {
-        pick = pick_area_light(emitter.ix, point_world, u.yz, emitter.probability);
+        light_sample = sample_area_light(emitter.ix, point_world, u.yz, emitter.probability);
     } else if (has_emitters(EMITTER_SUN) && emitter.kind == EMITTER_SUN) {
-        pick = pick_sun(emitter.ix, u.yz);
+        light_sample = sample_sun(emitter.ix, u.yz);
     } else if (has_emitters(EMITTER_TRIANGLE) && emitter.kind == EMITTER_TRIANGLE) {
-        pick = pick_triangle(emitter.ix, point_world, u.yz, emitter.probability);
+        light_sample = sample_triangle(emitter.ix, point_world, u.yz, emitter.probability);
     } else if (has_emitters(EMITTER_ENVIRONMENT)) {
-        pick = pick_environment(u.yz);
+        light_sample = sample_environment(u.yz);
     }
-    if (!has_emitters(EMITTER_AREA)) return pick;
-    SeenLight before = seen_light(point_world, pick.direction, LIGHT_HIDES_UP_TO * pick.distance);
-    if (!isinf(before.t)) return no_pick();
-    return pick;
+    if (!has_emitters(EMITTER_AREA)) return light_sample;
+    SeenLight before = seen_light(point_world, light_sample.direction, LIGHT_HIDES_UP_TO * light_sample.distance);
+    if (!isinf(before.t)) return no_sample();
+    return light_sample;
 }
 
-// The pdf with which pick_light picks the point of a triangle that is seen from a point in a direction at a
-// distance, per steradian; 0 for a triangle that is never picked. direction: a unit vector.
+// The pdf with which sample_light samples the point of a triangle that is seen from a point in a direction at a
+// distance, per steradian; 0 for a triangle that is never sampled. direction: a unit vector.
 float emission_pdf(uint triangle_ix, vec3 point_world, vec3 direction, float distance) {
     if (!has_emitters(EMITTER_TRIANGLE)) return 0.0;
     uint low = accel.first_triangle_emitter, end = low + accel.n_triangle_emitters;

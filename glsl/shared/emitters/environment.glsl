@@ -4,9 +4,9 @@
 // The map is equirectangular. Its rows go from the zenith, +y, down to -y. Its middle is in the direction -z, and the
 // quarter to the right of it is +x. `environment_turn` turns it about +y.
 //
-// The map is bilinear between the middles of texels, and directions are picked in proportion to its luminance. Such a
+// The map is bilinear between the middles of texels, and directions are sampled in proportion to its luminance. Such a
 // map is a sum of tents: each texel has one, which falls from the texel's middle to those of its neighbours. A row is
-// picked first, and then a texel of the row, each by an alias table, and at last a place below the texel's tent. The
+// sampled first, and then a texel of the row, each by an alias table, and at last a place below the texel's tent. The
 // pdf in the map is therefore bilinear, too. Per steradian, it is divided by the sine of the polar angle.
 //
 // Needs the words of textures (texture_words.glsl).
@@ -18,7 +18,7 @@
 #include "texture_words.glsl"
 #include "emitters/alias.glsl"
 #include "emitters/kinds.glsl"
-#include "emitters/pick.glsl"
+#include "emitters/light_sample.glsl"
 #include "emitters/sun.glsl"
 
 // Lower bound of the sine by which the pdf in the map is divided. At the poles, the sine is 0.
@@ -39,8 +39,8 @@ vec2 environment_place(vec3 direction, float aside) {
     return place * vec2(accel.environment_width, accel.environment_height) - 0.5;
 }
 
-// What the map has in a direction: its colour, and the pdf with which the direction is picked if the environment
-// without the suns is picked, per steradian.
+// What the map has in a direction: its colour, and the pdf with which the direction is sampled if the environment
+// without the suns is sampled, per steradian.
 struct MapValue {
     vec3 radiance;
     float pdf;
@@ -63,7 +63,7 @@ MapValue map_value(vec2 place, float aside) {
     return MapValue(value.rgb, value.a / max(aside, LEAST_MAP_SINE));
 }
 
-// What a ray that leaves the scene meets: the environment and its suns. pdf: with which pick_light picks the
+// What a ray that leaves the scene meets: the environment and its suns. pdf: with which sample_light samples the
 // direction because of them, per steradian.
 struct SeenEnvironment {
     vec3 radiance;
@@ -94,17 +94,17 @@ vec3 ambient_radiance(vec3 direction) {
 }
 
 // A direction of the environment, and what the environment without the suns has there.
-struct MapPick {
+struct MapSample {
     vec3 direction;
     MapValue value;
 };
 
 // A direction of the map.
-MapPick pick_map_direction(vec2 u) {
+MapSample sample_map_direction(vec2 u) {
     uint n_rows = accel.environment_height, n_columns = accel.environment_width;
-    AliasPick row = pick_alias(accel.environment_begin, 2u, n_rows, u.x, 0.0);
+    AliasSample row = sample_alias(accel.environment_begin, 2u, n_rows, u.x, 0.0);
     uint columns_begin = accel.environment_begin + 2u * (n_rows + row.ix * n_columns);
-    AliasPick column = pick_alias(columns_begin, 2u, n_columns, u.y, 0.0);
+    AliasSample column = sample_alias(columns_begin, 2u, n_columns, u.y, 0.0);
     // Between a pole and the middle of its row, there is no other row: the tent's half is a rectangle of half a texel.
     bool is_at_pole = row.rest < 0.5 ? row.ix == 0u : row.ix == n_rows - 1u;
     float down = float(row.ix) + (is_at_pole ? row.rest - 0.5 : tent(row.rest));
@@ -117,32 +117,32 @@ MapPick pick_map_direction(vec2 u) {
     float turns = (right + 0.5) / float(n_columns) - 0.5 - accel.environment_turn;
     float azimuth = 2.0 * EMITTER_PI * turns;
     vec3 direction = vec3(aside * sin(azimuth), is_upper ? 1.0 - versine : versine - 1.0, -aside * cos(azimuth));
-    return MapPick(direction, map_value(vec2(right, down), aside));
+    return MapSample(direction, map_value(vec2(right, down), aside));
 }
 
 // A direction, uniform on the sphere.
-MapPick pick_any_direction(vec2 u) {
+MapSample sample_any_direction(vec2 u) {
     float up = 1.0 - 2.0 * u.x;
     float sine = 2.0 * sqrt(max(u.x * (1.0 - u.x), 0.0));
     float azimuth = 2.0 * EMITTER_PI * u.y;
     vec3 direction = vec3(sine * sin(azimuth), up, -sine * cos(azimuth));
-    return MapPick(direction, MapValue(accel.background, 1.0 / (4.0 * EMITTER_PI)));
+    return MapSample(direction, MapValue(accel.background, 1.0 / (4.0 * EMITTER_PI)));
 }
 
-// The pick of a direction beyond the scene.
-LightPick pick_beyond(vec3 direction, SeenEnvironment seen) {
+// The sample of a direction beyond the scene.
+LightSample sample_beyond(vec3 direction, SeenEnvironment seen) {
     Towards way = Towards(direction, uintBitsToFloat(0x7f800000u));
-    return pick_of_point(way, seen.radiance + ambient_radiance(direction), seen.pdf);
+    return sample_of_point(way, seen.radiance + ambient_radiance(direction), seen.pdf);
 }
 
-LightPick pick_environment(vec2 u) {
-    MapPick pick = HAS_ENVIRONMENT_MAP ? pick_map_direction(u) : pick_any_direction(u);
-    return pick_beyond(pick.direction, with_suns(pick.value, pick.direction));
+LightSample sample_environment(vec2 u) {
+    MapSample sampled = HAS_ENVIRONMENT_MAP ? sample_map_direction(u) : sample_any_direction(u);
+    return sample_beyond(sampled.direction, with_suns(sampled.value, sampled.direction));
 }
 
-LightPick pick_sun(uint sun_ix, vec2 u) {
+LightSample sample_sun(uint sun_ix, vec2 u) {
     vec3 direction = sun_direction(sun_ix, u);
-    return pick_beyond(direction, seen_environment(direction));
+    return sample_beyond(direction, seen_environment(direction));
 }
 
 #endif

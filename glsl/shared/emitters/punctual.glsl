@@ -6,14 +6,14 @@
 
 #include "layout.glsl"
 #include "light.glsl"
-#include "emitters/pick.glsl"
+#include "emitters/light_sample.glsl"
 
-// probability: with which this light is picked.
-LightPick pick_punctual(Light light, vec3 point_world, float probability) {
+// probability: with which this light is sampled.
+LightSample sample_punctual(Light light, vec3 point_world, float probability) {
     IncidentLight arriving = incident_light(light, point_world);
     // Not `<=`: at the light itself, there are NaNs.
-    if (!(arriving.distance > 0.0)) return no_pick();
-    return LightPick(arriving.direction, arriving.distance, arriving.irradiance * (EMITTER_PI / probability), 0.0);
+    if (!(arriving.distance > 0.0)) return no_sample();
+    return LightSample(arriving.direction, arriving.distance, arriving.irradiance * (EMITTER_PI / probability), 0.0);
 }
 
 #endif

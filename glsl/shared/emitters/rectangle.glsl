@@ -3,7 +3,7 @@
 #define KDRAY_RECTANGLE
 
 #include "layout.glsl"
-#include "emitters/pick.glsl"
+#include "emitters/light_sample.glsl"
 
 // Distance at which a ray meets the front of a plane, in lengths of its direction; infinity if it does not.
 float hit_plane(AreaLight light, vec3 origin, vec3 direction) {
@@ -21,16 +21,16 @@ float hit_rectangle(AreaLight light, vec3 origin, vec3 direction) {
     return abs(u) <= 1.0 && abs(v) <= 1.0 ? t : uintBitsToFloat(0x7f800000u);
 }
 
-// Pdf per steradian of a direction in which a flat light is seen at a distance, if its points are picked uniformly.
+// Pdf per steradian of a direction in which a flat light is seen at a distance, if its points are sampled uniformly.
 float flat_pdf(AreaLight light, vec3 direction, float distance) {
     float facing = -dot(light.axis, direction) * light.area;
     return facing > 0.0 ? distance * distance / facing : 0.0;
 }
 
-// The distance up to which directions are picked by solid angle, as a multiple of half the diagonal. Farther away,
-// points that are picked uniformly on the rectangle are seen from directions that are as good.
+// The distance up to which directions are sampled by solid angle, as a multiple of half the diagonal. Farther away,
+// points that are sampled uniformly on the rectangle are seen from directions that are as good.
 #define NEAR_DIAGONALS 4.0
-// The least solid angle by which directions are picked, steradians. The rounding of a solid angle is below 1e-6.
+// The least solid angle by which directions are sampled, steradians. The rounding of a solid angle is below 1e-6.
 #define LEAST_SOLID_ANGLE 1.0e-3
 
 // A rectangle as a point sees it. The part of the rectangle from x0 to x is seen in a solid angle that is the turn at x
@@ -42,7 +42,7 @@ struct SeenRectangle {
     float height;
     // The turn at x0.
     float first_turn;
-    // The solid angle that the rectangle fills, steradians. It is 0 if directions are not picked by solid angle.
+    // The solid angle that the rectangle fills, steradians. It is 0 if directions are not sampled by solid angle.
     float solid_angle;
 };
 
@@ -99,23 +99,23 @@ vec3 vector_to_rectangle(AreaLight light, SeenRectangle seen, vec2 u) {
     return x * normalize(light.edge_u) + y * normalize(light.edge_v) - seen.height * light.axis;
 }
 
-// Pdf per steradian with which pick_rectangle picks a direction in which the rectangle is seen at a distance,
+// Pdf per steradian with which sample_rectangle samples a direction in which the rectangle is seen at a distance,
 // without the probability of the light.
 float rectangle_pdf(AreaLight light, vec3 point_world, vec3 direction, float distance) {
     SeenRectangle seen = seen_rectangle(light, point_world);
     return seen.solid_angle > 0.0 ? 1.0 / seen.solid_angle : flat_pdf(light, direction, distance);
 }
 
-LightPick pick_rectangle(AreaLight light, vec3 point_world, vec2 u) {
+LightSample sample_rectangle(AreaLight light, vec3 point_world, vec2 u) {
     SeenRectangle seen = seen_rectangle(light, point_world);
     if (seen.solid_angle > 0.0) {
         Towards way = towards(vec3(0.0), vector_to_rectangle(light, seen, u));
-        return pick_of_point(way, light.radiance, light.probability / seen.solid_angle);
+        return sample_of_point(way, light.radiance, light.probability / seen.solid_angle);
     }
     vec3 point = light.position + (2.0 * u.x - 1.0) * light.edge_u + (2.0 * u.y - 1.0) * light.edge_v;
     Towards way = towards(point_world, point);
     float pdf = light.probability * flat_pdf(light, way.direction, way.distance);
-    return pick_of_point(way, light.radiance, pdf);
+    return sample_of_point(way, light.radiance, pdf);
 }
 
 #endif

@@ -1,10 +1,10 @@
-// Spheres that shine outwards. A direction is picked uniformly in the cone in which the sphere is seen. From inside,
+// Spheres that shine outwards. A direction is sampled uniformly in the cone in which the sphere is seen. From inside,
 // there is no light. Twin of src/reference/emitters/sphere.rs.
 #ifndef KDRAY_SPHERE
 #define KDRAY_SPHERE
 
 #include "layout.glsl"
-#include "emitters/pick.glsl"
+#include "emitters/light_sample.glsl"
 
 // Distance at which a ray meets the sphere from outside, in lengths of its direction, a unit vector; infinity if it
 // does not. The distance of the centre from the ray's line is computed first, which keeps small and distant spheres
@@ -31,7 +31,7 @@ float sphere_pdf(AreaLight light, vec3 point_world) {
     return versine > 0.0 ? 1.0 / (2.0 * EMITTER_PI * versine) : 0.0;
 }
 
-LightPick pick_sphere(AreaLight light, vec3 point_world, vec2 u) {
+LightSample sample_sphere(AreaLight light, vec3 point_world, vec2 u) {
     Towards to_centre = towards(point_world, light.position);
     float versine = u.x * sphere_versine(light, light.position - point_world);
     float sine = sqrt(versine * (2.0 - versine));
@@ -46,7 +46,7 @@ LightPick pick_sphere(AreaLight light, vec3 point_world, vec2 u) {
     float aside = to_centre.distance * sine;
     float half_chord = sqrt(max(light.radius * light.radius - aside * aside, 0.0));
     float distance = max(to_centre.distance * (1.0 - versine) - half_chord, 0.0);
-    return pick_of_point(
+    return sample_of_point(
         Towards(direction, distance), light.radiance, light.probability * sphere_pdf(light, point_world)
     );
 }

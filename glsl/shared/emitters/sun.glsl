@@ -6,10 +6,10 @@
 
 #include "layout.glsl"
 #include "emitters/kinds.glsl"
-#include "emitters/pick.glsl"
+#include "emitters/light_sample.glsl"
 #include "emitters/area_light.glsl"
 
-// What the suns add to the environment in a direction. pdf: with which pick_light picks the direction because of
+// What the suns add to the environment in a direction. pdf: with which sample_light samples the direction because of
 // the suns, per steradian.
 struct SeenSuns {
     vec3 radiance;

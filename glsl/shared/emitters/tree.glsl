@@ -1,6 +1,6 @@
-// The light tree: a pick among many lights by what they may send to a point (Conty Estevez, Kulla: Importance Sampling
-// of Many Lights with Adaptive Tree Splitting, HPG 2018). The host builds it (src/world/light_tree.rs). Twin of
-// src/reference/emitters/tree.rs.
+// The light tree: a sample among many lights by what they may send to a point (Conty Estevez, Kulla: Importance
+// Sampling of Many Lights with Adaptive Tree Splitting, HPG 2018). The host builds it (src/world/light_tree.rs). Twin
+// of src/reference/emitters/tree.rs.
 //
 // Needs the words of textures (texture_words.glsl).
 #ifndef KDRAY_LIGHT_TREE
@@ -15,8 +15,8 @@ const float LEAST_SQUARED = 1.0e-30;
 // The step of a random number from which on the digits of another one continue it.
 const float COARSE_STEP = 1.0 / 4096.0;
 
-// A light that is picked, and the probability with which the tree picks it at this point.
-struct TreePick {
+// A light that is sampled, and the probability with which the tree samples it at this point.
+struct TreeSample {
     uint emitter_ix;
     float probability;
 };
@@ -54,15 +54,15 @@ float importance(LightNode node, vec3 point_world) {
     return cosine > node.cos_end ? node.intensity * cosine / largest : 0.0;
 }
 
-// The probability with which the left child of a node is picked.
+// The probability with which the left child of a node is sampled.
 float share_of_left(uint left_ix, uint right_ix, vec3 point_world) {
     float left = importance(light_node_at(left_ix), point_world);
     float sum = left + importance(light_node_at(right_ix), point_world);
     return sum > 0.0 ? left / sum : 0.5;
 }
 
-// Picks a light. u: in [0, 1). more: in [0, 1), continues u below the 24 bits that a float has.
-TreePick pick_in_tree(vec3 point_world, float u, float more) {
+// Samples a light. u: in [0, 1). more: in [0, 1), continues u below the 24 bits that a float has.
+TreeSample sample_in_tree(vec3 point_world, float u, float more) {
     uint ix = 0u;
     float probability = 1.0, smallest = 1.0 / 16777216.0;
     while ((load_texture_words(node_words_begin(ix) + 11u) & LIGHT_NODE_LEAF) == 0u) {
@@ -80,10 +80,10 @@ TreePick pick_in_tree(vec3 point_world, float u, float more) {
         u = min(u, ALMOST_ONE);
         probability *= share;
     }
-    return TreePick(load_texture_words(node_words_begin(ix) + 10u), probability);
+    return TreeSample(load_texture_words(node_words_begin(ix) + 10u), probability);
 }
 
-// The probability with which pick_in_tree picks the light of a leaf at a point.
+// The probability with which sample_in_tree samples the light of a leaf at a point.
 float tree_probability(vec3 point_world, uint leaf_ix) {
     uint ix = 0u;
     float probability = 1.0;

@@ -1,4 +1,4 @@
-// Triangles whose material emits light, to both sides. A point is picked uniformly on the area. Twin of
+// Triangles whose material emits light, to both sides. A point is sampled uniformly on the area. Twin of
 // src/reference/emitters/triangle.rs.
 //
 // Needs the binding `materials` (material.glsl) and the words of textures.
@@ -10,7 +10,7 @@
 #include "texture_words.glsl"
 #include "texture.glsl"
 #include "material.glsl"
-#include "emitters/pick.glsl"
+#include "emitters/light_sample.glsl"
 
 // The radiance that a triangle emits at barycentric weights of its second and third corner, by the largest level of
 // its texture. A surface without shading (`unlit`) emits nothing.
@@ -26,7 +26,7 @@ vec3 emission_at(uint triangle_ix, float u, float v) {
     return emitted * max(sample_finest(map, uv_at(triangle_ix, uv_set_of(map), u, v)).rgb, 0.0);
 }
 
-// Pdf per steradian of a direction in which the triangle is seen at a distance, if its points are picked uniformly.
+// Pdf per steradian of a direction in which the triangle is seen at a distance, if its points are sampled uniformly.
 float area_pdf(Triangle t, vec3 direction, float distance) {
     // Twice the area, times the cosine.
     float facing = abs(dot(cross(t.v1 - t.v0, t.v2 - t.v0), direction));
@@ -40,14 +40,14 @@ vec2 triangle_weights(vec2 u) {
     return u.y > u.x ? vec2(0.5 * u.x, u.y - 0.5 * u.x) : vec2(u.x - 0.5 * u.y, 0.5 * u.y);
 }
 
-// probability: with which this triangle is picked.
-LightPick pick_triangle(uint triangle_ix, vec3 point_world, vec2 u, float probability) {
+// probability: with which this triangle is sampled.
+LightSample sample_triangle(uint triangle_ix, vec3 point_world, vec2 u, float probability) {
     Triangle t = triangle_at(triangle_ix);
     vec2 weights = triangle_weights(u);
     vec3 point = t.v0 + weights.x * (t.v1 - t.v0) + weights.y * (t.v2 - t.v0);
     Towards way = towards(point_world, point);
     float pdf = probability * area_pdf(t, way.direction, way.distance);
-    return pick_of_point(way, emission_at(triangle_ix, weights.x, weights.y), pdf);
+    return sample_of_point(way, emission_at(triangle_ix, weights.x, weights.y), pdf);
 }
 
 #endif

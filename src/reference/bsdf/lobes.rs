@@ -43,7 +43,7 @@ pub(super) fn passing_share(material: &Material) -> f32 {
     material.transmission * (1.0 - material.metallic)
 }
 
-/// Whether all of the surface's lobes are perfectly smooth. Lights cannot be picked for it.
+/// Whether all of the surface's lobes are perfectly smooth. Lights cannot be sampled for it.
 pub fn is_smooth(material: &Material) -> bool {
     if material.flags & MATERIAL_UNLIT != 0 {
         return true;

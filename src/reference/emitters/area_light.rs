@@ -4,10 +4,10 @@
 use glam::{Vec2, Vec3};
 
 use super::{
-    disk::{hit_disk, pick_disk},
-    pick::LightPick,
-    rectangle::{flat_pdf, hit_rectangle, pick_rectangle, rectangle_pdf},
-    sphere::{hit_sphere, pick_sphere, sphere_pdf},
+    disk::{hit_disk, sample_disk},
+    light_sample::LightSample,
+    rectangle::{flat_pdf, hit_rectangle, rectangle_pdf, sample_rectangle},
+    sphere::{hit_sphere, sample_sphere, sphere_pdf},
     tree::tree_probability,
 };
 use crate::{
@@ -22,7 +22,7 @@ pub struct SeenLight {
     pub t: f32,
     /// Radiance that it emits.
     pub radiance: Vec3,
-    /// Pdf with which [`pick_light`](super::pick_light) picks the direction, per steradian.
+    /// Pdf with which [`sample_light`](super::sample_light) samples the direction, per steradian.
     pub pdf: f32,
 }
 
@@ -56,12 +56,12 @@ pub fn seen_light(inputs: &KernelInputs, origin: Vec3, direction: Vec3, t_max: f
     SeenLight { t: nearest, radiance: light.radiance, pdf: probability * pdf }
 }
 
-/// `probability`: with which this light is picked.
-pub(super) fn pick_area_light(light: AreaLight, point_world: Vec3, u: Vec2, probability: f32) -> LightPick {
+/// `probability`: with which this light is sampled.
+pub(super) fn sample_area_light(light: AreaLight, point_world: Vec3, u: Vec2, probability: f32) -> LightSample {
     let light = AreaLight { probability, ..light };
     match light.kind {
-        AREA_RECTANGLE => pick_rectangle(&light, point_world, u),
-        AREA_DISK => pick_disk(&light, point_world, u),
-        _ => pick_sphere(&light, point_world, u),
+        AREA_RECTANGLE => sample_rectangle(&light, point_world, u),
+        AREA_DISK => sample_disk(&light, point_world, u),
+        _ => sample_sphere(&light, point_world, u),
     }
 }

@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::{
-    pick::{LightPick, pick_of_point, towards},
+    light_sample::{LightSample, sample_of_point, towards},
     rectangle::{flat_pdf, hit_plane},
 };
 use crate::{layout::AreaLight, reference::turns::sin_cos_of_turns};
@@ -30,9 +30,9 @@ fn disk_point(u: Vec2) -> Vec2 {
     }
 }
 
-pub(super) fn pick_disk(light: &AreaLight, point_world: Vec3, u: Vec2) -> LightPick {
+pub(super) fn sample_disk(light: &AreaLight, point_world: Vec3, u: Vec2) -> LightSample {
     let place = light.radius * disk_point(u);
     let way = towards(point_world, light.position + place.x * light.edge_u + place.y * light.edge_v);
     let pdf = light.probability * flat_pdf(light, way.direction, way.distance);
-    pick_of_point(way, light.radiance, pdf)
+    sample_of_point(way, light.radiance, pdf)
 }

@@ -6,8 +6,8 @@ use std::f32::consts::{PI, TAU};
 use glam::{IVec2, Vec2, Vec3};
 
 use super::{
-    alias::pick_alias,
-    pick::{LightPick, Towards, pick_of_point},
+    alias::sample_alias,
+    light_sample::{LightSample, Towards, sample_of_point},
     sun::{seen_suns, sun_direction},
 };
 use crate::{
@@ -34,7 +34,7 @@ fn environment_place(map: &EnvironmentMap, direction: Vec3, aside: f32) -> Vec2 
 #[derive(Clone, Copy)]
 struct MapValue {
     radiance: Vec3,
-    /// Pdf with which the direction is picked if the environment without the suns is picked, per steradian.
+    /// Pdf with which the direction is sampled if the environment without the suns is sampled, per steradian.
     pdf: f32,
 }
 
@@ -64,7 +64,7 @@ fn map_value(map: &EnvironmentMap, place: Vec2, aside: f32) -> MapValue {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SeenEnvironment {
     pub radiance: Vec3,
-    /// Pdf with which [`pick_light`](super::pick_light) picks the direction because of them, per steradian.
+    /// Pdf with which [`sample_light`](super::sample_light) samples the direction because of them, per steradian.
     pub pdf: f32,
 }
 
@@ -102,11 +102,11 @@ fn ambient_from(emitters: &Emitters, direction: Vec3) -> Vec3 {
     if direction[emitters.up_axis] < 0.0 { emitters.ground_ambient } else { emitters.ambient }
 }
 
-fn pick_in_map(emitters: &Emitters, map: &EnvironmentMap, u: Vec2) -> LightPick {
+fn sample_in_map(emitters: &Emitters, map: &EnvironmentMap, u: Vec2) -> LightSample {
     let [n_columns, n_rows] = map.size;
-    let row = pick_alias(n_rows, |ix| map.rows[ix as usize].parts(), u.x, 0.0);
+    let row = sample_alias(n_rows, |ix| map.rows[ix as usize].parts(), u.x, 0.0);
     let first_column = row.ix * n_columns;
-    let column = pick_alias(n_columns, |ix| map.columns[(first_column + ix) as usize].parts(), u.y, 0.0);
+    let column = sample_alias(n_columns, |ix| map.columns[(first_column + ix) as usize].parts(), u.y, 0.0);
     // Between a pole and the middle of its row, there is no other row: the tent's half is a rectangle of half a texel.
     let is_at_pole = if row.rest < 0.5 { row.ix == 0 } else { row.ix == n_rows - 1 };
     let down = row.ix as f32 + if is_at_pole { row.rest - 0.5 } else { tent(row.rest) };
@@ -121,38 +121,44 @@ fn pick_in_map(emitters: &Emitters, map: &EnvironmentMap, u: Vec2) -> LightPick 
     let (sine, cosine) = sin_cos_of_turns(turns);
     let up = if is_upper { 1.0 - versine } else { versine - 1.0 };
     let direction = Vec3::new(aside * sine, up, -aside * cosine);
-    pick_at_place(emitters, map, direction, Vec2::new(right, down), aside)
+    sample_at_place(emitters, map, direction, Vec2::new(right, down), aside)
 }
 
 /// A direction that is uniform on the sphere.
-fn pick_any_direction(u: Vec2) -> Vec3 {
+fn sample_any_direction(u: Vec2) -> Vec3 {
     let up = 1.0 - 2.0 * u.x;
     let aside = 2.0 * (u.x * (1.0 - u.x)).max(0.0).sqrt();
     let (sine, cosine) = sin_cos_of_turns(u.y);
     Vec3::new(aside * sine, up, -aside * cosine)
 }
 
-/// The pick of a direction beyond the scene.
-fn pick_beyond(emitters: &Emitters, direction: Vec3, seen: SeenEnvironment) -> LightPick {
+/// The sample of a direction beyond the scene.
+fn sample_beyond(emitters: &Emitters, direction: Vec3, seen: SeenEnvironment) -> LightSample {
     let way = Towards { direction, distance: f32::INFINITY };
-    pick_of_point(way, seen.radiance + ambient_from(emitters, direction), seen.pdf)
+    sample_of_point(way, seen.radiance + ambient_from(emitters, direction), seen.pdf)
 }
 
-/// The pick of a direction whose place in the map is known. `aside`: the sine of the place's polar angle.
-pub fn pick_at_place(emitters: &Emitters, map: &EnvironmentMap, direction: Vec3, place: Vec2, aside: f32) -> LightPick {
-    pick_beyond(emitters, direction, with_suns(emitters, map_value(map, place, aside), direction))
+/// The sample of a direction whose place in the map is known. `aside`: the sine of the place's polar angle.
+pub fn sample_at_place(
+    emitters: &Emitters,
+    map: &EnvironmentMap,
+    direction: Vec3,
+    place: Vec2,
+    aside: f32,
+) -> LightSample {
+    sample_beyond(emitters, direction, with_suns(emitters, map_value(map, place, aside), direction))
 }
 
-/// Picks a direction of the environment. `u`: in [0, 1).
-pub fn pick_environment(emitters: &Emitters, u: Vec2) -> LightPick {
+/// Samples a direction of the environment. `u`: in [0, 1).
+pub fn sample_environment(emitters: &Emitters, u: Vec2) -> LightSample {
     if let Some(map) = &emitters.environment {
-        return pick_in_map(emitters, map, u);
+        return sample_in_map(emitters, map, u);
     }
-    let (direction, value) = (pick_any_direction(u), MapValue { radiance: emitters.background, pdf: UNIFORM });
-    pick_beyond(emitters, direction, with_suns(emitters, value, direction))
+    let (direction, value) = (sample_any_direction(u), MapValue { radiance: emitters.background, pdf: UNIFORM });
+    sample_beyond(emitters, direction, with_suns(emitters, value, direction))
 }
 
-pub(super) fn pick_sun(emitters: &Emitters, sun: &AreaLight, u: Vec2) -> LightPick {
+pub(super) fn sample_sun(emitters: &Emitters, sun: &AreaLight, u: Vec2) -> LightSample {
     let direction = sun_direction(sun, u);
-    pick_beyond(emitters, direction, seen_beyond(emitters, direction))
+    sample_beyond(emitters, direction, seen_beyond(emitters, direction))
 }

@@ -4,16 +4,16 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 
-use super::pick::LightPick;
+use super::light_sample::LightSample;
 use crate::{layout::Light, reference::light::incident_light};
 
-/// `probability`: with which this light is picked.
-pub fn pick_punctual(light: &Light, point_world: Vec3, probability: f32) -> LightPick {
+/// `probability`: with which this light is sampled.
+pub fn sample_punctual(light: &Light, point_world: Vec3, probability: f32) -> LightSample {
     let arriving = incident_light(light, point_world);
     // Not `<=`: at the light itself, there are NaNs.
     if !(arriving.distance > 0.0) {
-        return LightPick::NONE;
+        return LightSample::NONE;
     }
     let light = arriving.irradiance * (PI / probability);
-    LightPick { direction: arriving.direction, distance: arriving.distance, light, pdf: 0.0 }
+    LightSample { direction: arriving.direction, distance: arriving.distance, light, pdf: 0.0 }
 }

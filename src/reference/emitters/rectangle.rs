@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::pick::{LightPick, pick_of_point, towards};
+use super::light_sample::{LightSample, sample_of_point, towards};
 use crate::layout::AreaLight;
 
 /// Distance at which a ray meets the front of a plane, in lengths of its direction; infinity if it does not.
@@ -21,16 +21,16 @@ pub(super) fn hit_rectangle(light: &AreaLight, origin: Vec3, direction: Vec3) ->
     if u.abs() <= 1.0 && v.abs() <= 1.0 { t } else { f32::INFINITY }
 }
 
-/// Pdf per steradian of a direction in which a flat light is seen at a distance, if its points are picked
+/// Pdf per steradian of a direction in which a flat light is seen at a distance, if its points are sampled
 /// uniformly.
 pub(super) fn flat_pdf(light: &AreaLight, direction: Vec3, distance: f32) -> f32 {
     let facing = -light.axis.dot(direction) * light.area;
     if facing > 0.0 { distance * distance / facing } else { 0.0 }
 }
 
-/// The distance up to which directions are picked by solid angle, as a multiple of half the diagonal.
+/// The distance up to which directions are sampled by solid angle, as a multiple of half the diagonal.
 const NEAR_DIAGONALS: f32 = 4.0;
-/// The least solid angle by which directions are picked, steradians.
+/// The least solid angle by which directions are sampled, steradians.
 const LEAST_SOLID_ANGLE: f32 = 1e-3;
 
 /// A rectangle as a point sees it. The twin says what a turn is.
@@ -44,7 +44,7 @@ struct SeenRectangle {
     height: f32,
     /// The turn at the first end along `edge_u`.
     first_turn: f32,
-    /// The solid angle that the rectangle fills, steradians. It is 0 if directions are not picked by solid angle.
+    /// The solid angle that the rectangle fills, steradians. It is 0 if directions are not sampled by solid angle.
     solid_angle: f32,
 }
 
@@ -97,21 +97,21 @@ fn vector_to_rectangle(light: &AreaLight, seen: &SeenRectangle, u: Vec2) -> Vec3
     x * light.edge_u.normalize() + y * light.edge_v.normalize() - seen.height * light.axis
 }
 
-/// Pdf per steradian with which [`pick_rectangle`] picks a direction in which the rectangle is seen at a distance,
+/// Pdf per steradian with which [`sample_rectangle`] samples a direction in which the rectangle is seen at a distance,
 /// without the probability of the light.
 pub(super) fn rectangle_pdf(light: &AreaLight, point_world: Vec3, direction: Vec3, distance: f32) -> f32 {
     let seen = seen_rectangle(light, point_world);
     if seen.solid_angle > 0.0 { 1.0 / seen.solid_angle } else { flat_pdf(light, direction, distance) }
 }
 
-pub(super) fn pick_rectangle(light: &AreaLight, point_world: Vec3, u: Vec2) -> LightPick {
+pub(super) fn sample_rectangle(light: &AreaLight, point_world: Vec3, u: Vec2) -> LightSample {
     let seen = seen_rectangle(light, point_world);
     if seen.solid_angle > 0.0 {
         let way = towards(Vec3::ZERO, vector_to_rectangle(light, &seen, u));
-        return pick_of_point(way, light.radiance, light.probability / seen.solid_angle);
+        return sample_of_point(way, light.radiance, light.probability / seen.solid_angle);
     }
     let point = light.position + (2.0 * u.x - 1.0) * light.edge_u + (2.0 * u.y - 1.0) * light.edge_v;
     let way = towards(point_world, point);
     let pdf = light.probability * flat_pdf(light, way.direction, way.distance);
-    pick_of_point(way, light.radiance, pdf)
+    sample_of_point(way, light.radiance, pdf)
 }

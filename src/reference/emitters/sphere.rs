@@ -4,7 +4,7 @@ use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3, vec3};
 
-use super::pick::{LightPick, Towards, around, pick_of_point, towards};
+use super::light_sample::{LightSample, Towards, around, sample_of_point, towards};
 use crate::layout::AreaLight;
 
 /// Distance at which a ray meets the sphere from outside, in lengths of its direction, a unit vector; infinity if it
@@ -30,7 +30,7 @@ pub(super) fn sphere_pdf(light: &AreaLight, point_world: Vec3) -> f32 {
     if versine > 0.0 { 1.0 / (2.0 * PI * versine) } else { 0.0 }
 }
 
-pub(super) fn pick_sphere(light: &AreaLight, point_world: Vec3, u: Vec2) -> LightPick {
+pub(super) fn sample_sphere(light: &AreaLight, point_world: Vec3, u: Vec2) -> LightSample {
     let to_centre = towards(point_world, light.position);
     let versine = u.x * sphere_versine(light, light.position - point_world);
     let sine = (versine * (2.0 - versine)).sqrt();
@@ -46,5 +46,5 @@ pub(super) fn pick_sphere(light: &AreaLight, point_world: Vec3, u: Vec2) -> Ligh
     let half_chord = (light.radius * light.radius - aside * aside).max(0.0).sqrt();
     let distance = (to_centre.distance * (1.0 - versine) - half_chord).max(0.0);
     let pdf = light.probability * sphere_pdf(light, point_world);
-    pick_of_point(Towards { direction, distance }, light.radiance, pdf)
+    sample_of_point(Towards { direction, distance }, light.radiance, pdf)
 }

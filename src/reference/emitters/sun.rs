@@ -2,14 +2,14 @@
 
 use glam::{Vec2, Vec3};
 
-use super::pick::around;
+use super::light_sample::around;
 use crate::{layout::AreaLight, world::Emitters};
 
 /// What the suns add to the environment in a direction.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SeenSuns {
     pub radiance: Vec3,
-    /// The suns' part of the pdf with which the direction is picked, per steradian.
+    /// The suns' part of the pdf with which the direction is sampled, per steradian.
     pub pdf: f32,
 }
 

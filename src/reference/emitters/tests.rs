@@ -1,10 +1,10 @@
-//! Tests of the emitters against closed forms, and of pdfs against picks.
+//! Tests of the emitters against closed forms, and of pdfs against samples.
 
 use std::{f32::consts::PI, path::Path};
 
 use glam::{DVec3, Vec3, vec3};
 
-use super::{LightPick, ambient_radiance, emission_at, emission_pdf, pick_light, seen_environment, seen_light};
+use super::{LightSample, ambient_radiance, emission_at, emission_pdf, sample_light, seen_environment, seen_light};
 use crate::{
     accel::kdtree::BuildOptions,
     frame::RenderOptions,
@@ -50,18 +50,18 @@ pub(super) fn emitting_square(scene: &mut FlatScene) {
     scene.material_names = vec![String::new(); 2];
 }
 
-/// The random numbers of `n` picks: points of a sequence that fills the cube evenly.
+/// The random numbers of `n` samples: points of a sequence that fills the cube evenly.
 pub(super) fn numbers(n: usize) -> impl Iterator<Item = Vec3> {
     const STEPS: DVec3 = DVec3::new(0.819_172_513_4, 0.671_043_606_7, 0.549_700_477_9);
     (0..n).map(|i| (STEPS * i as f64 + 0.5).fract().as_vec3().min(Vec3::splat(0.999_999)))
 }
 
-/// The irradiance that picks estimate at a point of a surface.
+/// The irradiance that samples estimate at a point of a surface.
 pub(super) fn irradiance(inputs: &KernelInputs, point: Vec3, normal: Vec3) -> Vec3 {
     const N: usize = 100_000;
     let sum: DVec3 = numbers(N)
         .map(|u| {
-            let LightPick { direction, light, .. } = pick_light(inputs, point, u);
+            let LightSample { direction, light, .. } = sample_light(inputs, point, u);
             (light * direction.dot(normal).max(0.0)).as_dvec3()
         })
         .sum();
@@ -117,8 +117,8 @@ fn light_without_a_size_falls_with_the_squared_distance() {
     let inputs = inputs_of(&world, &frame);
     assert_near(irradiance(&inputs, Vec3::ZERO, Vec3::Z).x, PI * 3.0 / 4.0, 1e-4);
     assert_near(irradiance(&inputs, vec3(0.0, 0.0, -2.0), Vec3::Z).x, PI * 3.0 / 16.0, 1e-4);
-    assert_eq!(pick_light(&inputs, vec3(0.0, 0.0, 2.0), Vec3::splat(0.5)), LightPick::NONE);
-    assert_eq!(pick_light(&inputs, Vec3::ZERO, Vec3::splat(0.5)).pdf, 0.0);
+    assert_eq!(sample_light(&inputs, vec3(0.0, 0.0, 2.0), Vec3::splat(0.5)), LightSample::NONE);
+    assert_eq!(sample_light(&inputs, Vec3::ZERO, Vec3::splat(0.5)).pdf, 0.0);
 }
 
 /// Lights, and the red irradiance that they cause at the origin on a surface that faces +z.
@@ -169,7 +169,7 @@ fn solid_angle([a, b, c]: [DVec3; 3]) -> f64 {
 /// From nearby, all directions to a rectangle have the same pdf, which is that of the solid angle. From far away,
 /// and from where it is seen edge-on, the pdfs are those of points on its area. Both are finite.
 #[test]
-fn rectangles_are_picked_by_solid_angle_from_nearby() {
+fn rectangles_are_sampled_by_solid_angle_from_nearby() {
     let world = world(vec![rectangle()]);
     let frame = frame(&world);
     let inputs = inputs_of(&world, &frame);
@@ -181,13 +181,13 @@ fn rectangles_are_picked_by_solid_angle_from_nearby() {
         (vec3(3.5, 0.0, 1.9999), false),
         (vec3(0.0, 0.0, -14.0), false),
     ] {
-        let picks: Vec<_> = numbers(500).map(|u| pick_light(&inputs, point, u)).collect();
-        let pdfs = picks.iter().map(|pick| pick.pdf).filter(|pdf| *pdf > 0.0);
+        let samples: Vec<_> = numbers(500).map(|u| sample_light(&inputs, point, u)).collect();
+        let pdfs = samples.iter().map(|sample| sample.pdf).filter(|pdf| *pdf > 0.0);
         let (least, most) = pdfs.fold((f32::INFINITY, 0.0_f32), |(least, most), d| (least.min(d), most.max(d)));
         assert_eq!(most / least < 1.0001, is_near, "{point}: {least} to {most}");
-        for pick in picks.iter().filter(|pick| pick.pdf > 0.0) {
-            assert!(pick.direction.is_normalized() && (pick.pdf / most - 1.0).is_finite(), "{pick:?}");
-            let at = point + pick.distance * pick.direction;
+        for sample in samples.iter().filter(|sample| sample.pdf > 0.0) {
+            assert!(sample.direction.is_normalized() && (sample.pdf / most - 1.0).is_finite(), "{sample:?}");
+            let at = point + sample.distance * sample.direction;
             let beyond = (at.abs() - vec3(3.0, 2.0, 2.0)).max_element();
             assert!(beyond < 1e-4 && (at.z - 2.0).abs() < 1e-4, "{point}: {at} is not on the rectangle");
         }
@@ -197,7 +197,10 @@ fn rectangles_are_picked_by_solid_angle_from_nearby() {
             assert_near(1.0 / most, (solid_angle([a, b, c]) + solid_angle([a, c, d])) as f32, 1e-4);
         }
     }
-    assert!(numbers(100).all(|u| pick_light(&inputs, vec3(0.0, 0.0, 2.5), u) == LightPick::NONE), "the back is dark");
+    assert!(
+        numbers(100).all(|u| sample_light(&inputs, vec3(0.0, 0.0, 2.5), u) == LightSample::NONE),
+        "the back is dark"
+    );
 }
 
 #[test]
@@ -213,9 +216,9 @@ fn pdfs_of_area_lights_are_whole() {
     }
 }
 
-/// Picked directions are distributed by the pdf that is stated for rays that meet the light.
+/// Sampled directions are distributed by the pdf that is stated for rays that meet the light.
 #[test]
-fn picks_have_the_stated_pdf() {
+fn samples_have_the_stated_pdf() {
     let worlds = [
         world(vec![rectangle()]),
         world(vec![disk()]),
@@ -229,8 +232,8 @@ fn picks_have_the_stated_pdf() {
         for point in [Vec3::ZERO, vec3(0.3, -0.5, 1.0)] {
             let mut random = Uniform(ix as u64);
             let mut sample = || {
-                let pick = pick_light(&inputs, point, random.point());
-                (pick != LightPick::NONE).then_some(pick.direction)
+                let sample = sample_light(&inputs, point, random.point());
+                (sample != LightSample::NONE).then_some(sample.direction)
             };
             let pdf = |direction| {
                 let seen = seen_light(&inputs, point, direction, f32::INFINITY).pdf;
@@ -268,17 +271,17 @@ fn pdfs_of_environments_are_whole() {
         let frame = frame(&world);
         let inputs = inputs_of(&world, &frame);
         assert_near(over_sphere(|direction| seen_environment(&inputs, direction).pdf), 1.0, 5e-3);
-        // Picks find all the light that there is.
+        // Samples find all the light that there is.
         let found = irradiance(&inputs, Vec3::ZERO, Vec3::Y).x;
         let expected = over_sphere(|it| seen_environment(&inputs, it).radiance.x * it.y.max(0.0));
         assert_near(found, expected, 2e-2);
     }
 }
 
-/// Light from a map is picked in proportion to its luminance, also between a bright texel and its dark neighbours. So
-/// what a pick brings hardly varies: by as much as the sine does from row to row.
+/// Light from a map is sampled in proportion to its luminance, also between a bright texel and its dark neighbours. So
+/// what a sample brings hardly varies: by as much as the sine does from row to row.
 #[test]
-fn picks_of_a_map_bring_the_same_light() {
+fn samples_of_a_map_bring_the_same_light() {
     let mut colours = vec![Vec3::splat(0.25); 64 * 32];
     colours[12 * 64 + 20] = Vec3::splat(8000.0);
     colours[20 * 64 + 63] = vec3(0.0, 500.0, 0.0);
@@ -287,16 +290,16 @@ fn picks_of_a_map_bring_the_same_light() {
     let frame = frame(&world);
     let inputs = inputs_of(&world, &frame);
     let found: Vec<f32> = numbers(20_000)
-        .map(|u| pick_light(&inputs, Vec3::ZERO, u))
-        .map(|pick| pick.light.dot(vec3(0.2126, 0.7152, 0.0722)))
+        .map(|u| sample_light(&inputs, Vec3::ZERO, u))
+        .map(|sample| sample.light.dot(vec3(0.2126, 0.7152, 0.0722)))
         .collect();
     let mean = found.iter().sum::<f32>() / found.len() as f32;
     let worst = found.iter().map(|light| (light / mean - 1.0).abs()).fold(0.0, f32::max);
-    assert!(worst < 0.06, "one pick brings {worst} more or less");
+    assert!(worst < 0.06, "one sample brings {worst} more or less");
 }
 
 #[test]
-fn picks_have_the_pdf_of_what_is_seen() {
+fn samples_have_the_pdf_of_what_is_seen() {
     let (radiance, radius) = (Vec3::splat(3.0), 1.0);
     let lights = vec![
         Light::Rectangle { position: vec3(-9.0, 0.0, 2.0), edge_u: 2.0 * Vec3::Y, edge_v: 3.0 * Vec3::X, radiance },
@@ -314,27 +317,27 @@ fn picks_have_the_pdf_of_what_is_seen() {
     let point = vec3(6.0, 0.2, -4.0);
     let (mut n_shapes, mut n_beyond, mut n_triangles, mut n_borders) = (0, 0, 0, 0);
     for u in numbers(20_000) {
-        let pick = pick_light(&inputs, point, u);
-        let seen = seen_light(&inputs, point, pick.direction, f32::INFINITY);
-        if pick == LightPick::NONE {
+        let sample = sample_light(&inputs, point, u);
+        let seen = seen_light(&inputs, point, sample.direction, f32::INFINITY);
+        if sample == LightSample::NONE {
             continue;
         }
-        let pdf = if pick.distance.is_infinite() {
+        let pdf = if sample.distance.is_infinite() {
             n_beyond += 1;
-            seen_environment(&inputs, pick.direction).pdf
-        } else if (seen.t - pick.distance).abs() < 1e-3 * pick.distance {
+            seen_environment(&inputs, sample.direction).pdf
+        } else if (seen.t - sample.distance).abs() < 1e-3 * sample.distance {
             n_shapes += 1;
             seen.pdf
         } else {
             n_triangles += 1;
-            let pdfs = [0, 1, 2].map(|ix| emission_pdf(&inputs, ix, point, pick.direction, pick.distance));
+            let pdfs = [0, 1, 2].map(|ix| emission_pdf(&inputs, ix, point, sample.direction, sample.distance));
             assert_eq!(pdfs[0], 0.0);
             // Both triangles are in one plane and have the same size.
             pdfs[1]
         };
-        if (pdf - pick.pdf).abs() > 1e-2 * pick.pdf {
+        if (pdf - sample.pdf).abs() > 1e-2 * sample.pdf {
             // At the border of two texels and of the sun, rounding decides.
-            assert!(pick.distance.is_infinite(), "{u}: {pdf}, {pick:?}");
+            assert!(sample.distance.is_infinite(), "{u}: {pdf}, {sample:?}");
             n_borders += 1;
         }
     }
@@ -350,9 +353,9 @@ fn nearer_lights_hide_what_is_behind_them() {
     let world = world(vec![behind, sphere()]);
     let frame = frame(&world);
     let inputs = inputs_of(&world, &frame);
-    assert!(numbers(500).all(|u| pick_light(&inputs, Vec3::ZERO, u).distance < 3.0));
+    assert!(numbers(500).all(|u| sample_light(&inputs, Vec3::ZERO, u).distance < 3.0));
     // Beside the sphere, both are seen.
-    assert!(numbers(500).any(|u| pick_light(&inputs, vec3(5.0, 0.0, 0.0), u).distance > 9.0));
+    assert!(numbers(500).any(|u| sample_light(&inputs, vec3(5.0, 0.0, 0.0), u).distance > 9.0));
 }
 
 #[test]
@@ -422,12 +425,12 @@ fn texels_that_are_no_radiance_are_mended() {
 }
 
 #[test]
-fn nothing_is_picked_where_there_is_no_light() {
+fn nothing_is_sampled_where_there_is_no_light() {
     let black = Light::Sphere { position: Vec3::ONE, radius: 0.0, radiance: Vec3::ONE };
     let world = world(vec![black, Light::Point { position: Vec3::ONE, intensity: Vec3::ZERO }]);
     let frame = frame(&world);
     let inputs = inputs_of(&world, &frame);
-    assert!(numbers(100).all(|u| pick_light(&inputs, Vec3::ZERO, u) == LightPick::NONE));
+    assert!(numbers(100).all(|u| sample_light(&inputs, Vec3::ZERO, u) == LightSample::NONE));
     assert!(world.scene().area_lights.is_empty());
     assert_eq!(self::world(vec![disk()]).scene().area_lights.len(), 1);
 }

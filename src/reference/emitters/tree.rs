@@ -1,5 +1,5 @@
-//! The light tree: a pick among many lights by what they may send to a point. Twin of `emitters/tree.glsl`, which names
-//! the source.
+//! The light tree: a sample among many lights by what they may send to a point. Twin of `emitters/tree.glsl`, which
+//! names the source.
 
 use glam::Vec3;
 
@@ -11,9 +11,9 @@ const LEAST_SQUARED: f32 = 1.0e-30;
 /// The step of a random number below which the digits of another one continue it.
 const COARSE_STEP: f32 = 1.0 / 4096.0;
 
-/// A light that is picked, and the probability with which the tree picks it at this point.
+/// A light that is sampled, and the probability with which the tree samples it at this point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TreePick {
+pub struct TreeSample {
     pub emitter_ix: u32,
     pub probability: f32,
 }
@@ -43,15 +43,15 @@ pub fn importance(node: &LightNode, point_world: Vec3) -> f32 {
     if cosine > node.cos_end { node.intensity * cosine / largest } else { 0.0 }
 }
 
-/// The probability with which the left child of a node is picked.
+/// The probability with which the left child of a node is sampled.
 fn share_of_left(nodes: &[LightNode], left_ix: usize, right_ix: usize, point_world: Vec3) -> f32 {
     let (left, right) = (importance(&nodes[left_ix], point_world), importance(&nodes[right_ix], point_world));
     let sum = left + right;
     if sum > 0.0 { left / sum } else { 0.5 }
 }
 
-/// Picks a light. `u` is in [0, 1), and `more`, also in [0, 1), continues it below the 24 bits that a float has.
-pub fn pick_in_tree(nodes: &[LightNode], point_world: Vec3, mut u: f32, mut more: f32) -> TreePick {
+/// Samples a light. `u` is in [0, 1), and `more`, also in [0, 1), continues it below the 24 bits that a float has.
+pub fn sample_in_tree(nodes: &[LightNode], point_world: Vec3, mut u: f32, mut more: f32) -> TreeSample {
     let (mut ix, mut probability, mut step) = (0, 1.0, 1.0 / 16_777_216.0);
     while nodes[ix].flags & LIGHT_NODE_LEAF == 0 {
         let right_ix = nodes[ix].next as usize;
@@ -68,10 +68,10 @@ pub fn pick_in_tree(nodes: &[LightNode], point_world: Vec3, mut u: f32, mut more
         u = u.min(ALMOST_ONE);
         probability *= share;
     }
-    TreePick { emitter_ix: nodes[ix].next, probability }
+    TreeSample { emitter_ix: nodes[ix].next, probability }
 }
 
-/// The probability with which [`pick_in_tree`] picks the light of a leaf at a point.
+/// The probability with which [`sample_in_tree`] samples the light of a leaf at a point.
 pub fn tree_probability(nodes: &[LightNode], point_world: Vec3, leaf_ix: u32) -> f32 {
     let (leaf_ix, mut ix, mut probability) = (leaf_ix as usize, 0, 1.0);
     while ix != leaf_ix {

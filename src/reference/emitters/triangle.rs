@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::pick::{LightPick, MOST_LIGHT, pick_of_point, towards};
+use super::light_sample::{LightSample, MOST_LIGHT, sample_of_point, towards};
 use crate::{
     layout::{MATERIAL_UNLIT, NO_TEXTURE, Triangle},
     reference::{
@@ -29,7 +29,7 @@ pub fn emission_at(inputs: &KernelInputs, triangle_ix: u32, u: f32, v: f32) -> V
     material.ke * sample_texture(&textures.texels, map, uv, 0.0).truncate().max(Vec3::ZERO)
 }
 
-/// Pdf per steradian of a direction in which the triangle is seen at a distance, if its points are picked
+/// Pdf per steradian of a direction in which the triangle is seen at a distance, if its points are sampled
 /// uniformly.
 pub(super) fn area_pdf(t: &Triangle, direction: Vec3, distance: f32) -> f32 {
     // Twice the area, times the cosine.
@@ -43,18 +43,18 @@ fn triangle_weights(u: Vec2) -> Vec2 {
     if u.y > u.x { Vec2::new(0.5 * u.x, u.y - 0.5 * u.x) } else { Vec2::new(u.x - 0.5 * u.y, 0.5 * u.y) }
 }
 
-/// `probability`: with which this triangle is picked.
-pub(super) fn pick_triangle(
+/// `probability`: with which this triangle is sampled.
+pub(super) fn sample_triangle(
     inputs: &KernelInputs,
     triangle_ix: u32,
     point_world: Vec3,
     u: Vec2,
     probability: f32,
-) -> LightPick {
+) -> LightSample {
     let t = &inputs.triangles[triangle_ix as usize];
     let weights = triangle_weights(u);
     let point = t.v0 + weights.x * (t.v1 - t.v0) + weights.y * (t.v2 - t.v0);
     let way = towards(point_world, point);
     let pdf = probability * area_pdf(t, way.direction, way.distance);
-    pick_of_point(way, emission_at(inputs, triangle_ix, weights.x, weights.y), pdf)
+    sample_of_point(way, emission_at(inputs, triangle_ix, weights.x, weights.y), pdf)
 }

@@ -1,5 +1,5 @@
-//! The picks of sixteen directions of the environment's map. They are those of the reference's `pick_environment`, bit
-//! for bit.
+//! The samples of sixteen directions of the environment's map. They are those of the reference's `sample_environment`,
+//! bit for bit.
 
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 use glam::{Vec2, vec3};
@@ -10,21 +10,21 @@ use super::{
     vec3x16::{greater, lesser},
 };
 use crate::{
-    reference::emitters::{LightPick, alias::ALMOST_ONE, environment::pick_at_place},
+    reference::emitters::{LightSample, alias::ALMOST_ONE, environment::sample_at_place},
     world::{AliasEntry, Emitters, EnvironmentMap},
 };
 
-/// The results of sixteen picks from alias tables.
-struct AliasPicks<S: Simd> {
+/// The results of sixteen samples from alias tables.
+struct AliasSamples<S: Simd> {
     /// The indices of the entries, as floats.
     ix: f32x16<S>,
     rest: f32x16<S>,
 }
 
-/// Picks from the tables of sixteen lanes, each of which has `n` entries. `first`: where each lane's table begins in
+/// Samples from the tables of sixteen lanes, each of which has `n` entries. `first`: where each lane's table begins in
 /// `entries`.
 #[inline(always)]
-fn pick_alias<S: Simd>(entries: &[AliasEntry], first: &[u32; LANES], n: u32, u: f32x16<S>) -> AliasPicks<S> {
+fn sample_alias<S: Simd>(entries: &[AliasEntry], first: &[u32; LANES], n: u32, u: f32x16<S>) -> AliasSamples<S> {
     let simd = u.simd;
     let almost_one = f32x16::splat(simd, ALMOST_ONE);
     let scaled = u * n as f32;
@@ -38,7 +38,7 @@ fn pick_alias<S: Simd>(entries: &[AliasEntry], first: &[u32; LANES], n: u32, u: 
     let (threshold, alias) = (f32x16::load_array(simd, thresholds), f32x16::load_array(simd, aliases));
     let is_own = rest.simd_lt(threshold);
     let rest = is_own.select(rest / threshold, (rest - threshold) / (1.0 - threshold));
-    AliasPicks { ix: is_own.select(ix, alias), rest: lesser(rest, almost_one) }
+    AliasSamples { ix: is_own.select(ix, alias), rest: lesser(rest, almost_one) }
 }
 
 /// Does what the reference's `tent` does.
@@ -58,12 +58,12 @@ struct Places {
 #[inline(always)]
 fn places<S: Simd>(simd: S, map: &EnvironmentMap, [ux, uy]: [&[f32; LANES]; 2]) -> Places {
     let [n_columns, n_rows] = map.size;
-    let row = pick_alias(&map.rows, &[0; LANES], n_rows, f32x16::load_array_ref(simd, ux));
+    let row = sample_alias(&map.rows, &[0; LANES], n_rows, f32x16::load_array_ref(simd, ux));
     let mut first_columns = [0; LANES];
     for (first, row_ix) in first_columns.iter_mut().zip(row.ix.to_array()) {
         *first = row_ix as u32 * n_columns;
     }
-    let column = pick_alias(&map.columns, &first_columns, n_columns, f32x16::load_array_ref(simd, uy));
+    let column = sample_alias(&map.columns, &first_columns, n_columns, f32x16::load_array_ref(simd, uy));
     let is_above = row.rest.simd_lt(0.5);
     let is_last = row.ix.simd_eq((n_rows - 1) as f32);
     let is_at_pole = (is_above & row.ix.simd_eq(0.0)) | (!is_above & is_last);
@@ -85,17 +85,17 @@ fn places<S: Simd>(simd: S, map: &EnvironmentMap, [ux, uy]: [&[f32; LANES]; 2]) 
     }
 }
 
-/// Returns the picks for sixteen pairs of random numbers.
-pub fn environment_picks(
+/// Returns the samples for sixteen pairs of random numbers.
+pub fn environment_samples(
     level: Level,
     emitters: &Emitters,
     map: &EnvironmentMap,
     u: [&[f32; LANES]; 2],
-) -> [LightPick; LANES] {
+) -> [LightSample; LANES] {
     let Places { right, down, aside, direction: [x, y, z] } = dispatch!(level, simd => places(simd, map, u));
     std::array::from_fn(|lane| {
         let (place, direction) = (Vec2::new(right[lane], down[lane]), vec3(x[lane], y[lane], z[lane]));
-        pick_at_place(emitters, map, direction, place, aside[lane])
+        sample_at_place(emitters, map, direction, place, aside[lane])
     })
 }
 
@@ -108,7 +108,7 @@ mod tests {
     use super::*;
     use crate::{
         accel::kdtree::BuildOptions,
-        reference::{chi_square::Uniform, emitters::pick_environment},
+        reference::{chi_square::Uniform, emitters::sample_environment},
         scene::{Environment, Light, Scene},
         world::{FlatScene, World},
     };
@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn picks_are_those_of_the_reference() {
+    fn samples_are_those_of_the_reference() {
         let mut random = Uniform(4);
         for (size, has_sun) in [([1, 1], false), ([2, 1], true), ([7, 5], false), ([64, 33], true)] {
             let world = world(size, has_sun, &mut random);
@@ -141,10 +141,10 @@ mod tests {
                     (u[0][lane], u[1][lane]) = (at_bound(point.x, 0), at_bound(point.y, 2));
                 }
                 for level in [Level::new(), Level::baseline()] {
-                    let picks = environment_picks(level, emitters, map, [&u[0], &u[1]]);
-                    for (lane, pick) in picks.iter().enumerate() {
+                    let samples = environment_samples(level, emitters, map, [&u[0], &u[1]]);
+                    for (lane, sample) in samples.iter().enumerate() {
                         let at = Vec2::new(u[0][lane], u[1][lane]);
-                        assert_eq!(*pick, pick_environment(emitters, at), "{size:?} {at}");
+                        assert_eq!(*sample, sample_environment(emitters, at), "{size:?} {at}");
                     }
                 }
             }

@@ -1,4 +1,4 @@
-// What `pick_light` returns, whichever kind of emitter was picked. Twin of src/reference/emitters/pick.rs.
+// What `sample_light` returns, whichever kind of emitter was sampled. Twin of src/reference/emitters/light_sample.rs.
 #ifndef KDRAY_PICK
 #define KDRAY_PICK
 
@@ -9,21 +9,21 @@ const float EMITTER_PI = 3.14159265;
 const float MOST_LIGHT = 1.0e30;
 
 // A direction from which light may come.
-struct LightPick {
+struct LightSample {
     // Unit vector from the point, and the distance up to which the way must be free, world units (infinity for what is
     // beyond the scene).
     vec3 direction;
     float distance;
     // Radiance divided by `pdf`. Of lights without a size: irradiance on a facing surface, divided by the
-    // probability of the pick. Either is multiplied by f |cos| to give the reflected radiance. 0: there is no light.
+    // probability of the sample. Either is multiplied by f |cos| to give the reflected radiance. 0: there is no light.
     vec3 light;
     // Pdf of the direction, per steradian, the probability of the emitter included. It is 0 for lights without a
     // size, which no ray can hit.
     float pdf;
 };
 
-LightPick no_pick() {
-    return LightPick(vec3(0.0), 0.0, vec3(0.0), 0.0);
+LightSample no_sample() {
+    return LightSample(vec3(0.0), 0.0, vec3(0.0), 0.0);
 }
 
 // Unit vector and distance to a point; the distance is 0 if there is no direction.
@@ -39,10 +39,10 @@ Towards towards(vec3 from, vec3 to) {
     return Towards(way / distance, distance);
 }
 
-// The pick of a point from which light of this radiance comes.
-LightPick pick_of_point(Towards way, vec3 radiance, float pdf) {
-    if (!(pdf > 0.0 && pdf < MOST_LIGHT)) return no_pick();
-    return LightPick(way.direction, way.distance, radiance / pdf, pdf);
+// The sample of a point from which light of this radiance comes.
+LightSample sample_of_point(Towards way, vec3 radiance, float pdf) {
+    if (!(pdf > 0.0 && pdf < MOST_LIGHT)) return no_sample();
+    return LightSample(way.direction, way.distance, radiance / pdf, pdf);
 }
 
 // A vector that is `cosine` along the axis, and `sine` aside of it at an azimuth in turns. The three axes are

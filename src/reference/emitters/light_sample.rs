@@ -1,4 +1,5 @@
-//! What [`pick_light`](super::pick_light) returns, whichever kind of emitter was picked. Twin of `emitters/pick.glsl`.
+//! What [`sample_light`](super::sample_light) returns, whichever kind of emitter was sampled. Twin of
+//! `emitters/light_sample.glsl`.
 
 use glam::Vec3;
 
@@ -9,21 +10,21 @@ pub(super) const MOST_LIGHT: f32 = 1.0e30;
 
 /// A direction from which light may come.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LightPick {
+pub struct LightSample {
     /// Unit vector from the point.
     pub direction: Vec3,
     /// Distance up to which the way must be free, world units (infinity for what is beyond the scene).
     pub distance: f32,
     /// Radiance divided by `pdf`. Of lights without a size: irradiance on a facing surface, divided by the
-    /// probability of the pick. Either is multiplied by f |cos| to give the reflected radiance. 0: there is no light.
+    /// probability of the sample. Either is multiplied by f |cos| to give the reflected radiance. 0: there is no light.
     pub light: Vec3,
     /// Pdf of the direction, per steradian, the probability of the emitter included. It is 0 for lights without a
     /// size, which no ray can hit.
     pub pdf: f32,
 }
 
-impl LightPick {
-    /// The pick where there is no light.
+impl LightSample {
+    /// The sample where there is no light.
     pub const NONE: Self = Self { direction: Vec3::ZERO, distance: 0.0, light: Vec3::ZERO, pdf: 0.0 };
 }
 
@@ -44,12 +45,12 @@ pub(super) fn towards(from: Vec3, to: Vec3) -> Towards {
     Towards { direction: way / distance, distance }
 }
 
-/// The pick of a point from which light of this radiance comes.
-pub(super) fn pick_of_point(way: Towards, radiance: Vec3, pdf: f32) -> LightPick {
+/// The sample of a point from which light of this radiance comes.
+pub(super) fn sample_of_point(way: Towards, radiance: Vec3, pdf: f32) -> LightSample {
     if !(pdf > 0.0 && pdf < MOST_LIGHT) {
-        return LightPick::NONE;
+        return LightSample::NONE;
     }
-    LightPick { direction: way.direction, distance: way.distance, light: radiance / pdf, pdf }
+    LightSample { direction: way.direction, distance: way.distance, light: radiance / pdf, pdf }
 }
 
 /// A vector that is `cosine` along the first of three orthonormal axes, and `sine` aside of it at an azimuth in turns.
