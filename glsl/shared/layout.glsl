@@ -154,7 +154,7 @@
 // Roughness up to which a microfacet surface reflects rays as a mirror does.
 #define MIRROR_ROUGHNESS 0.1
 // Roughness from which a microfacet surface reflects no rays. In between, the share of mirrored light falls linearly.
-#define MATT_ROUGHNESS 0.3
+#define DIFFUSE_ROUGHNESS 0.3
 // Lower bound of the width of a distribution of microfacets, the squared roughness. It keeps highlights of point lights
 // finite.
 #define LEAST_MICROFACET_WIDTH 0.002
@@ -659,7 +659,7 @@ struct Segment {
 #define MOST_NOISE_TILES 4096u
 // `Frame.window_x` if the window is a column of noise tiles (noise_tiles.glsl).
 #define WINDOW_OF_TILES 0xffffffffu
-// The least pdf, per steradian, with which a lobe samples a direction in which it sees the studio. That of matt
+// The least pdf, per steradian, with which a lobe samples a direction in which it sees the studio. That of diffuse
 // surfaces is at most 1 / pi.
 #define STUDIO_LEAST_PDF 1.0
 // Number of the layers of light (path_layers.comp).

@@ -85,7 +85,7 @@ vec3 microfacet_reflectance(Material material, vec3 normal, vec3 to_viewer, vec3
 
 // The share of the reflected light that arrives as a mirrored ray. The surface shows the rest by lights alone.
 float mirror_share(Material material) {
-    return clamp((MATT_ROUGHNESS - material.roughness) / (MATT_ROUGHNESS - MIRROR_ROUGHNESS), 0.0, 1.0);
+    return clamp((DIFFUSE_ROUGHNESS - material.roughness) / (DIFFUSE_ROUGHNESS - MIRROR_ROUGHNESS), 0.0, 1.0);
 }
 
 // The share of uniform light from all directions that the surface reflects: diffusely, and by its microfacets except

@@ -9,7 +9,7 @@
 //!     path_begin, path_scatter   the rays of paths, and their steps at hits
 //!       sampler                  the random numbers of sixteen paths
 //!       environment_samples        the samples of sixteen directions of the environment
-//!       matt_surfaces, matt_steps, area_lights   the steps of sixteen paths at matt surfaces
+//!       lambertian_surfaces, lambertian_steps, area_lights   the steps of sixteen paths at Lambertian surfaces
 //!       vec3x16, turns           sixteen vectors; sines and cosines of sixteen angles
 //!   timing   wall-clock times of passes
 //! meter    the exposure of a scene whose light has physical units
@@ -24,9 +24,9 @@
 mod area_lights;
 pub mod direction_bins;
 mod environment_samples;
+mod lambertian_steps;
+mod lambertian_surfaces;
 pub mod lanes;
-mod matt_steps;
-mod matt_surfaces;
 mod meter;
 pub mod packet;
 pub mod packet_traverser;

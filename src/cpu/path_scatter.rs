@@ -1,6 +1,6 @@
 //! Path scatter: the light at the hits of paths, and the rays with which they go on. It does what the reference's pass
 //! does, bit for bit. The random numbers of sixteen paths are computed together, and so are the steps of paths at
-//! [matt](super::matt_surfaces) surfaces.
+//! [Lambertian](super::lambertian_surfaces) surfaces.
 
 use arrayvec::ArrayVec;
 use fearless_simd::{Level, dispatch, f32x16, prelude::*};
@@ -10,9 +10,9 @@ use rayon::prelude::*;
 use super::{
     area_lights::meets_light,
     environment_samples::environment_samples,
+    lambertian_steps::{BounceConstants, Samples, lambertian_steps},
+    lambertian_surfaces::{LambertianHits, lambertian_surfaces},
     lanes::{LANES, LaneMask},
-    matt_steps::{BounceConstants, Samples, matt_steps},
-    matt_surfaces::{MattHits, matt_surfaces},
     path_begin::PixelOfBatch,
     sampler::{KeysSoa, PairsSoa, random_pairs},
     soa::RaysSoa,
@@ -62,8 +62,8 @@ pub struct BounceOfPaths<'a> {
     pub batch: &'a Batch,
     /// The pixels of the batch.
     pub pixels: &'a [PixelOfBatch],
-    /// Whether each material is matt.
-    pub are_matt: &'a [bool],
+    /// Whether each material is Lambertian.
+    pub are_lambertian: &'a [bool],
     /// The closest hits of paths.
     pub hits: &'a [Hit],
     pub level: Level,
@@ -99,24 +99,24 @@ pub fn path_scatter(
 impl BounceOfPaths<'_> {
     /// Takes the paths of a block one step further. Writes to `kinds` which of them go on and have a segment.
     fn step_block(&self, live: &[u32], kinds: &mut [u32], paths: &mut PathsOfBlock) {
-        let mut at_matt = ArrayVec::<_, BLOCK_SIZE>::new();
-        let (mut at_others, mut missed) = (at_matt.clone(), at_matt.clone());
+        let mut at_lambertian = ArrayVec::<_, BLOCK_SIZE>::new();
+        let (mut at_others, mut missed) = (at_lambertian.clone(), at_lambertian.clone());
         for (place, &path_ix) in live.iter().enumerate() {
             let hit = &self.hits[path_ix as usize];
             let list = if hit.triangle_ix == NO_TRIANGLE {
                 &mut missed
-            } else if self.is_matt(hit) {
-                &mut at_matt
+            } else if self.is_lambertian(hit) {
+                &mut at_lambertian
             } else {
                 &mut at_others
             };
             list.push((place, path_ix));
         }
-        for group in at_matt.chunks(LANES) {
+        for group in at_lambertian.chunks(LANES) {
             if group.len() < LEAST_GROUP {
                 self.step_group(group, &self.choices_of(group), kinds, paths)
             } else {
-                self.step_matt(group, kinds, paths)
+                self.step_lambertian(group, kinds, paths)
             }
         }
         at_others.chunks(LANES).for_each(|group| self.step_group(group, &self.choices_of(group), kinds, paths));
@@ -124,8 +124,8 @@ impl BounceOfPaths<'_> {
         missed.chunks(LANES).for_each(|group| self.step_group(group, &Default::default(), kinds, paths));
     }
 
-    fn is_matt(&self, hit: &Hit) -> bool {
-        self.are_matt[self.inputs.triangle_materials[hit.triangle_ix as usize] as usize]
+    fn is_lambertian(&self, hit: &Hit) -> bool {
+        self.are_lambertian[self.inputs.triangle_materials[hit.triangle_ix as usize] as usize]
     }
 
     fn key_of(&self, path_ix: u32) -> SampleKey {
@@ -198,8 +198,8 @@ impl BounceOfPaths<'_> {
         }
     }
 
-    /// Ends a group of paths at matt surfaces, with the light that their rays meet before.
-    fn end_at_matt(&self, group: &[(usize, u32)], kinds: &mut [u32], paths: &mut PathsOfBlock) {
+    /// Ends a group of paths at Lambertian surfaces, with the light that their rays meet before.
+    fn end_at_lambertian(&self, group: &[(usize, u32)], kinds: &mut [u32], paths: &mut PathsOfBlock) {
         let before_lights = self.before_lights(group, paths);
         for (lane, &(place, path_ix)) in group.iter().enumerate() {
             kinds[place] = 0;
@@ -209,19 +209,20 @@ impl BounceOfPaths<'_> {
         }
     }
 
-    /// Takes a group of paths at matt surfaces one step further. Those that meet a light are stepped as all others.
-    fn step_matt(&self, group: &[(usize, u32)], kinds: &mut [u32], paths: &mut PathsOfBlock) {
+    /// Takes a group of paths at Lambertian surfaces one step further. Those that meet a light are stepped as all
+    /// others.
+    fn step_lambertian(&self, group: &[(usize, u32)], kinds: &mut [u32], paths: &mut PathsOfBlock) {
         let (inputs, frame, depth) = (self.inputs, self.inputs.frame(), self.batch.depth);
         // The last ray of a path only meets light.
         if depth + 1 >= frame.max_depth {
-            return self.end_at_matt(group, kinds, paths);
+            return self.end_at_lambertian(group, kinds, paths);
         }
-        let mut hits = MattHits::default();
+        let mut hits = LambertianHits::default();
         for (lane, &(_, path_ix)) in group.iter().enumerate() {
             let hit = &self.hits[path_ix as usize];
             hits.set(lane, paths.rays.of_path(path_ix), hit, &inputs.triangles[hit.triangle_ix as usize]);
         }
-        let surfaces = dispatch!(self.level, simd => matt_surfaces(simd, &hits));
+        let surfaces = dispatch!(self.level, simd => lambertian_surfaces(simd, &hits));
         let choices = self.choices_of(group);
         let mut samples = Samples::default();
         for (lane, &(_, path_ix)) in group.iter().enumerate() {
@@ -232,8 +233,8 @@ impl BounceOfPaths<'_> {
             samples.set(lane, &sample_emitter(inputs, surfaces.point_world(lane), u, of_environment.as_ref()));
         }
         let bounce = BounceConstants { depth, clamp: frame.clamp, shapes: self.shapes() };
-        let steps =
-            dispatch!(self.level, simd => matt_steps(simd, &bounce, (&hits, &surfaces), (&samples, &choices.pairs)));
+        let samples = (&samples, &choices.pairs);
+        let steps = dispatch!(self.level, simd => lambertian_steps(simd, &bounce, (&hits, &surfaces), samples));
         let before_lights = self.before_lights(group, paths);
         for (lane, &(place, path_ix)) in group.iter().enumerate() {
             if before_lights >> lane & 1 == 1 {
@@ -265,7 +266,7 @@ mod tests {
     use super::{super::path_begin::pixels_of_batch, *};
     use crate::{
         accel::kdtree::BuildOptions,
-        cpu::matt_surfaces::matt_materials,
+        cpu::lambertian_surfaces::lambertian_materials,
         frame::RenderOptions,
         layout::{FLAT_NORMAL, Frame, MATERIAL_MICROFACET, MATERIAL_UNLIT, Material, Triangle},
         reference::{self, chi_square::Uniform},
@@ -273,11 +274,11 @@ mod tests {
         world::{FlatScene, World},
     };
 
-    /// Matt materials first, with a black one, and then others.
+    /// Lambertian materials first, with a black one, and then others.
     fn materials() -> (usize, Vec<Material>) {
-        let matt = |kd| Material { kd, ni: 1.5, d: 1.0, ns: 1.0, roughness: 1.0, ..Material::default() };
-        let grey = matt(Vec3::splat(0.7));
-        let matts = [grey, matt(vec3(0.9, 0.0, 0.1)), matt(Vec3::ZERO), matt(vec3(2.0, -1.0, 0.5))];
+        let diffuse = |kd| Material { kd, ni: 1.5, d: 1.0, ns: 1.0, roughness: 1.0, ..Material::default() };
+        let grey = diffuse(Vec3::splat(0.7));
+        let lambertian = [grey, diffuse(vec3(0.9, 0.0, 0.1)), diffuse(Vec3::ZERO), diffuse(vec3(2.0, -1.0, 0.5))];
         let others = [
             Material { flags: MATERIAL_MICROFACET, ks: Vec3::ONE, roughness: 0.5, ..grey },
             Material { metallic: 1.0, roughness: 0.3, ..grey },
@@ -287,7 +288,7 @@ mod tests {
             Material { sheen_colour: Vec3::ONE, ..grey },
             Material { flags: MATERIAL_UNLIT, ..grey },
         ];
-        (matts.len(), matts.into_iter().chain(others).collect())
+        (lambertian.len(), lambertian.into_iter().chain(others).collect())
     }
 
     /// A world of triangles of all materials, of which some have normals and some no area.
@@ -304,7 +305,7 @@ mod tests {
         scene.triangles = (0..300).map(triangle).collect();
         scene.materials = materials().1;
         scene.material_names = vec![String::new(); scene.materials.len()];
-        // Two of three triangles are matt.
+        // Two of three triangles are Lambertian.
         let material_of = |i| if i % 3 < 2 { i % materials().0 } else { i % scene.materials.len() };
         scene.triangle_materials = (0..300).map(|i| material_of(i) as u32).collect();
         World::of_flat(scene, &BuildOptions::default()).expect("a world")
@@ -381,7 +382,7 @@ mod tests {
     fn steps_are_those_of_the_reference() {
         const N: usize = 3000;
         let mut random = Uniform(1);
-        let (mut n_matt, mut n_going_on, mut n_segments) = (0, 0, 0);
+        let (mut n_lambertian, mut n_going_on, mut n_segments) = (0, 0, 0);
         let scenes = lights().into_iter().flat_map(|lights| [0, 2, 3, 4].map(|depth| (lights.clone(), depth)));
         for (i, (lights, depth)) in scenes.enumerate() {
             let environment = (i % 2 == 1).then(|| sky(&mut random));
@@ -393,7 +394,7 @@ mod tests {
             let batch = &Batch { n_pixels: N as u32 / 4, depth, ..Batch::default() };
             let mut expected = Paths::at_random(N, &mut random);
             let hits: Vec<_> = (0..N).map(|i| hit_at_random(&mut random, i % 9 == 0)).collect();
-            let (pixels, are_matt) = (&pixels_of_batch(inputs, batch)[..], &matt_materials(inputs)[..]);
+            let (pixels, are_lambertian) = (&pixels_of_batch(inputs, batch)[..], &lambertian_materials(inputs)[..]);
             let live: Vec<_> = (0..N as u32).filter(|i| i % 7 != 0).collect();
             expected.kinds.truncate(live.len());
             expected.blocks.truncate(live.len().div_ceil(BLOCK_SIZE));
@@ -403,21 +404,28 @@ mod tests {
             for level in [Level::new(), Level::baseline()] {
                 let mut found = begun.clone();
                 let (paths, results) = found.buffers();
-                let bounce = BounceOfPaths { inputs, batch, pixels, are_matt, hits: &hits, level };
-                n_matt += hits.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE && bounce.is_matt(hit)).count();
+                let bounce = BounceOfPaths { inputs, batch, pixels, are_lambertian, hits: &hits, level };
+                n_lambertian +=
+                    hits.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE && bounce.is_lambertian(hit)).count();
                 path_scatter(&bounce, &live, paths, results);
                 assert!(found.bits() == expected.bits(), "depth {depth}");
                 n_going_on += found.blocks.iter().map(|[n_going_on, _]| n_going_on).sum::<u32>();
                 n_segments += found.segments.iter().filter(|segment| segment.state != SEGMENT_NONE).count();
             }
         }
-        assert!(n_matt > 10_000 && n_going_on > 10_000 && n_segments > 5000, "{n_matt} {n_going_on} {n_segments}");
+        assert!(
+            n_lambertian > 10_000 && n_going_on > 10_000 && n_segments > 5000,
+            "{n_lambertian} {n_going_on} {n_segments}"
+        );
     }
 
     #[test]
-    fn only_lambertian_materials_are_matt() {
+    fn only_lambertian_materials_are_lambertian() {
         let (world, frame) = (world(Vec::new(), None, &mut Uniform(1)), Frame::default());
-        let are_matt = matt_materials(&KernelInputs::new(&world, &frame));
-        assert!(are_matt.iter().enumerate().all(|(i, &is_matt)| is_matt == (i < materials().0)), "{are_matt:?}");
+        let are_lambertian = lambertian_materials(&KernelInputs::new(&world, &frame));
+        assert!(
+            are_lambertian.iter().enumerate().all(|(i, &is_lambertian)| is_lambertian == (i < materials().0)),
+            "{are_lambertian:?}"
+        );
     }
 }

@@ -4,7 +4,7 @@ use bytemuck::Zeroable;
 use fearless_simd::Level;
 
 use super::{
-    matt_surfaces::matt_materials,
+    lambertian_surfaces::lambertian_materials,
     path_begin::{PixelOfBatch, path_begin, pixels_of_batch},
     path_scatter::{BounceOfPaths, path_scatter},
     queue::Queue,
@@ -31,8 +31,8 @@ use crate::{
 #[derive(Default)]
 pub struct Paths {
     pixels: Vec<PixelOfBatch>,
-    /// Whether each material is matt.
-    are_matt: Vec<bool>,
+    /// Whether each material is Lambertian.
+    are_lambertian: Vec<bool>,
     pub states: Vec<PathState>,
     segments: Vec<Segment>,
     /// The radiance of each path when the last layer of light was complete.
@@ -123,10 +123,10 @@ impl Paths {
         let Queue { rays, hits, child_kinds, .. } = queue;
         let paths = PathBuffers { rays, states: &mut self.states, segments: &mut self.segments };
         if batch.depth == 0 {
-            self.are_matt = matt_materials(inputs);
+            self.are_lambertian = lambertian_materials(inputs);
         }
-        let (pixels, are_matt) = (&self.pixels, &self.are_matt);
-        let bounce = BounceOfPaths { inputs, batch, pixels, are_matt, hits, level: Level::new() };
+        let (pixels, are_lambertian) = (&self.pixels, &self.are_lambertian);
+        let bounce = BounceOfPaths { inputs, batch, pixels, are_lambertian, hits, level: Level::new() };
         path_scatter(&bounce, live, paths, (child_kinds, &mut self.scan_blocks));
     }
 

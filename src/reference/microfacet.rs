@@ -4,7 +4,7 @@
 use glam::{Vec3, Vec4};
 
 use crate::layout::{
-    LEAST_COSINE, LEAST_MICROFACET_WIDTH, MATERIAL_MICROFACET, MATT_ROUGHNESS, MIRROR_ROUGHNESS, Material,
+    DIFFUSE_ROUGHNESS, LEAST_COSINE, LEAST_MICROFACET_WIDTH, MATERIAL_MICROFACET, MIRROR_ROUGHNESS, Material,
 };
 
 /// Whether the material reflects by microfacets.
@@ -72,7 +72,7 @@ pub fn microfacet_reflectance(material: &Material, normal: Vec3, to_viewer: Vec3
 
 /// The share of the reflected light that arrives as a mirrored ray. The surface shows the rest by lights alone.
 pub fn mirror_share(material: &Material) -> f32 {
-    ((MATT_ROUGHNESS - material.roughness) / (MATT_ROUGHNESS - MIRROR_ROUGHNESS)).clamp(0.0, 1.0)
+    ((DIFFUSE_ROUGHNESS - material.roughness) / (DIFFUSE_ROUGHNESS - MIRROR_ROUGHNESS)).clamp(0.0, 1.0)
 }
 
 /// The share of uniform light from all directions that the surface reflects: diffusely, and by its microfacets except

@@ -39,7 +39,7 @@ pub enum Preset {
 }
 
 named_enum!(Preset {
-    Clay = "clay": "grey and matt, Kd 0.6",
+    Clay = "clay": "grey and diffuse, Kd 0.6",
     Chrome = "chrome": "polished chromium",
     Gold = "gold": "polished gold",
     Silver = "silver": "polished silver",

@@ -72,8 +72,8 @@ mod tests {
     #[test]
     fn each_illum_becomes_microfacets() {
         for illum in [0, 1] {
-            let matt = path_material(&of_illum(illum));
-            assert_eq!((matt.kd, matt.ks), (Vec3::new(0.9, 1.0, 0.3), Vec3::ZERO));
+            let diffuse = path_material(&of_illum(illum));
+            assert_eq!((diffuse.kd, diffuse.ks), (Vec3::new(0.9, 1.0, 0.3), Vec3::ZERO));
         }
         for illum in [2, 10] {
             let glossy = path_material(&of_illum(illum));

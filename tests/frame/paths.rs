@@ -116,7 +116,7 @@ fn rays_one_by_one_make_the_picture_of_the_tree() {
     }
 }
 
-/// A mirror shows the studio. Matt surfaces and the camera do not see it.
+/// A mirror shows the studio. Lambertian surfaces and the camera do not see it.
 #[test]
 fn only_narrow_lobes_see_the_studio() {
     let options = options(24, 18, 3);

@@ -140,23 +140,23 @@ def slopes(strength, n=64):
 
 
 def diffuse():
-    """A matt sphere on a matt floor, by a point light."""
+    """A diffuse sphere on a diffuse floor, by a point light."""
     floor()
-    sphere(material("matt", (0.8, 0.4, 0.2)))
+    sphere(material("diffuse", (0.8, 0.4, 0.2)))
     point_light()
 
 
 def sun():
     """The same by a sun that is not overhead."""
     floor()
-    monkey(material("matt", (0.8, 0.4, 0.2)))
+    monkey(material("diffuse", (0.8, 0.4, 0.2)))
     light("SUN", 3.0, (-2.0, -3.0, 4.0), colour=(1.0, 0.8, 0.6))
 
 
 def spot_hard():
     """A spot with a sharp edge, aimed beside the middle."""
     floor()
-    sphere(material("matt", (0.8, 0.4, 0.2)))
+    sphere(material("diffuse", (0.8, 0.4, 0.2)))
     light("SPOT", 900.0, (-2.5, -2.0, 5.0), (0.3, 0.4, 0.2), spot_size=math.radians(40), spot_blend=0.0)
 
 
@@ -504,7 +504,7 @@ def negative_scale(smooth):
 
     def build():
         floor()
-        made = material("matt", (0.8, 0.4, 0.2))
+        made = material("diffuse", (0.8, 0.4, 0.2))
         monkey(made, (-1.2, 0.0, 1.0), (-1.0, 1.0, 1.0), smooth)
         monkey(made, (1.2, 0.0, 1.0), (0.8, -0.8, -1.2), smooth).rotation_euler = (0.2, 0.4, 0.6)
         light("SUN", 3.0, (-2.0, -3.0, 4.0))
@@ -596,7 +596,7 @@ def solid_glass(ior, samples):
 def skin():
     """Two smooth heads, which are one mesh, each turned and moved by a bone of its own in the armature's pose."""
     floor()
-    made = material("matt", (0.8, 0.4, 0.2))
+    made = material("diffuse", (0.8, 0.4, 0.2))
     left, right = (monkey(made, (x, 0.0, 1.0), smooth=True) for x in (-1.2, 1.2))
     n_left = len(left.data.vertices)
     bpy.ops.object.select_all(action="DESELECT")
@@ -628,7 +628,7 @@ def skin():
 def morph():
     """A smooth ball with two morph targets: one that bends it, with its whole weight, and one with the weight 0."""
     floor()
-    ball = sphere(material("matt", (0.8, 0.4, 0.2)))
+    ball = sphere(material("diffuse", (0.8, 0.4, 0.2)))
     ball.shape_key_add(name="Basis")
     bent, flat = ball.shape_key_add(name="bent"), ball.shape_key_add(name="flat")
     for bent_point, flat_point in zip(bent.data, flat.data):
@@ -641,14 +641,14 @@ def morph():
 
 def terminator():
     """A smooth sphere of few faces, whose facets shadow themselves, by a sun from the side."""
-    sphere(material("matt"), segments=16)
+    sphere(material("diffuse"), segments=16)
     light("SUN", 3.0, (-4.0, -1.0, 1.5))
 
 
 def many_lights():
     """Three lights of different kinds and colours."""
     floor()
-    sphere(material("matt"))
+    sphere(material("diffuse"))
     light("POINT", 400.0, (-2.5, -3.0, 5.0), colour=(1.0, 0.3, 0.3))
     light("SUN", 1.0, (2.0, -3.0, 4.0), colour=(0.3, 1.0, 0.3))
     light("SPOT", 900.0, (0.5, -2.0, 5.0), colour=(0.3, 0.3, 1.0), spot_size=1.0, spot_blend=0.0)
@@ -677,7 +677,7 @@ def obj_scene(specular):
         links.new(shown.outputs["Color"], node.inputs["Base Color"])
         # The border is left out, since OBJ files repeat the image, and colours are blended differently there.
         rectangle("card", (-2.2, 0.6, 0.0), (2.2, 0, 0), (0, 0.3, 2.0), made, 0.02)
-        monkey(material("matt", (0.2, 0.5, 0.8), specular=specular), (1.0, 0.0, 1.0), smooth=True)
+        monkey(material("diffuse", (0.2, 0.5, 0.8), specular=specular), (1.0, 0.0, 1.0), smooth=True)
         light("SUN", 3.0, (-2.0, -3.0, 4.0), colour=(1.0, 0.8, 0.6))
 
     return build

@@ -98,7 +98,7 @@ def sphere_lamp():
 
 
 def room():
-    """Adds a matt room that is open at the front, with a block, and a camera that does not see the ceiling."""
+    """Adds a diffuse room that is open at the front, with a block, and a camera that does not see the ceiling."""
     white, red, green = (material(*of) for of in (
         ("white", (0.75, 0.75, 0.75)), ("red", (0.7, 0.1, 0.1)), ("green", (0.1, 0.5, 0.15)),
     ))  # fmt: skip
@@ -124,19 +124,19 @@ def area():
 
 def sun():
     floor()
-    block(material("matt", (0.3, 0.5, 0.7)))
+    block(material("diffuse", (0.3, 0.5, 0.7)))
     light("SUN", 3.0, (-2.0, -1.0, 3.0), angle=math.radians(20.0))
 
 
 def sky_light():
     floor()
-    ball(material("matt", (0.3, 0.5, 0.7)))
+    ball(material("diffuse", (0.3, 0.5, 0.7)))
     daylight()
 
 
 def sphere_light():
     floor()
-    block(material("matt", (0.3, 0.5, 0.7)))
+    block(material("diffuse", (0.3, 0.5, 0.7)))
     sphere_lamp()
 
 
@@ -154,7 +154,7 @@ def textured_lamp():
     shown = texture(made, image("emission.png", letters()), "Closest")
     links.new(shown.outputs["Color"], node.inputs["Emission Color"])
     rectangle("lamp", (-1.4, 1.0, 0.2), (2.8, 0, 0), (0, 0.3, 1.8), made)
-    block(material("matt", (0.8, 0.8, 0.8)), (0.5, -0.6, 0.3), 0.6)
+    block(material("diffuse", (0.8, 0.8, 0.8)), (0.5, -0.6, 0.3), 0.6)
 
 
 def coated(colour=(0.1, 0.03, 0.03)):
@@ -210,7 +210,7 @@ def glass():
 def thin_glass():
     """A smooth pane in front of a block."""
     floor()
-    block(material("matt", (0.3, 0.5, 0.7)))
+    block(material("diffuse", (0.3, 0.5, 0.7)))
     made = material("pane", (0.5, 0.8, 0.9), 0.5, Roughness=0.0, Transmission_Weight=1.0)
     rectangle("pane", (-1.0, -1.5, 0.1), (2.0, 0.6, 0.0), (0.0, 0.3, 1.6), made)
     daylight()

@@ -127,25 +127,25 @@ fn torus_of(material: Material) -> FlatScene {
 /// Kernels are made without the code for lobes that no material of the scene has.
 #[test]
 fn agrees_for_each_kind_of_material() {
-    let matt = Material { flags: MATERIAL_MICROFACET, ..scenes::diffuse(vec3(0.7, 0.5, 0.3)) };
-    let smooth = Material { roughness: 0.0, ..matt };
-    let glossy = Material { ks: Vec3::ONE, ni: 1.5, roughness: 0.4, ..matt };
-    let metal = Material { metallic: 1.0, roughness: 0.3, ..matt };
+    let diffuse = Material { flags: MATERIAL_MICROFACET, ..scenes::diffuse(vec3(0.7, 0.5, 0.3)) };
+    let smooth = Material { roughness: 0.0, ..diffuse };
+    let glossy = Material { ks: Vec3::ONE, ni: 1.5, roughness: 0.4, ..diffuse };
+    let metal = Material { metallic: 1.0, roughness: 0.3, ..diffuse };
     let conductor = Material {
-        flags: matt.flags | MATERIAL_CONDUCTOR,
+        flags: diffuse.flags | MATERIAL_CONDUCTOR,
         conductor_eta: vec3(0.2, 0.9, 1.1),
         conductor_k: vec3(3.9, 2.5, 2.2),
         ..metal
     };
     let sheet = Material { transmission: 0.8, ..glossy };
-    let glass = Material { flags: matt.flags | MATERIAL_SOLID, transmission: 1.0, ..glossy };
+    let glass = Material { flags: diffuse.flags | MATERIAL_SOLID, transmission: 1.0, ..glossy };
     let clear_glass = Material { roughness: 0.0, ..glass };
-    let coated = Material { clearcoat: 0.7, clearcoat_roughness: 0.2, ..matt };
-    let polished = Material { clearcoat: 0.7, clearcoat_roughness: 0.0, ..matt };
-    let cloth = Material { sheen_colour: vec3(0.6, 0.5, 0.4), sheen_roughness: 0.5, ..matt };
+    let coated = Material { clearcoat: 0.7, clearcoat_roughness: 0.2, ..diffuse };
+    let polished = Material { clearcoat: 0.7, clearcoat_roughness: 0.0, ..diffuse };
+    let cloth = Material { sheen_colour: vec3(0.6, 0.5, 0.4), sheen_roughness: 0.5, ..diffuse };
     let all = Material { sheen_colour: cloth.sheen_colour, clearcoat: 0.5, metallic: 0.3, ..sheet };
     let materials = [
-        ("matt", matt),
+        ("diffuse", diffuse),
         ("mirror", Material { metallic: 1.0, ..smooth }),
         ("glossy", glossy),
         ("metal", metal),

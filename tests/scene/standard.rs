@@ -477,7 +477,7 @@ fn converted_files_keep_the_look_and_the_samples() {
     }
 }
 
-/// Metals and glass need something to mirror. What is matt, rough or lit by its file keeps the plain background.
+/// Metals and glass need something to mirror. What is diffuse, rough or lit by its file keeps the plain background.
 #[test]
 fn bare_files_with_metals_or_glass_get_a_studio() {
     let obj = box_obj(Vec3::ZERO, Vec3::ONE).replacen("f 1", "mtllib m.mtl\nusemtl a\nf 1", 1);

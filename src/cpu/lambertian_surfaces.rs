@@ -1,5 +1,5 @@
-//! Matt surfaces at the hits of sixteen paths: surfaces whose material is Lambertian, without a normal map and without
-//! light of its own. Their normals and points are those of the reference's `surface_at`, bit for bit.
+//! Lambertian surfaces at the hits of sixteen paths: their material has the Lambertian lobe alone, without a normal map
+//! and without light of its own. Their normals and points are those of the reference's `surface_at`, bit for bit.
 
 use fearless_simd::{Simd, f32x16, i32x16, prelude::*, u32x16};
 use glam::Vec3;
@@ -17,13 +17,14 @@ use crate::{
     world::Textures,
 };
 
-/// Returns for each material whether its surfaces are matt.
-pub fn matt_materials(inputs: &KernelInputs) -> Vec<bool> {
-    let is_matt = |(material_ix, material)| is_matt(material) && stays_matt(inputs.textures, material_ix);
-    inputs.materials.iter().enumerate().map(is_matt).collect()
+/// Returns for each material whether its surfaces are Lambertian.
+pub fn lambertian_materials(inputs: &KernelInputs) -> Vec<bool> {
+    let is_lambertian =
+        |(material_ix, material)| is_lambertian(material) && stays_lambertian(inputs.textures, material_ix);
+    inputs.materials.iter().enumerate().map(is_lambertian).collect()
 }
 
-fn is_matt(material: &Material) -> bool {
+fn is_lambertian(material: &Material) -> bool {
     let &Material { ks, ke, metallic, transmission, clearcoat, sheen_colour, flags, .. } = material;
     let is_lambertian = !ks.cmpgt(Vec3::ZERO).any() && metallic == 0.0 && transmission == 0.0;
     let is_bare = !(clearcoat > 0.0) && !sheen_colour.cmpgt(Vec3::ZERO).any();
@@ -31,7 +32,7 @@ fn is_matt(material: &Material) -> bool {
 }
 
 /// Returns whether the textures of a material change no more than its colour and its opacity.
-fn stays_matt(textures: Option<&Textures>, material_ix: usize) -> bool {
+fn stays_lambertian(textures: Option<&Textures>, material_ix: usize) -> bool {
     textures.is_none_or(|textures| {
         let maps = &textures.material_maps[material_ix];
         let of_colours = [maps.specular, maps.specular_factor, maps.emission];
@@ -43,7 +44,7 @@ fn stays_matt(textures: Option<&Textures>, material_ix: usize) -> bool {
 /// Rays of paths and their hits.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(64))]
-pub struct MattHits {
+pub struct LambertianHits {
     direction: Vec3sSoa,
     pub(super) throughput: Vec3sSoa,
     u: [f32; LANES],
@@ -59,7 +60,7 @@ pub struct MattHits {
 /// The surfaces at the hits.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(64))]
-pub struct MattSurfaces {
+pub struct LambertianSurfaces {
     pub(super) point_world: Vec3sSoa,
     /// The unit normals of the triangles' planes, on the side that the ray comes from.
     pub(super) geometric: Vec3sSoa,
@@ -70,7 +71,7 @@ pub struct MattSurfaces {
     pub(super) clearance: [f32; LANES],
 }
 
-impl MattHits {
+impl LambertianHits {
     #[inline(always)]
     pub fn set(&mut self, lane: usize, ray: &PathRay, hit: &Hit, triangle: &Triangle) {
         set(&mut self.direction, lane, ray.direction);
@@ -92,7 +93,7 @@ impl MattHits {
     }
 }
 
-impl MattSurfaces {
+impl LambertianSurfaces {
     #[inline(always)]
     pub fn point_world(&self, lane: usize) -> Vec3 {
         get(&self.point_world, lane)
@@ -122,7 +123,7 @@ fn decoded<S: Simd>(codes: u32x16<S>) -> Vec3x16<S> {
 
 /// Returns the interpolated normals on the side of `outward`, as `shading_normal` does.
 #[inline(always)]
-fn interpolated<S: Simd>(hits: &MattHits, outward: Vec3x16<S>, [u, v]: [f32x16<S>; 2]) -> Vec3x16<S> {
+fn interpolated<S: Simd>(hits: &LambertianHits, outward: Vec3x16<S>, [u, v]: [f32x16<S>; 2]) -> Vec3x16<S> {
     let simd = u.simd;
     let [a, b, c] = &hits.normals;
     let [a, b, c] = [u32x16::load_array_ref(simd, a), u32x16::load_array_ref(simd, b), u32x16::load_array_ref(simd, c)];
@@ -135,7 +136,7 @@ fn interpolated<S: Simd>(hits: &MattHits, outward: Vec3x16<S>, [u, v]: [f32x16<S
 
 /// Returns the surfaces, as `surface_at` and `frame_around` do.
 #[inline(always)]
-pub fn matt_surfaces<S: Simd>(simd: S, hits: &MattHits) -> MattSurfaces {
+pub fn lambertian_surfaces<S: Simd>(simd: S, hits: &LambertianHits) -> LambertianSurfaces {
     let [v0, v1, v2] =
         [&hits.corners[0], &hits.corners[1], &hits.corners[2]].map(|corners| Vec3x16::load(simd, corners));
     let (u, v) = (f32x16::load_array_ref(simd, &hits.u), f32x16::load_array_ref(simd, &hits.v));
@@ -162,7 +163,7 @@ pub fn matt_surfaces<S: Simd>(simd: S, hits: &MattHits) -> MattSurfaces {
     }
     let point_world = at_v0 + at_v1 + at_v2;
     let (tangent, bitangent) = axes_around(normal);
-    MattSurfaces {
+    LambertianSurfaces {
         point_world: point_world.to_arrays(),
         geometric: geometric.to_arrays(),
         normal: normal.to_arrays(),

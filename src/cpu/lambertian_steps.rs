@@ -1,5 +1,5 @@
-//! One step of sixteen paths at [matt surfaces](super::matt_surfaces). It does the operations of the reference's
-//! `step_path` for such a surface, in the same order, so that the results are the same bit for bit.
+//! One step of sixteen paths at [Lambertian surfaces](super::lambertian_surfaces). It does the operations of the
+//! reference's `step_path` for such a surface, in the same order, so that the results are the same bit for bit.
 
 use std::f32::consts::PI;
 
@@ -7,8 +7,8 @@ use fearless_simd::{Simd, f32x16, mask32x16, prelude::*};
 
 use super::{
     area_lights::meets_light,
+    lambertian_surfaces::{LambertianHits, LambertianSurfaces},
     lanes::{LANES, LaneMask},
-    matt_surfaces::{MattHits, MattSurfaces},
     sampler::PairsSoa,
     turns::sin_cos_of_turns,
     vec3x16::{Vec3sSoa, Vec3x16, get, greater, lesser, set},
@@ -34,7 +34,7 @@ pub struct Samples {
 /// The segments to lights, and the rays with which paths go on.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(64))]
-pub struct MattSteps {
+pub struct LambertianSteps {
     segment_origin: Vec3sSoa,
     segment_direction: Vec3sSoa,
     segment_light: Vec3sSoa,
@@ -56,7 +56,7 @@ impl Samples {
     }
 }
 
-impl MattSteps {
+impl LambertianSteps {
     #[inline(always)]
     pub fn segment(&self, lane: usize, source_triangle: u32) -> Segment {
         Segment {
@@ -97,7 +97,7 @@ struct Surfaces<S: Simd> {
 
 impl<S: Simd> Surfaces<S> {
     #[inline(always)]
-    fn load(simd: S, hits: &MattHits, surfaces: &MattSurfaces) -> Self {
+    fn load(simd: S, hits: &LambertianHits, surfaces: &LambertianSurfaces) -> Self {
         let kd = Vec3x16::load(simd, &hits.kd);
         let [r, g, b] = kd.0;
         Self {
@@ -140,7 +140,7 @@ pub struct BounceConstants<'a> {
 /// other area lights.
 #[inline(always)]
 fn set_segments<S: Simd>(
-    steps: &mut MattSteps,
+    steps: &mut LambertianSteps,
     bounce: &BounceConstants,
     surfaces: &Surfaces<S>,
     (throughput, samples): (Vec3x16<S>, &Samples),
@@ -177,7 +177,7 @@ fn set_segments<S: Simd>(
 /// Writes the rays with which the paths go on. `choices`: the random numbers of Russian roulette.
 #[inline(always)]
 fn set_rays<S: Simd>(
-    steps: &mut MattSteps,
+    steps: &mut LambertianSteps,
     depth: u32,
     surfaces: &Surfaces<S>,
     (throughput, local, choices): (Vec3x16<S>, Vec3x16<S>, f32x16<S>),
@@ -214,17 +214,17 @@ fn lambert_samples<S: Simd>(simd: S, [ux, uy]: &PairsSoa) -> Vec3x16<S> {
 
 /// Returns the steps of the paths.
 #[inline(always)]
-pub fn matt_steps<S: Simd>(
+pub fn lambertian_steps<S: Simd>(
     simd: S,
     bounce: &BounceConstants,
-    (hits, surfaces): (&MattHits, &MattSurfaces),
+    (hits, surfaces): (&LambertianHits, &LambertianSurfaces),
     (samples, random_pairs): (&Samples, &[PairsSoa; PAIRS_OF_HIT]),
-) -> MattSteps {
+) -> LambertianSteps {
     let surfaces = Surfaces::load(simd, hits, surfaces);
     let throughput = Vec3x16::load(simd, &hits.throughput);
     let [_, choices, to_next, _] = random_pairs;
     let local = lambert_samples(simd, to_next);
-    let mut steps = MattSteps::default();
+    let mut steps = LambertianSteps::default();
     set_segments(&mut steps, bounce, &surfaces, (throughput, samples));
     let choices = f32x16::load_array_ref(simd, &choices[1]);
     set_rays(&mut steps, bounce.depth, &surfaces, (throughput, local, choices));
