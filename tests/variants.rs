@@ -146,8 +146,8 @@ fn check_against_cpu(name: &str, world: &MeshWithTree, rays: &[PathRay], (found,
     assert!(n_wrong <= n_outliers, "{name}: {n_wrong} rays differ from the CPU's");
     assert!(n_hits > N_RAYS / 5 && found.n_hits == n_hits as u32, "{name}: {n_hits} hits, {} counted", found.n_hits);
     let n_of = |state| found.light_visibility.iter().filter(|&&visibility| visibility == state).count();
-    let n_segments = [LIGHT_UNTESTED, LIGHT_LIT, LIGHT_SHADOWED].map(n_of);
-    assert!(n_segments.into_iter().all(|n| n > 0), "{name}: {n_segments:?} not tested, lit, in shadow");
+    let n_shadow_rays = [LIGHT_UNTESTED, LIGHT_LIT, LIGHT_SHADOWED].map(n_of);
+    assert!(n_shadow_rays.into_iter().all(|n| n > 0), "{name}: {n_shadow_rays:?} not tested, lit, in shadow");
 }
 
 #[test]

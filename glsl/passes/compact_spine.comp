@@ -2,10 +2,9 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 // Compact, 2 of 3: the only workgroup turns the sums of the blocks of SCAN_GROUP_SIZE rays into exclusive prefix sums
-// and sizes the next bounce. A block of paths has two sums: of paths that go on, and of segments. If the queue has no
-// room for the next bounce's rays, that bounce is empty and its `overflow` is set, as is `any_overflow` of the first
-// row of bounces.
-// Reads and writes scan_blocks and bounces.
+// and sizes the next bounce. A block of paths has two sums: of paths that go on, and of shadow rays. If the queue has
+// no room for the next bounce's rays, that bounce is empty and its `overflow` is set, as is `any_overflow` of the first
+// row of bounces. Reads and writes scan_blocks and bounces.
 #include "layout.glsl"
 #include "integrator.glsl"
 #include "scan.glsl"
@@ -27,13 +26,13 @@ uint groups_for(uint n_invocations, uint group_size) {
     return (n_invocations + group_size - 1u) / group_size;
 }
 
-// Sizes the next bounce of paths. n_paths: the paths that go on. n_segments: the segments of this bounce, which the
-// next dispatch traces, too.
-void size_next_bounce_of_paths(uint n_paths, uint n_segments) {
+// Sizes the next bounce of paths. n_paths: the paths that go on. n_shadow_rays: the shadow rays of this bounce, which
+// the next dispatch traces, too.
+void size_next_bounce_of_paths(uint n_paths, uint n_shadow_rays) {
     uint next_ix = batch.bounce_ix + 1u;
-    uint n_traced = n_paths + n_segments;
+    uint n_traced = n_paths + n_shadow_rays;
     uint for_rays = lanes_log2(n_traced);
-    bounces[batch.bounce_ix].n_segments = n_segments;
+    bounces[batch.bounce_ix].n_shadow_rays = n_shadow_rays;
     bounces[next_ix].n_rays = n_paths;
     bounces[next_ix].n_wanted = n_paths;
     bounces[next_ix].trace_groups_x = groups_for(n_traced << for_rays, RAY_GROUP_SIZE);
@@ -52,11 +51,11 @@ void size_next_bounce(uint n_wanted) {
     if (n_rays != n_wanted) bounces[0].any_overflow = 1u;
     uint n_so_far = first_ray + n_rays;
     uint for_rays = lanes_log2(n_rays);
-    uint for_segments = lanes_log2(n_so_far * frame.n_lights);
+    uint for_shadow_rays = lanes_log2(n_so_far * frame.n_lights);
     bounces[next_ix].trace_groups_x = groups_for(n_rays << for_rays, RAY_GROUP_SIZE);
     bounces[next_ix].trace_lanes_log2 = for_rays;
-    bounces[next_ix].shadow_groups_x = groups_for(n_so_far << for_segments, RAY_GROUP_SIZE);
-    bounces[next_ix].shadow_lanes_log2 = for_segments;
+    bounces[next_ix].shadow_groups_x = groups_for(n_so_far << for_shadow_rays, RAY_GROUP_SIZE);
+    bounces[next_ix].shadow_lanes_log2 = for_shadow_rays;
     bounces[next_ix].scan_groups_x = groups_for(n_rays, SCAN_GROUP_SIZE);
     bounces[next_ix].shade_groups_x = groups_for(n_so_far, RAY_GROUP_SIZE);
 }

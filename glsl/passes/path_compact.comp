@@ -2,8 +2,8 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 // Path compact: one invocation per path of the bounce, in workgroups of SCAN_GROUP_SIZE. Two lists are written for the
-// next bounce, in order and without gaps: the paths that go on, and the paths that have a segment to a light.
-// Reads child_kinds (whether the path at a place of the bounce's list goes on and has a segment), scan_blocks, bounces;
+// next bounce, in order and without gaps: the paths that go on, and the paths that have a shadow ray to a light. Reads
+// child_kinds (whether the path at a place of the bounce's list goes on and has a shadow ray), scan_blocks, bounces;
 // updates live_paths.
 #include "layout.glsl"
 #include "paths.glsl"
@@ -24,5 +24,5 @@ void main() {
     uint path_ix = live_paths[list_of(batch.depth) + place];
     uvec2 next_place = scan_blocks[gl_WorkGroupID.x] + before;
     if ((kind & PATH_GOES_ON) != 0u) live_paths[list_of(batch.depth + 1u) + next_place.x] = path_ix;
-    if ((kind & PATH_HAS_SEGMENT) != 0u) live_paths[list_of_segments() + next_place.y] = path_ix;
+    if ((kind & PATH_HAS_SHADOW_RAY) != 0u) live_paths[list_of_shadow_rays() + next_place.y] = path_ix;
 }

@@ -2,11 +2,10 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 // Path scatter: one invocation per path that is alive at the bounce. It adds the light that the path's ray meets,
-// samples a light at the hit, to which the next dispatch of path_trace.comp traces a segment, and samples the direction
-// in which the path goes on. Each workgroup counts those of its SCAN_GROUP_SIZE paths that go on, and those that have a
-// segment.
-// Reads hits, live_paths, bounces and the scene; updates rays and path_states; writes segments, child_kinds (whether
-// the path at a place of the list goes on and has a segment) and scan_blocks[workgroup].
+// samples a light at the hit, to which the next dispatch of path_trace.comp traces a shadow ray, and samples the
+// direction in which the path goes on. Each workgroup counts those of its SCAN_GROUP_SIZE paths that go on, and those
+// that have a shadow ray. Reads hits, live_paths, bounces and the scene; updates rays and path_states; writes shadow
+// rays, child_kinds (whether the path at a place of the list goes on and has a shadow ray) and scan_blocks[workgroup].
 #include "layout.glsl"
 #include "paths.glsl"
 #include "scan.glsl"
@@ -21,27 +20,27 @@ layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { B
 layout(std430, set = 0, binding = BIND_CHILD_KINDS) writeonly buffer ChildKindsBlock { uint child_kinds[]; };
 layout(std430, set = 0, binding = BIND_SCAN_BLOCKS) writeonly buffer ScanBlocksBlock { uvec2 scan_blocks[]; };
 layout(std430, set = 0, binding = BIND_PATH_STATES) buffer PathStatesBlock { vec4 path_states[]; };
-layout(std430, set = 0, binding = BIND_SEGMENTS) writeonly buffer SegmentsBlock { uvec4 stored_segments[]; };
+layout(std430, set = 0, binding = BIND_SHADOW_RAYS) writeonly buffer ShadowRaysBlock { uvec4 stored_shadow_rays[]; };
 
-void store_segment(uint path_ix, Segment segment) {
-    stored_segments[3u * path_ix] = words_of(segment.origin, segment.state);
-    stored_segments[3u * path_ix + 1u] = words_of(segment.direction, segment.source_triangle);
-    stored_segments[3u * path_ix + 2u] = words_of(segment.light, floatBitsToUint(segment.t_max));
+void store_shadow_ray(uint path_ix, ShadowRay shadow_ray) {
+    stored_shadow_rays[3u * path_ix] = words_of(shadow_ray.origin, shadow_ray.state);
+    stored_shadow_rays[3u * path_ix + 1u] = words_of(shadow_ray.direction, shadow_ray.source_triangle);
+    stored_shadow_rays[3u * path_ix + 2u] = words_of(shadow_ray.light, floatBitsToUint(shadow_ray.t_max));
 }
 
-// Takes a path one step further. Returns whether it goes on and has a segment, for `child_kinds`.
+// Takes a path one step further. Returns whether it goes on and has a shadow ray, for `child_kinds`.
 uint step_of(uint path_ix) {
     uvec2 pixel = pixel_of_path(path_ix);
     PathRay ray = rays[path_ix];
     vec4 words = path_states[path_ix];
     PathState state = PathState(words.xyz, words.w);
-    Segment segment;
-    bool goes_on = step_path(key_of_path(path_ix, pixel), batch.depth, hits[path_ix], ray, state, segment);
+    ShadowRay shadow_ray;
+    bool goes_on = step_path(key_of_path(path_ix, pixel), batch.depth, hits[path_ix], ray, state, shadow_ray);
     path_states[path_ix] = vec4(state.radiance, state.pdf);
-    // A path without a segment has none already: path_trace.comp has cleared the last one.
-    if (segment.state != SEGMENT_NONE) store_segment(path_ix, segment);
+    // A path without a shadow ray has none already: path_trace.comp has cleared the last one.
+    if (shadow_ray.state != SHADOW_RAY_NONE) store_shadow_ray(path_ix, shadow_ray);
     if (goes_on) store_ray(path_ix, ray);
-    return (goes_on ? PATH_GOES_ON : 0u) | (segment.state != SEGMENT_NONE ? PATH_HAS_SEGMENT : 0u);
+    return (goes_on ? PATH_GOES_ON : 0u) | (shadow_ray.state != SHADOW_RAY_NONE ? PATH_HAS_SHADOW_RAY : 0u);
 }
 
 void main() {

@@ -1,13 +1,13 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-// Path trace: finds the closest hits of the paths that are alive, and tests the segments to lights of the bounce
+// Path trace: finds the closest hits of the paths that are alive, and tests the shadow rays to lights of the bounce
 // before. One dispatch does both: it lasts as long as its longest ray, and so waits for such a ray once a bounce, not
-// twice. There are 2^trace_lanes_log2 invocations per ray and segment, the first of which works (lanes.glsl). The
-// segments follow the rays. Rays pass through see-through surfaces at random (cutout.glsl).
-// Reads rays, live_paths, bounces and the acceleration structure; updates hits and segments, in which stalled rays and
-// segments leave their mark (stalls.glsl), path_states (light that arrives is added), counters and, with COUNT_COSTS,
-// n_rays and n_steps of pixel_features, which are about the first sample of the frame.
+// twice. There are 2^trace_lanes_log2 invocations per ray and shadow ray, the first of which works (lanes.glsl). The
+// shadow rays follow the rays. Rays pass through see-through surfaces at random (cutout.glsl). Reads rays, live_paths,
+// bounces and the acceleration structure; updates hits and shadow rays, in which stalled rays and shadow rays leave
+// their mark (stalls.glsl), path_states (light that arrives is added), counters and, with COUNT_COSTS, n_rays and
+// n_steps of pixel_features, which are about the first sample of the frame.
 #include "layout.glsl"
 
 // Whether the cost of the rays of each pixel's first sample is added to pixel_features.
@@ -20,7 +20,7 @@ const bool PASSES_VEILS = true;
 #include "store.glsl"
 #include "counters.glsl"
 
-// Whether hits and segments are counted.
+// Whether hits and shadow rays are counted.
 layout(constant_id = CONSTANT_COUNTS) const bool COUNTS = true;
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
@@ -29,17 +29,17 @@ layout(std430, set = 0, binding = BIND_RAYS) readonly buffer RaysBlock { PathRay
 layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hits[]; };
 layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
 layout(std430, set = 0, binding = BIND_PATH_STATES) buffer PathStatesBlock { vec4 path_states[]; };
-layout(std430, set = 0, binding = BIND_SEGMENTS) buffer SegmentsBlock { Segment segments[]; };
+layout(std430, set = 0, binding = BIND_SHADOW_RAYS) buffer ShadowRaysBlock { ShadowRay shadow_rays[]; };
 layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock { Feature pixel_features[]; };
 
-PathRay ray_of(Segment segment, uint pixel_ix) {
-    return PathRay(segment.origin, pixel_ix, segment.direction, segment.source_triangle, vec3(0.0), segment.t_max);
+PathRay ray_of(ShadowRay ray, uint pixel_ix) {
+    return PathRay(ray.origin, pixel_ix, ray.direction, ray.source_triangle, vec3(0.0), ray.t_max);
 }
 
-// Stores the result of a path's segment, whose traversal has found this triangle, none, or a mark.
-void end_segment(uint path_ix, uint found) {
-    segments[path_ix].state = is_stalled(found) ? found : SEGMENT_NONE;
-    if (found == NO_TRIANGLE) path_states[path_ix].xyz += segments[path_ix].light;
+// Stores the result of a path's shadow ray, whose traversal has found this triangle, none, or a mark.
+void end_shadow_ray(uint path_ix, uint found) {
+    shadow_rays[path_ix].state = is_stalled(found) ? found : SHADOW_RAY_NONE;
+    if (found == NO_TRIANGLE) path_states[path_ix].xyz += shadow_rays[path_ix].light;
 }
 
 void count(PathRay ray) {
@@ -47,34 +47,34 @@ void count(PathRay ray) {
     atomicAdd(pixel_features[ray.pixel_ix].n_steps, n_steps);
 }
 
-// Traces a ray, or a segment. Returns whether it has a hit; or of a segment, whether it was traced to its end.
-bool traced(uint path_ix, bool is_segment) {
+// Traces a ray, or a shadow ray. Returns whether it has a hit; or of a shadow ray, whether it was traced to its end.
+bool traced(uint path_ix, bool is_shadow_ray) {
     PathRay ray = rays[path_ix];
-    if (is_segment) ray = ray_of(segments[path_ix], ray.pixel_ix);
-    Hit hit = traverse(ray, 0.0, is_segment);
+    if (is_shadow_ray) ray = ray_of(shadow_rays[path_ix], ray.pixel_ix);
+    Hit hit = traverse(ray, 0.0, is_shadow_ray);
     bool ends = !is_stalled(hit.triangle_ix);
     if (COUNT_COSTS && ends && sample_of_path(path_ix) == 0u) count(ray);
-    if (is_segment) end_segment(path_ix, hit.triangle_ix);
+    if (is_shadow_ray) end_shadow_ray(path_ix, hit.triangle_ix);
     else store_hit(path_ix, hit);
-    return ends && (is_segment || hit.triangle_ix != NO_TRIANGLE);
+    return ends && (is_shadow_ray || hit.triangle_ix != NO_TRIANGLE);
 }
 
 void main() {
     uint place = ray_of_lane(gl_GlobalInvocationID.x, bounces[batch.bounce_ix].trace_lanes_log2);
     uint n_rays = bounces[batch.bounce_ix].n_rays;
-    uint n_segments = batch.depth > 0u ? bounces[batch.bounce_ix - 1u].n_segments : 0u;
-    bool is_segment = place >= n_rays;
+    uint n_shadow_rays = batch.depth > 0u ? bounces[batch.bounce_ix - 1u].n_shadow_rays : 0u;
+    bool is_shadow_ray = place >= n_rays;
     bool counts = false;
     // The index of a lane that does not work is beyond both, also after the subtraction.
-    uint in_list = is_segment ? place - n_rays : place;
-    if (in_list < (is_segment ? n_segments : n_rays)) {
-        uint path_ix = live_paths[(is_segment ? list_of_segments() : list_of(batch.depth)) + in_list];
-        uint mark = is_segment ? segments[path_ix].state : hits[path_ix].triangle_ix;
-        if (runs_in_round(batch.round, mark)) counts = traced(path_ix, is_segment);
+    uint in_list = is_shadow_ray ? place - n_rays : place;
+    if (in_list < (is_shadow_ray ? n_shadow_rays : n_rays)) {
+        uint path_ix = live_paths[(is_shadow_ray ? list_of_shadow_rays() : list_of(batch.depth)) + in_list];
+        uint mark = is_shadow_ray ? shadow_rays[path_ix].state : hits[path_ix].triangle_ix;
+        if (runs_in_round(batch.round, mark)) counts = traced(path_ix, is_shadow_ray);
     }
     if (COUNTS) {
-        count_hits(batch.bounce_ix, gl_WorkGroupID.x, counts && !is_segment);
+        count_hits(batch.bounce_ix, gl_WorkGroupID.x, counts && !is_shadow_ray);
         uint before = batch.depth > 0u ? batch.bounce_ix - 1u : batch.bounce_ix;
-        count_shadow_rays(before, gl_WorkGroupID.x, counts && is_segment ? 1u : 0u);
+        count_shadow_rays(before, gl_WorkGroupID.x, counts && is_shadow_ray ? 1u : 0u);
     }
 }

@@ -66,15 +66,15 @@ vec3 radiance_of(PathRay ray, uint ray_ix) {
 }
 
 // Adds the number of the ray's shadow rays to the counter of its bounce.
-void count_segments(uint ray_ix) {
-    uint n_segments = 0u;
+void count_shadow_rays(uint ray_ix) {
+    uint n_shadow_rays = 0u;
     for (uint light_ix = 0u; light_ix < frame.n_lights; ++light_ix) {
-        n_segments += light_visibility[light_ix * frame.queue_capacity + ray_ix] == LIGHT_UNTESTED ? 0u : 1u;
+        n_shadow_rays += light_visibility[light_ix * frame.queue_capacity + ray_ix] == LIGHT_UNTESTED ? 0u : 1u;
     }
     for (uint depth = 0u; depth < frame.max_depth; ++depth) {
         uint bounce_ix = batch.bounce_ix + depth;
         bool is_of_bounce = ray_ix - bounces[bounce_ix].first_ray < bounces[bounce_ix].n_rays;
-        count_shadow_rays(bounce_ix, gl_WorkGroupID.x, is_of_bounce ? n_segments : 0u);
+        count_shadow_rays(bounce_ix, gl_WorkGroupID.x, is_of_bounce ? n_shadow_rays : 0u);
     }
 }
 
@@ -83,5 +83,5 @@ void main() {
     uint last_ix = batch.bounce_ix + frame.max_depth - 1u;
     if (ray_ix >= bounces[last_ix].first_ray + bounces[last_ix].n_rays) return;
     ray_radiance[ray_ix] = vec4(radiance_of(ray_at(ray_ix), ray_ix), 0.0);
-    if (COUNTS) count_segments(ray_ix);
+    if (COUNTS) count_shadow_rays(ray_ix);
 }

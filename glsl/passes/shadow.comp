@@ -1,14 +1,13 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Shadow (the paper's section 2.1): tests the shadow rays, here called segments. They go from the hits of all rays of
-// the batch, in all bounces, to each light that the surface could show. A light is hidden if its segment hits
-// anything.
+// Shadow (the paper's section 2.1): tests the shadow rays. They go from the hits of all rays of the batch, in all
+// bounces, to each light that the surface could show. A light is hidden if its shadow ray hits anything.
 // There are 2^shadow_lanes_log2 invocations per ray and light, the first of which works (lanes.glsl).
 // Reads rays, hits, bounces and the scene; updates light_visibility[light * queue_capacity + ray], in which a stalled
-// segment leaves its mark (stalls.glsl), and, with COUNT_COSTS, n_rays and n_steps of pixel_features.
+// shadow ray leaves its mark (stalls.glsl), and, with COUNT_COSTS, n_rays and n_steps of pixel_features.
 #include "layout.glsl"
 
-// Whether the segments' cost is added to pixel_features.
+// Whether the shadow rays' cost is added to pixel_features.
 layout(constant_id = CONSTANT_COUNT_COSTS) const bool COUNT_COSTS = false;
 const bool PASSES_VEILS = true;
 #include "accel.glsl"
@@ -27,8 +26,8 @@ layout(std430, set = 0, binding = BIND_LIGHT_VISIBILITY) buffer LightVisibilityB
 layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
 layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock { Feature pixel_features[]; };
 
-// Computes the segment to the light. Returns false if the surface faces away from the light or would not show it.
-bool shadow_segment(PathRay ray, Hit hit, Light light, out PathRay segment) {
+// Computes the shadow ray to the light. Returns false if the surface faces away from the light or would not show it.
+bool shadow_ray_of(PathRay ray, Hit hit, Light light, out PathRay shadow_ray) {
     Triangle t = triangle_at(hit.triangle_ix);
     Surface surface = surface_at(ray, hit, t);
     IncidentLight to_light = incident_light(light, surface.point_world);
@@ -37,22 +36,22 @@ bool shadow_segment(PathRay ray, Hit hit, Light light, out PathRay segment) {
     if (!can_show(material, surface.shading, -ray.direction, to_light.direction)) return false;
     vec3 origin = lit_point(surface, hit, to_light.direction);
     origin += surface.clearance * surface.geometric;
-    // The segment ends where the light is seen from the surface's own point.
+    // The shadow ray ends where the light is seen from the surface's own point.
     float t_max = to_light.distance - dot(origin - surface.point_world, to_light.direction);
-    segment = PathRay(origin, ray.pixel_ix, to_light.direction, hit.triangle_ix, vec3(0.0), t_max);
+    shadow_ray = PathRay(origin, ray.pixel_ix, to_light.direction, hit.triangle_ix, vec3(0.0), t_max);
     return true;
 }
 
-// Returns the light's visibility from the ray's hit, one of LIGHT_*, or the mark of a stalled segment.
+// Returns the light's visibility from the ray's hit, one of LIGHT_*, or the mark of a stalled shadow ray.
 uint visibility_of(Light light, uint ray_ix) {
     Hit hit = hits[ray_ix];
-    PathRay segment;
-    if (hit.triangle_ix == NO_TRIANGLE || !shadow_segment(ray_at(ray_ix), hit, light, segment)) return LIGHT_UNTESTED;
-    uint found = traverse(segment, 0.0, true).triangle_ix;
+    PathRay shadow_ray;
+    if (hit.triangle_ix == NO_TRIANGLE || !shadow_ray_of(ray_at(ray_ix), hit, light, shadow_ray)) return LIGHT_UNTESTED;
+    uint found = traverse(shadow_ray, 0.0, true).triangle_ix;
     if (is_stalled(found)) return found;
     if (COUNT_COSTS) {
-        atomicAdd(pixel_features[segment.pixel_ix].n_rays, 1u);
-        atomicAdd(pixel_features[segment.pixel_ix].n_steps, n_steps);
+        atomicAdd(pixel_features[shadow_ray.pixel_ix].n_rays, 1u);
+        atomicAdd(pixel_features[shadow_ray.pixel_ix].n_steps, n_steps);
     }
     return found == NO_TRIANGLE ? LIGHT_LIT : LIGHT_SHADOWED;
 }

@@ -22,9 +22,9 @@ void count_hits(uint bounce_ix, uint place, bool is_hit) {
 
 // Counts n_of_lane shadow rays of this invocation. place: as for `count_hits`.
 void count_shadow_rays(uint bounce_ix, uint place, uint n_of_lane) {
-    uint n_segments = subgroupAdd(n_of_lane);
-    if (subgroupElect() && n_segments > 0u)
-        atomicAdd(counters[counters_of(bounce_ix, place)].n_shadow_rays, n_segments);
+    uint n_shadow_rays = subgroupAdd(n_of_lane);
+    if (subgroupElect() && n_shadow_rays > 0u)
+        atomicAdd(counters[counters_of(bounce_ix, place)].n_shadow_rays, n_shadow_rays);
 }
 
 #endif

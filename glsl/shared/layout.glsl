@@ -217,8 +217,8 @@
 // What `child_kinds` has for a path that goes on. This and the next constant are counts in the two halves of a word, so
 // that one prefix sum over a workgroup counts both.
 #define PATH_GOES_ON 1u
-// What `child_kinds` has, in addition, for a path with a segment to a light.
-#define PATH_HAS_SEGMENT 0x10000u
+// What `child_kinds` has, in addition, for a path with a shadow ray to a light.
+#define PATH_HAS_SHADOW_RAY 0x10000u
 
 // `light_visibility` of a ray's hit and a light: no shadow ray was traced, since the hit would not show the light.
 #define LIGHT_UNTESTED 0u
@@ -618,16 +618,16 @@ struct PathState {
     float pdf;
 };
 
-// A segment from a hit of a path to a sampled light, 48 bytes. If nothing is in between, its light is added to the
+// A shadow ray from a hit of a path to a sampled light, 48 bytes. If nothing is in between, its light is added to the
 // path.
 //
 // - `origin`: world units.
-// - `state`: `SEGMENT_NONE`, `SEGMENT_WAITS`, or the mark of a segment whose traversal has stalled.
+// - `state`: `SHADOW_RAY_NONE`, `SHADOW_RAY_WAITS`, or the mark of a shadow ray whose traversal has stalled.
 // - `direction`: unit length.
-// - `source_triangle`: the triangle on which the segment starts, which it never hits again.
-// - `light`: what the segment adds to the path's radiance.
-// - `t_max`: length of the segment (world units).
-struct Segment {
+// - `source_triangle`: the triangle on which the shadow ray starts, which it never hits again.
+// - `light`: what the shadow ray adds to the path's radiance.
+// - `t_max`: length of the shadow ray (world units).
+struct ShadowRay {
     vec3 origin;
     uint state;
     vec3 direction;
@@ -636,10 +636,10 @@ struct Segment {
     float t_max;
 };
 
-// `Segment.state`: the path has no segment.
-#define SEGMENT_NONE 0u
-// `Segment.state`: the segment has not been traced yet.
-#define SEGMENT_WAITS 1u
+// `ShadowRay.state`: the path has no shadow ray.
+#define SHADOW_RAY_NONE 0u
+// `ShadowRay.state`: the shadow ray has not been traced yet.
+#define SHADOW_RAY_WAITS 1u
 
 // Values of `Frame.pixel_filter`: the pdf of samples around the centre of their pixel.
 //
@@ -668,8 +668,8 @@ struct Segment {
 #define ROULETTE_DEPTH 3u
 // The least probability with which a path survives Russian roulette. It bounds the weight of those that survive.
 #define LEAST_SURVIVAL 0.05
-// The share of the distance to a light at which a segment ends, so that it does not hit the light itself.
-#define SEGMENT_SHARE 0.9998
+// The share of the distance to a light at which a shadow ray ends, so that it does not hit the light itself.
+#define SHADOW_RAY_SHARE 0.9998
 
 // The hit of a ray, 16 bytes.
 //
@@ -765,9 +765,9 @@ struct Frame {
     uint has_studio;
 };
 
-// The rays of one bounce of one batch, 80 bytes. The host writes the row of a batch's first bounce, and in all rows
-// the y and z of the `groups`. Compaction of each bounce's rays (`compact_spine.comp`) writes the rest of the next
-// bounce's row, and `n_segments` of the bounce's own. The rays of a batch are in one queue, bounce after bounce. Each
+// The rays of one bounce of one batch, 80 bytes. The host writes the row of a batch's first bounce, and in all rows the
+// y and z of the `groups`. Compaction of each bounce's rays (`compact_spine.comp`) writes the rest of the next bounce's
+// row, and `n_shadow_rays` of the bounce's own. The rays of a batch are in one queue, bounce after bounce. Each
 // `groups` is a `VkDispatchIndirectCommand`.
 //
 // - `first_ray`, `n_rays`: the bounce's rays in the queue.
@@ -775,16 +775,16 @@ struct Frame {
 // - `overflow`: 1 if the queue has no room for all of these rays. Then `n_rays` is 0, and the batch has to be split.
 // - `trace_groups`: over the bounce's rays, each of which has `2^trace_lanes_log2` lanes. Only the first lane of a
 //   ray works (src/frame/bounce.rs).
-// - `shadow_groups`: over the segments from hits to lights. y counts lights, x all rays of the batch up to the last
-//   one of this bounce. A segment has `2^shadow_lanes_log2` lanes.
+// - `shadow_groups`: over the shadow rays from hits to lights. y counts lights, x all rays of the batch up to the last
+//   one of this bounce. A shadow ray has `2^shadow_lanes_log2` lanes.
 // - `scan_groups`: over the bounce's rays.
 // - `any_overflow`: in the first row of `bounces` only, 1 if any row of the frame has an overflow.
 // - `shade_groups`: over all rays of the batch up to the last one of this bounce.
-// - `n_segments`: in frames of paths, the number of segments from the bounce's hits to lights. The next bounce's
+// - `n_shadow_rays`: in frames of paths, the number of shadow rays from the bounce's hits to lights. The next bounce's
 //   dispatch of path_trace.comp reads it.
 //
 // In frames of paths, the rays of a bounce are those of the paths that are alive, `first_ray` is 0, and
-// `trace_groups` also count the segments of the bounce before.
+// `trace_groups` also count the shadow rays of the bounce before.
 struct Bounce {
     uint first_ray;
     uint n_rays;
@@ -805,7 +805,7 @@ struct Bounce {
     uint shade_groups_x;
     uint shade_groups_y;
     uint shade_groups_z;
-    uint n_segments;
+    uint n_shadow_rays;
 };
 
 // Copies of a bounce's `Counters`, whose sum is the count. This many workgroups can add to them at the same time.
@@ -817,7 +817,7 @@ struct Bounce {
 // every order of arrival.
 //
 // - `n_hits`: rays that hit a triangle.
-// - `n_shadow_rays`: segments that were tested.
+// - `n_shadow_rays`: shadow rays that were tested.
 struct Counters {
     uint n_hits;
     uint n_shadow_rays;
@@ -943,7 +943,7 @@ struct AccelConstants {
 
 // Whether `fma` rounds once on the device.
 #define CONSTANT_FUSED_FMA 1u
-// Whether hits and shadow segments are counted.
+// Whether hits and shadow rays are counted.
 #define CONSTANT_COUNTS 2u
 // Whether the nodes and triangles that a ray reads are counted.
 #define CONSTANT_COUNT_COSTS 3u
@@ -1254,14 +1254,14 @@ struct GridSort {
 // One `PathRay` for each ray, bounce after bounce. The camera's rays are not stored, except in frames of paths.
 #define BIND_RAYS 8u
 // A word for each ray: bits of `CHILD_REFLECTED` and its like. In frames of paths, it is `PATH_GOES_ON` and
-// `PATH_HAS_SEGMENT`.
+// `PATH_HAS_SHADOW_RAY`.
 #define BIND_CHILD_KINDS 9u
 // A word for each ray: the index of its first child in the queue. A ray without children has the index that a child
 // of it would have.
 #define BIND_FIRST_CHILDREN 10u
 // A word for each block of `SCAN_GROUP_SIZE` rays: the number of the block's children. After the scan, it is the
 // number of the children of all blocks before. In frames of paths, each block has two words: the number of paths that
-// go on, and the number of segments.
+// go on, and the number of shadow rays.
 #define BIND_SCAN_BLOCKS 11u
 // One `Bounce` for each batch and bounce.
 #define BIND_BOUNCES 12u
@@ -1298,16 +1298,16 @@ struct GridSort {
 // A row of counts, then `STALLED_RAY_ROWS` rows of four words for each slot (stalls.glsl).
 #define BIND_STALLS 32u
 
-// Bindings that only frames of paths have. `rays`, `hits`, `path_states`, `segments` and `path_snapshots` have an
+// Bindings that only frames of paths have. `rays`, `hits`, `path_states`, `shadow_rays` and `path_snapshots` have an
 // element for each path of a batch: all samples of the first pixel, then those of the second one, and so on.
 
 // One `PathState` for each path.
 #define BIND_PATH_STATES 33u
-// One `Segment` for each path.
-#define BIND_SEGMENTS 34u
+// One `ShadowRay` for each path.
+#define BIND_SHADOW_RAYS 34u
 // Three lists of `Frame.queue_capacity` words, each of indices of paths in their order. The first two lists have the
 // paths that are alive: the first one at bounces of even depth, the second one at those of odd depth. The third list
-// has the paths whose segments are to be traced.
+// has the paths whose shadow rays are to be traced.
 #define BIND_LIVE_PATHS 35u
 // One `Guide` for each pixel.
 #define BIND_PIXEL_GUIDES 36u

@@ -59,31 +59,31 @@ vec3 met_environment(PathRay ray, PathState state, uint depth) {
     return mirrors ? met + studio_radiance(ray.direction) : met;
 }
 
-// The segment to a light that is sampled at a hit.
-Segment segment_to_light(
+// The shadow ray to a light that is sampled at a hit.
+ShadowRay shadow_ray_to_light(
     uint depth, vec3 u, Surface surface, BsdfTerms terms, uint triangle_ix, vec3 throughput
 ) {
-    Segment segment;
-    segment.state = SEGMENT_NONE;
-    if (is_smooth(terms.material)) return segment;
+    ShadowRay shadow_ray;
+    shadow_ray.state = SHADOW_RAY_NONE;
+    if (is_smooth(terms.material)) return shadow_ray;
     LightSample light_sample = sample_light(surface.point_world, u);
-    if (light_sample.light == vec3(0.0)) return segment;
+    if (light_sample.light == vec3(0.0)) return shadow_ray;
     BsdfEval scattered = eval_bsdf(terms, surface, light_sample.direction);
-    if (!any(greaterThan(scattered.value, vec3(0.0)))) return segment;
+    if (!any(greaterThan(scattered.value, vec3(0.0)))) return shadow_ray;
     float weight = light_sample.pdf > 0.0 ? power_heuristic(light_sample.pdf, scattered.pdf) : 1.0;
     vec3 light = added_light(throughput * scattered.value * light_sample.light * weight, depth + 1u);
-    if (!any(greaterThan(light, vec3(0.0)))) return segment;
+    if (!any(greaterThan(light, vec3(0.0)))) return shadow_ray;
     float side = dot(light_sample.direction, surface.geometric) < 0.0 ? -surface.clearance : surface.clearance;
     vec3 offset = side * surface.geometric;
     vec3 origin = surface.point_world + offset;
-    segment = Segment(origin, SEGMENT_WAITS, light_sample.direction, triangle_ix, light, light_sample.distance);
-    if (isinf(light_sample.distance)) return segment;
-    // From its start beside the surface, the segment still goes to the point that was sampled.
+    shadow_ray = ShadowRay(origin, SHADOW_RAY_WAITS, light_sample.direction, triangle_ix, light, light_sample.distance);
+    if (isinf(light_sample.distance)) return shadow_ray;
+    // From its start beside the surface, the shadow ray still goes to the point that was sampled.
     vec3 to_light = light_sample.distance * light_sample.direction - offset;
     float distance = length(to_light);
-    segment.direction = to_light / distance;
-    segment.t_max = SEGMENT_SHARE * distance;
-    return segment;
+    shadow_ray.direction = to_light / distance;
+    shadow_ray.t_max = SHADOW_RAY_SHARE * distance;
+    return shadow_ray;
 }
 
 // Whether a path survives Russian roulette. Its throughput is then larger, by the reciprocal of the probability.
@@ -97,9 +97,9 @@ bool survives(uint depth, float u, inout vec3 throughput) {
 // Adds the light that the path's ray meets to its state, samples a light at the hit, and replaces the ray by the one
 // with which the path goes on. Returns whether it does.
 bool step_path(
-    SampleKey key, uint depth, Hit hit, inout PathRay ray, inout PathState state, out Segment segment
+    SampleKey key, uint depth, Hit hit, inout PathRay ray, inout PathState state, out ShadowRay shadow_ray
 ) {
-    segment.state = SEGMENT_NONE;
+    shadow_ray.state = SHADOW_RAY_NONE;
     bool is_miss = hit.triangle_ix == NO_TRIANGLE;
     float infinity = uintBitsToFloat(0x7f800000u);
     SeenLight seen = seen_light(ray.origin, ray.direction, is_miss ? infinity : hit.t);
@@ -127,7 +127,7 @@ bool step_path(
     uint first_pair = PAIRS_OF_CAMERA + PAIRS_OF_HIT * depth;
     vec2 to_light = random_pair(key, first_pair), choices = random_pair(key, first_pair + 1u);
     vec2 to_next = random_pair(key, first_pair + 2u), lobe = random_pair(key, first_pair + 3u);
-    segment = segment_to_light(depth, vec3(to_light, choices.x), surface, terms, hit.triangle_ix, throughput);
+    shadow_ray = shadow_ray_to_light(depth, vec3(to_light, choices.x), surface, terms, hit.triangle_ix, throughput);
     BsdfSample next = sample_bsdf(terms, surface, vec3(to_next, lobe.x));
     throughput *= next.weight;
     if (!any(greaterThan(throughput, vec3(0.0))) || !survives(depth, choices.y, throughput)) return false;

@@ -1,8 +1,8 @@
 // The paths of a batch. Each path has a fixed place in the buffers. The samples of a pixel follow each other, because
 // their rays have much in common: they meet the same parts of the tree and the same materials. Lists of indices say
-// which paths are alive at a bounce, and which have a segment. Twin of src/reference/paths.rs.
+// which paths are alive at a bounce, and which have a shadow ray. Twin of src/reference/paths.rs.
 //
-// Needs nothing. Provides `list_of`, `list_of_segments`, `path_of`, `sample_of_path`, `pixel_at`, `pixel_of_path`,
+// Needs nothing. Provides `list_of`, `list_of_shadow_rays`, `path_of`, `sample_of_path`, `pixel_at`, `pixel_of_path`,
 // `key_of_path` and the push constants `batch`.
 #ifndef KDRAY_PATHS
 #define KDRAY_PATHS
@@ -19,8 +19,8 @@ uint list_of(uint depth) {
     return (depth & 1u) * frame.queue_capacity;
 }
 
-// Where the list of the paths with a segment begins in `live_paths`.
-uint list_of_segments() {
+// Where the list of the paths with a shadow ray begins in `live_paths`.
+uint list_of_shadow_rays() {
     return 2u * frame.queue_capacity;
 }
 

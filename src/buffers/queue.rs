@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::{
     frame::NoiseTiles,
     gpu::{Buffer, BufferUse, Context, GpuError},
-    layout::{Hit, MOST_SAMPLES_LOG2, PathRay, PathState, SCAN_GROUP_SIZE, Segment},
+    layout::{Hit, MOST_SAMPLES_LOG2, PathRay, PathState, SCAN_GROUP_SIZE, ShadowRay},
 };
 
 /// What a batch of paths has beside the buffers of [`Queue`], in which each path has one ray. A clone is a second
@@ -14,9 +14,9 @@ use crate::{
 pub struct PathQueue {
     /// One for each path, as in the next buffer.
     pub path_states: Buffer<PathState>,
-    pub segments: Buffer<Segment>,
+    pub shadow_rays: Buffer<ShadowRay>,
     /// Three lists, each with room for all paths: those that are alive at this bounce, those that are alive at the
-    /// next, and those that have a segment.
+    /// next, and those that have a shadow ray.
     pub live_paths: Buffer<u32>,
     /// The radiance of each path when the last layer of light was complete. Empty if the picture has no such layers.
     pub path_snapshots: Buffer<[f32; 4]>,
@@ -27,8 +27,11 @@ pub struct PathQueue {
 impl PathQueue {
     /// Bytes that a path takes, with its ray and hit, whether it goes on, and its places in the lists. Layers of light
     /// take 16 more.
-    pub const BYTES_PER_PATH: usize =
-        size_of::<PathRay>() + size_of::<Hit>() + size_of::<PathState>() + size_of::<Segment>() + 4 * size_of::<u32>();
+    pub const BYTES_PER_PATH: usize = size_of::<PathRay>()
+        + size_of::<Hit>()
+        + size_of::<PathState>()
+        + size_of::<ShadowRay>()
+        + 4 * size_of::<u32>();
 
     /// The part of a device's memory that paths may take is 1 / this.
     pub const MEMORY_PER_PATHS: u64 = 8;
@@ -49,7 +52,7 @@ impl PathQueue {
         let capacity = capacity as usize;
         Ok(Self {
             path_states: Buffer::new(context, "path_states", capacity, storage)?,
-            segments: Buffer::new(context, "segments", capacity, storage)?,
+            shadow_rays: Buffer::new(context, "shadow_rays", capacity, storage)?,
             live_paths: Buffer::new(context, "live_paths", 3 * capacity, storage)?,
             path_snapshots: Buffer::new(context, "path_snapshots", if has_layers { capacity } else { 0 }, storage)?,
             noise_tiles: Buffer::new(context, "noise_tiles", NoiseTiles::MOST, BufferUse::Uniform)?,

@@ -50,7 +50,7 @@ const BINDINGS_OF_WHITTED: [u32; 5] = [
 /// Further bindings, for paths.
 const BINDINGS_OF_PATHS: [u32; 6] = [
     layout::BIND_PATH_STATES,
-    layout::BIND_SEGMENTS,
+    layout::BIND_SHADOW_RAYS,
     layout::BIND_LIVE_PATHS,
     layout::BIND_PIXEL_GUIDES,
     layout::BIND_PATH_SNAPSHOTS,
@@ -204,7 +204,7 @@ impl Resources {
             ],
             Some(paths) => vec![
                 (layout::BIND_PATH_STATES, Binding::Buffer(paths.path_states.any())),
-                (layout::BIND_SEGMENTS, Binding::Buffer(paths.segments.any())),
+                (layout::BIND_SHADOW_RAYS, Binding::Buffer(paths.shadow_rays.any())),
                 (layout::BIND_LIVE_PATHS, Binding::Buffer(paths.live_paths.any())),
                 (layout::BIND_PIXEL_GUIDES, Binding::Buffer(pixels.pixel_guides.any())),
                 (layout::BIND_PATH_SNAPSHOTS, Binding::Buffer(paths.path_snapshots.any())),

@@ -14,7 +14,7 @@ use super::{
     vec3x16::{Vec3sSoa, Vec3x16, get, greater, lesser, set},
 };
 use crate::{
-    layout::{AreaLight, LEAST_SURVIVAL, PathRay, ROULETTE_DEPTH, SEGMENT_SHARE, SEGMENT_WAITS, Segment},
+    layout::{AreaLight, LEAST_SURVIVAL, PathRay, ROULETTE_DEPTH, SHADOW_RAY_SHARE, SHADOW_RAY_WAITS, ShadowRay},
     reference::{
         emitters::{LIGHT_HIDES_UP_TO, LightSample},
         path_vertex::PAIRS_OF_HIT,
@@ -31,15 +31,15 @@ pub struct Samples {
     pdf: [f32; LANES],
 }
 
-/// The segments to lights, and the rays with which paths go on.
+/// The shadow rays to lights, and the rays with which paths go on.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(64))]
 pub struct LambertianSteps {
-    segment_origin: Vec3sSoa,
-    segment_direction: Vec3sSoa,
-    segment_light: Vec3sSoa,
-    segment_t_max: [f32; LANES],
-    pub have_segment: LaneMask,
+    shadow_ray_origin: Vec3sSoa,
+    shadow_ray_direction: Vec3sSoa,
+    shadow_ray_light: Vec3sSoa,
+    shadow_ray_t_max: [f32; LANES],
+    pub have_shadow_ray: LaneMask,
     origin: Vec3sSoa,
     direction: Vec3sSoa,
     throughput: Vec3sSoa,
@@ -58,14 +58,14 @@ impl Samples {
 
 impl LambertianSteps {
     #[inline(always)]
-    pub fn segment(&self, lane: usize, source_triangle: u32) -> Segment {
-        Segment {
-            origin: get(&self.segment_origin, lane),
-            state: SEGMENT_WAITS,
-            direction: get(&self.segment_direction, lane),
+    pub fn shadow_ray(&self, lane: usize, source_triangle: u32) -> ShadowRay {
+        ShadowRay {
+            origin: get(&self.shadow_ray_origin, lane),
+            state: SHADOW_RAY_WAITS,
+            direction: get(&self.shadow_ray_direction, lane),
             source_triangle,
-            light: get(&self.segment_light, lane),
-            t_max: self.segment_t_max[lane],
+            light: get(&self.shadow_ray_light, lane),
+            t_max: self.shadow_ray_t_max[lane],
         }
     }
 
@@ -136,10 +136,10 @@ pub struct BounceConstants<'a> {
     pub shapes: &'a [AreaLight],
 }
 
-/// Writes the segments to the lights that were sampled, without regard to what hides them from the surfaces except
+/// Writes the shadow rays to the lights that were sampled, without regard to what hides them from the surfaces except
 /// other area lights.
 #[inline(always)]
-fn set_segments<S: Simd>(
+fn set_shadow_rays<S: Simd>(
     steps: &mut LambertianSteps,
     bounce: &BounceConstants,
     surfaces: &Surfaces<S>,
@@ -163,15 +163,15 @@ fn set_segments<S: Simd>(
     let arriving = throughput.times(value).times(light) * share;
     let arriving = arriving.min(f32x16::splat(simd, bounce.clamp));
     exist &= value.any_positive() & arriving.all_below(1.0e30) & arriving.any_positive();
-    steps.have_segment = exist.to_bitmask() as LaneMask;
+    steps.have_shadow_ray = exist.to_bitmask() as LaneMask;
     let offset = surfaces.offset(direction);
     let to_light = direction * distance - offset;
     let length = to_light.dot(to_light).sqrt();
     let is_far = distance.simd_eq(f32::INFINITY);
-    steps.segment_origin = (surfaces.point_world + offset).to_arrays();
-    steps.segment_direction = Vec3x16::select(is_far, direction, to_light / length).to_arrays();
-    steps.segment_light = arriving.max(f32x16::splat(simd, 0.0)).to_arrays();
-    steps.segment_t_max = is_far.select(distance, length * SEGMENT_SHARE).to_array();
+    steps.shadow_ray_origin = (surfaces.point_world + offset).to_arrays();
+    steps.shadow_ray_direction = Vec3x16::select(is_far, direction, to_light / length).to_arrays();
+    steps.shadow_ray_light = arriving.max(f32x16::splat(simd, 0.0)).to_arrays();
+    steps.shadow_ray_t_max = is_far.select(distance, length * SHADOW_RAY_SHARE).to_array();
 }
 
 /// Writes the rays with which the paths go on. `choices`: the random numbers of Russian roulette.
@@ -225,7 +225,7 @@ pub fn lambertian_steps<S: Simd>(
     let [_, choices, to_next, _] = random_pairs;
     let local = lambert_samples(simd, to_next);
     let mut steps = LambertianSteps::default();
-    set_segments(&mut steps, bounce, &surfaces, (throughput, samples));
+    set_shadow_rays(&mut steps, bounce, &surfaces, (throughput, samples));
     let choices = f32x16::load_array_ref(simd, &choices[1]);
     set_rays(&mut steps, bounce.depth, &surfaces, (throughput, local, choices));
     steps

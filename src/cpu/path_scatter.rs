@@ -19,7 +19,7 @@ use super::{
     vec3x16::Vec3x16,
 };
 use crate::{
-    layout::{AreaLight, Batch, Hit, NO_TRIANGLE, PathRay, PathState, SCAN_GROUP_SIZE, SEGMENT_NONE, Segment},
+    layout::{AreaLight, Batch, Hit, NO_TRIANGLE, PathRay, PathState, SCAN_GROUP_SIZE, SHADOW_RAY_NONE, ShadowRay},
     reference::{
         emitters::{LightSample, sample_emitter},
         inputs::KernelInputs,
@@ -73,7 +73,7 @@ pub struct BounceOfPaths<'a> {
 struct PathsOfBlock<'a> {
     rays: Part<'a, PathRay>,
     states: Part<'a, PathState>,
-    segments: Part<'a, Segment>,
+    shadow_rays: Part<'a, ShadowRay>,
 }
 
 /// Does what [`reference::path_scatter`](crate::reference::path_scatter::path_scatter) does.
@@ -87,17 +87,17 @@ pub fn path_scatter(
     let of_paths = (
         parts(paths.rays, live, BLOCK_SIZE),
         parts(paths.states, live, BLOCK_SIZE),
-        parts(paths.segments, live, BLOCK_SIZE),
+        parts(paths.shadow_rays, live, BLOCK_SIZE),
     );
-    of_blocks.into_par_iter().zip(of_paths).for_each(|(of_block, (rays, states, segments))| {
+    of_blocks.into_par_iter().zip(of_paths).for_each(|(of_block, (rays, states, shadow_rays))| {
         let (live, kinds, counts) = of_block;
-        bounce.step_block(live, kinds, &mut PathsOfBlock { rays, states, segments });
+        bounce.step_block(live, kinds, &mut PathsOfBlock { rays, states, shadow_rays });
         *counts = counts_of_block(kinds);
     });
 }
 
 impl BounceOfPaths<'_> {
-    /// Takes the paths of a block one step further. Writes to `kinds` which of them go on and have a segment.
+    /// Takes the paths of a block one step further. Writes to `kinds` which of them go on and have a shadow ray.
     fn step_block(&self, live: &[u32], kinds: &mut [u32], paths: &mut PathsOfBlock) {
         let mut at_lambertian = ArrayVec::<_, BLOCK_SIZE>::new();
         let (mut at_others, mut missed) = (at_lambertian.clone(), at_lambertian.clone());
@@ -157,19 +157,19 @@ impl BounceOfPaths<'_> {
         })
     }
 
-    /// Takes a path one step further. Returns its kind: whether it goes on and has a segment.
+    /// Takes a path one step further. Returns its kind: whether it goes on and has a shadow ray.
     fn step(&self, path_ix: u32, before_light: bool, choices: HitChoices, paths: &mut PathsOfBlock) -> u32 {
         let (ray, state) = (paths.rays.of_path(path_ix), paths.states.of_path(path_ix));
         let (inputs, depth, hit) = (self.inputs, self.batch.depth, &self.hits[path_ix as usize]);
-        let (goes_on, segment) = match before_light {
+        let (goes_on, shadow_ray) = match before_light {
             true => step_path(inputs, || choices, depth, hit, ray, state),
             false => step_past_lights(inputs, || choices, depth, hit, ray, state),
         };
-        // A path without a segment has none already.
-        if segment.state != SEGMENT_NONE {
-            *paths.segments.of_path(path_ix) = segment;
+        // A path without a shadow ray has none already.
+        if shadow_ray.state != SHADOW_RAY_NONE {
+            *paths.shadow_rays.of_path(path_ix) = shadow_ray;
         }
-        kind_of_path(goes_on, segment.state != SEGMENT_NONE)
+        kind_of_path(goes_on, shadow_ray.state != SHADOW_RAY_NONE)
     }
 
     /// Makes the random decisions at the hits of a group of paths. The last ray of a path only meets light, so that no
@@ -242,10 +242,10 @@ impl BounceOfPaths<'_> {
                 continue;
             }
             let triangle_ix = self.hits[path_ix as usize].triangle_ix;
-            let (goes_on, has_segment) = (steps.go_on >> lane & 1 == 1, steps.have_segment >> lane & 1 == 1);
-            kinds[place] = kind_of_path(goes_on, has_segment);
-            if has_segment {
-                *paths.segments.of_path(path_ix) = steps.segment(lane, triangle_ix);
+            let (goes_on, has_shadow_ray) = (steps.go_on >> lane & 1 == 1, steps.have_shadow_ray >> lane & 1 == 1);
+            kinds[place] = kind_of_path(goes_on, has_shadow_ray);
+            if has_shadow_ray {
+                *paths.shadow_rays.of_path(path_ix) = steps.shadow_ray(lane, triangle_ix);
             }
             if goes_on {
                 let ray = paths.rays.of_path(path_ix);
@@ -333,7 +333,7 @@ mod tests {
     struct Paths {
         rays: Vec<PathRay>,
         states: Vec<PathState>,
-        segments: Vec<Segment>,
+        shadow_rays: Vec<ShadowRay>,
         kinds: Vec<u32>,
         blocks: Vec<[u32; 2]>,
     }
@@ -350,21 +350,22 @@ mod tests {
             Self {
                 rays: (0..n).map(|_| ray(random)).collect(),
                 states: (0..n).map(|_| PathState { radiance: random.point(), pdf: random.point().x }).collect(),
-                segments: vec![Segment::zeroed(); n],
+                shadow_rays: vec![ShadowRay::zeroed(); n],
                 kinds: vec![9; n],
                 blocks: vec![[9; 2]; n.div_ceil(BLOCK_SIZE)],
             }
         }
 
         fn buffers(&mut self) -> (PathBuffers<'_>, (&mut [u32], &mut [[u32; 2]])) {
-            let Self { rays, states, segments, kinds, blocks } = self;
-            (PathBuffers { rays, states, segments }, (kinds, blocks))
+            let Self { rays, states, shadow_rays, kinds, blocks } = self;
+            (PathBuffers { rays, states, shadow_rays }, (kinds, blocks))
         }
 
         /// Returns the bits of all floats, of which those of NaN are not told apart.
         fn bits(&self) -> Vec<u32> {
             let words = [bytemuck::cast_slice(&self.rays), bytemuck::cast_slice(&self.states)];
-            let all = words.concat().into_iter().chain(bytemuck::cast_slice::<_, u32>(&self.segments).iter().copied());
+            let all =
+                words.concat().into_iter().chain(bytemuck::cast_slice::<_, u32>(&self.shadow_rays).iter().copied());
             let all = all.chain(self.kinds.clone()).chain(self.blocks.concat());
             all.map(|word: u32| if word & 0x7fff_ffff > 0x7f80_0000 { f32::NAN.to_bits() } else { word }).collect()
         }
@@ -382,7 +383,7 @@ mod tests {
     fn steps_are_those_of_the_reference() {
         const N: usize = 3000;
         let mut random = Uniform(1);
-        let (mut n_lambertian, mut n_going_on, mut n_segments) = (0, 0, 0);
+        let (mut n_lambertian, mut n_going_on, mut n_shadow_rays) = (0, 0, 0);
         let scenes = lights().into_iter().flat_map(|lights| [0, 2, 3, 4].map(|depth| (lights.clone(), depth)));
         for (i, (lights, depth)) in scenes.enumerate() {
             let environment = (i % 2 == 1).then(|| sky(&mut random));
@@ -410,12 +411,13 @@ mod tests {
                 path_scatter(&bounce, &live, paths, results);
                 assert!(found.bits() == expected.bits(), "depth {depth}");
                 n_going_on += found.blocks.iter().map(|[n_going_on, _]| n_going_on).sum::<u32>();
-                n_segments += found.segments.iter().filter(|segment| segment.state != SEGMENT_NONE).count();
+                n_shadow_rays +=
+                    found.shadow_rays.iter().filter(|shadow_ray| shadow_ray.state != SHADOW_RAY_NONE).count();
             }
         }
         assert!(
-            n_lambertian > 10_000 && n_going_on > 10_000 && n_segments > 5000,
-            "{n_lambertian} {n_going_on} {n_segments}"
+            n_lambertian > 10_000 && n_going_on > 10_000 && n_shadow_rays > 5000,
+            "{n_lambertian} {n_going_on} {n_shadow_rays}"
         );
     }
 

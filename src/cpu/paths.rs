@@ -13,14 +13,14 @@ use super::{
 };
 use crate::{
     accel::{kdtree::Traversal, wide_bvh::WideBvh},
-    layout::{Batch, Bounce, Feature, Frame, Hit, PathRay, PathState, SCAN_GROUP_SIZE, Segment},
+    layout::{Batch, Bounce, Feature, Frame, Hit, PathRay, PathState, SCAN_GROUP_SIZE, ShadowRay},
     reference::{
         counting::costs,
         inputs::KernelInputs,
         path_compact,
         path_layers::path_layers,
         path_scatter::PathBuffers,
-        path_trace::{closest_hits_by, ray_of, segments_by},
+        path_trace::{closest_hits_by, ray_of, shadow_rays_by},
         paths::sample_of_path,
         traverser::Tracer,
     },
@@ -34,15 +34,15 @@ pub struct Paths {
     /// Whether each material is Lambertian.
     are_lambertian: Vec<bool>,
     pub states: Vec<PathState>,
-    segments: Vec<Segment>,
+    shadow_rays: Vec<ShadowRay>,
     /// The radiance of each path when the last layer of light was complete.
     snapshots: Vec<[f32; 4]>,
     /// The indices of the paths that are alive, for bounces of even depth and for those of odd depth.
     live: [Vec<u32>; 2],
-    /// The indices of the paths with a segment to a light.
-    with_segment: Vec<u32>,
+    /// The indices of the paths with a shadow ray to a light.
+    with_shadow_ray: Vec<u32>,
     /// For each block of `SCAN_GROUP_SIZE` paths of a bounce, the numbers of those that go on and of those with a
-    /// segment, and after the prefix sum the numbers in all blocks before.
+    /// shadow ray, and after the prefix sum the numbers in all blocks before.
     scan_blocks: Vec<[u32; 2]>,
 }
 
@@ -55,16 +55,17 @@ impl Paths {
         queue.hits.resize(n, Hit::zeroed());
         self.states.clear();
         self.states.resize(n, PathState::zeroed());
-        self.segments.clear();
-        self.segments.resize(n, Segment::zeroed());
+        self.shadow_rays.clear();
+        self.shadow_rays.resize(n, ShadowRay::zeroed());
         self.live[0] = (0..n_paths).collect();
-        self.with_segment.clear();
+        self.with_shadow_ray.clear();
         self.pixels = pixels_of_batch(inputs, batch);
         path_begin(inputs, &self.pixels, &mut queue.rays);
     }
 
-    /// Finds the hits of the paths that are alive, and tests the segments of the bounce before. Returns the numbers of
-    /// hits and of segments. `wide_bvh`: the hierarchy through which all but camera rays are traced, if there is one.
+    /// Finds the hits of the paths that are alive, and tests the shadow rays of the bounce before. Returns the numbers
+    /// of hits and of shadow rays. `wide_bvh`: the hierarchy through which all but camera rays are traced, if there is
+    /// one.
     pub fn trace(
         &mut self,
         inputs: &KernelInputs,
@@ -91,11 +92,11 @@ impl Paths {
         let ray = |path_ix: &u32| queue.rays[*path_ix as usize];
         let shadow_ray = |path_ix: &u32| {
             let pixel_ix = ray(path_ix).pixel_ix;
-            PathRay { pixel_ix, ..ray_of(&self.segments[*path_ix as usize]) }
+            PathRay { pixel_ix, ..ray_of(&self.shadow_rays[*path_ix as usize]) }
         };
         let live = &self.live[depth as usize % 2];
         let rays: Vec<_> = live.iter().filter(is_first).map(ray).collect();
-        let shadow_rays: Vec<_> = self.with_segment.iter().filter(is_first).map(shadow_ray).collect();
+        let shadow_rays: Vec<_> = self.with_shadow_ray.iter().filter(is_first).map(shadow_ray).collect();
         let inputs = &inputs.through_veils_at_random();
         costs::count_rays::<false>(inputs, traversal, &rays, pixel_features);
         costs::count_rays::<true>(inputs, traversal, &shadow_rays, pixel_features);
@@ -108,11 +109,11 @@ impl Paths {
         depth: u32,
         queue: &mut Queue,
     ) -> (u32, u32) {
-        let Self { states, segments, live, with_segment, .. } = self;
+        let Self { states, shadow_rays, live, with_shadow_ray, .. } = self;
         let live = &live[depth as usize % 2];
         let n_hits = closest_hits_by(inputs, &new_tracer, live, &queue.rays, &mut queue.hits);
-        segments_by(inputs, &new_tracer, with_segment, segments, states);
-        (n_hits, with_segment.len() as u32)
+        shadow_rays_by(inputs, &new_tracer, with_shadow_ray, shadow_rays, states);
+        (n_hits, with_shadow_ray.len() as u32)
     }
 
     /// Adds the light at the hits, and replaces the rays by those with which the paths go on.
@@ -121,7 +122,7 @@ impl Paths {
         queue.child_kinds.resize(live.len(), 0);
         self.scan_blocks.resize(live.len().div_ceil(SCAN_GROUP_SIZE as usize), [0; 2]);
         let Queue { rays, hits, child_kinds, .. } = queue;
-        let paths = PathBuffers { rays, states: &mut self.states, segments: &mut self.segments };
+        let paths = PathBuffers { rays, states: &mut self.states, shadow_rays: &mut self.shadow_rays };
         if batch.depth == 0 {
             self.are_lambertian = lambertian_materials(inputs);
         }
@@ -136,19 +137,19 @@ impl Paths {
         path_layers(frame, batch, &self.states, &mut self.snapshots, pixel_layers);
     }
 
-    /// Computes the prefix sums of the numbers of paths that go on and of segments, and the row of the next bounce.
+    /// Computes the prefix sums of the numbers of paths that go on and of shadow rays, and the row of the next bounce.
     pub fn spine(&mut self, frame: &Frame, depth: u32, queue: &mut Queue) {
         let mut next = Bounce::of_paths(0, frame);
         path_compact::spine(&mut self.scan_blocks, frame, &mut queue.bounces[depth as usize], &mut next);
         queue.bounces.push(next);
     }
 
-    /// Lists the paths that go on, and those with a segment.
+    /// Lists the paths that go on, and those with a shadow ray.
     pub fn compact(&mut self, depth: u32, queue: &Queue) {
         let [even, odd] = &mut self.live;
         let (live, next) = if depth.is_multiple_of(2) { (even, odd) } else { (odd, even) };
         next.resize(queue.bounces[depth as usize + 1].n_rays as usize, 0);
-        self.with_segment.resize(queue.bounces[depth as usize].n_segments as usize, 0);
-        path_compact::path_compact(live, &queue.child_kinds, &self.scan_blocks, next, &mut self.with_segment);
+        self.with_shadow_ray.resize(queue.bounces[depth as usize].n_shadow_rays as usize, 0);
+        path_compact::path_compact(live, &queue.child_kinds, &self.scan_blocks, next, &mut self.with_shadow_ray);
     }
 }

@@ -12,7 +12,7 @@ pub struct Queue {
     /// The closest hit of each ray.
     pub hits: Vec<Hit>,
     /// For each ray, the kinds of its child rays, as bits: `CHILD_REFLECTED` and the other constants `CHILD_*`. For
-    /// each path, whether it goes on and has a segment.
+    /// each path, whether it goes on and has a shadow ray.
     pub child_kinds: Vec<u32>,
     /// For each ray, the index in `rays` of its first child, or the index that the child would have.
     pub first_children: Vec<u32>,

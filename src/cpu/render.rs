@@ -311,7 +311,7 @@ impl Renderer {
         for (depth, bounce) in (0..).zip(&plan.bounces) {
             self.batch.depth = depth;
             passes(bounce).for_each(|pass| self.run(pass, depth));
-            // After a bounce that ends all paths, its segments are still to be traced.
+            // After a bounce that ends all paths, its shadow rays are still to be traced.
             if self.queue.bounces[depth as usize].n_rays == 0 {
                 break;
             }
@@ -361,7 +361,7 @@ impl Renderer {
         self.clock.time(Pass::PathBegin, Some(0), || paths.begin(&inputs, batch, n_paths, queue));
     }
 
-    /// Finds the closest hits of the bounce's paths, tests the segments of the bounce before, and counts both.
+    /// Finds the closest hits of the bounce's paths, tests the shadow rays of the bounce before, and counts both.
     fn path_trace(&mut self, depth: u32) {
         let Self { world, frame, links, paths, queue, path_materials, .. } = self;
         let inputs = KernelInputs::new(world, frame).with_links(links).of_paths(path_materials, world.emitters());
@@ -371,9 +371,9 @@ impl Renderer {
             paths.note_costs(&inputs, traversal, depth, queue, &mut self.pixel_features);
         }
         let trace = || paths.trace(&inputs, (traversal, wide_bvh_for(world, traversal)), depth, queue);
-        let (n_hits, n_segments) = self.clock.time(Pass::PathTrace, Some(depth), trace);
+        let (n_hits, n_shadow_rays) = self.clock.time(Pass::PathTrace, Some(depth), trace);
         if let Some(before) = self.batch_stats.last_mut() {
-            before.n_shadow_rays = n_segments.into();
+            before.n_shadow_rays = n_shadow_rays.into();
         }
         let n_rays = self.queue.bounces[depth as usize].n_rays.into();
         self.batch_stats.push(BounceStats { n_rays, n_hits: n_hits.into(), n_shadow_rays: 0 });

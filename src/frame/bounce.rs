@@ -1,5 +1,5 @@
 //! Rows of the buffer `bounces`, one for each bounce of each batch. A row has the bounce's range of rays and the sizes
-//! of the dispatches over them; of paths, it also has the number of segments. Twin of `compact_spine.comp`, which
+//! of the dispatches over them; of paths, it also has the number of shadow rays. Twin of `compact_spine.comp`, which
 //! computes the rows of secondary rays on the device.
 
 use std::ops::Range;
@@ -34,11 +34,11 @@ impl Bounce {
         row
     }
 
-    /// Sets the number of paths that are alive at the bounce, the lanes of each ray and segment, and the sizes of the
-    /// dispatches along x. `n_segments`: the number of segments of the bounce before, which are traced with the rays of
-    /// this bounce.
-    pub fn set_paths(&mut self, n_paths: u32, n_segments: u32, constants: &Frame) {
-        let n_traced = n_paths + n_segments;
+    /// Sets the number of paths that are alive at the bounce, the lanes of each ray and shadow ray, and the sizes of
+    /// the dispatches along x. `n_shadow_rays`: the number of shadow rays of the bounce before, which are traced with
+    /// the rays of this bounce.
+    pub fn set_paths(&mut self, n_paths: u32, n_shadow_rays: u32, constants: &Frame) {
+        let n_traced = n_paths + n_shadow_rays;
         self.n_rays = n_paths;
         self.n_wanted = n_paths;
         self.trace_lanes_log2 = lanes_log2(n_traced, constants.n_lanes);
@@ -50,13 +50,13 @@ impl Bounce {
     pub fn set_rays(&mut self, first_ray: u32, n_rays: u32, constants: &Frame) {
         let n_so_far = first_ray + n_rays;
         let for_rays = lanes_log2(n_rays, constants.n_lanes);
-        let for_segments = lanes_log2(n_so_far.saturating_mul(constants.n_lights), constants.n_lanes);
+        let for_shadow_rays = lanes_log2(n_so_far.saturating_mul(constants.n_lights), constants.n_lanes);
         self.first_ray = first_ray;
         self.n_rays = n_rays;
         self.trace_groups_x = (n_rays << for_rays).div_ceil(RAY_GROUP_SIZE);
         self.trace_lanes_log2 = for_rays;
-        self.shadow_groups_x = (n_so_far << for_segments).div_ceil(RAY_GROUP_SIZE);
-        self.shadow_lanes_log2 = for_segments;
+        self.shadow_groups_x = (n_so_far << for_shadow_rays).div_ceil(RAY_GROUP_SIZE);
+        self.shadow_lanes_log2 = for_shadow_rays;
         self.scan_groups_x = n_rays.div_ceil(SCAN_GROUP_SIZE);
         self.shade_groups_x = n_so_far.div_ceil(RAY_GROUP_SIZE);
     }

@@ -5,7 +5,7 @@ use super::resource::{
     Resource::{
         Bounces, ChildKinds, Counters, FirstChildren, Hits, LightVisibility, LivePaths, PathSnapshots, PathStates,
         PixelAccumulated, PixelDisplay, PixelFeatures, PixelFiltered, PixelGuides, PixelNearest, PixelRadiance,
-        RasterGroups, RayRadiance, Rays, ScanBlocks, Segments, Stalls, TriangleIds,
+        RasterGroups, RayRadiance, Rays, ScanBlocks, ShadowRays, Stalls, TriangleIds,
     },
 };
 
@@ -16,7 +16,7 @@ pub enum Role {
     PrimaryVisibility,
     /// Finds the closest hits of a bounce's rays.
     ClosestHit,
-    /// Tests the segments between hits and lights, the shadow rays.
+    /// Tests the shadow rays between hits and lights.
     Shadow,
     /// Computes radiance at the hits, or adds it up in the pixels.
     Light,
@@ -61,7 +61,7 @@ pub enum Pass {
     CompactSpine,
     /// Writes the next bounce's rays.
     CompactScatter,
-    /// Tests the segments from hits to lights.
+    /// Tests the shadow rays from hits to lights.
     Shadow,
     /// Computes the radiance that each ray contributes to its pixel: that of its hit, weighted by its throughput.
     Shade,
@@ -77,11 +77,11 @@ pub enum Pass {
     Tonemap,
     /// Makes the camera rays of a batch's paths.
     PathBegin,
-    /// Finds the closest hits of paths, and tests the segments to lights of the bounce before.
+    /// Finds the closest hits of paths, and tests the shadow rays to lights of the bounce before.
     PathTrace,
     /// Adds the light that paths meet, samples lights at their hits, and the directions in which they go on.
     PathScatter,
-    /// Lists the paths that go on, and those with a segment to a light, without gaps.
+    /// Lists the paths that go on, and those with a shadow ray to a light, without gaps.
     PathCompact,
     /// Adds up one layer of the light of each pixel's paths: emission, direct or indirect light.
     PathLayers,
@@ -279,7 +279,7 @@ const TABLE: [Info; 26] = [
         scope: Scope::Bounce,
         color: [90, 160, 235],
         reads: &[],
-        writes: &[Rays, PathStates, Segments, LivePaths],
+        writes: &[Rays, PathStates, ShadowRays, LivePaths],
         indirect: None,
     },
     Info {
@@ -288,8 +288,8 @@ const TABLE: [Info; 26] = [
         role: Role::ClosestHit,
         scope: Scope::Bounce,
         color: [235, 110, 40],
-        reads: &[Rays, Hits, LivePaths, Bounces, PathStates, Segments, Counters, PixelFeatures, Stalls],
-        writes: &[Hits, PathStates, Segments, Counters, PixelFeatures, Stalls],
+        reads: &[Rays, Hits, LivePaths, Bounces, PathStates, ShadowRays, Counters, PixelFeatures, Stalls],
+        writes: &[Hits, PathStates, ShadowRays, Counters, PixelFeatures, Stalls],
         indirect: Some(Bounces),
     },
     Info {
@@ -299,7 +299,7 @@ const TABLE: [Info; 26] = [
         scope: Scope::Bounce,
         color: [240, 200, 70],
         reads: &[Rays, Hits, LivePaths, Bounces, PathStates],
-        writes: &[Rays, PathStates, Segments, ChildKinds, ScanBlocks],
+        writes: &[Rays, PathStates, ShadowRays, ChildKinds, ScanBlocks],
         indirect: Some(Bounces),
     },
     Info {

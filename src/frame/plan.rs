@@ -10,7 +10,7 @@ use super::{
         Resource::{
             Bounces, ChildKinds, Counters, FirstChildren, Hits, LightVisibility, LivePaths, PathSnapshots, PathStates,
             PixelAccumulated, PixelFeatures, PixelFiltered, PixelGuides, PixelNearest, PixelRadiance, RasterGroups,
-            RayRadiance, Rays, ScanBlocks, Segments,
+            RayRadiance, Rays, ScanBlocks, ShadowRays,
         },
     },
     {Denoise, Integrator, Primary, RenderOptions},
@@ -184,12 +184,12 @@ fn bounce_of_paths(kind: &FrameKind, depth: u32) -> Section {
     if depth == 0 {
         bounce.extend([
             Step::Run(Pass::PathBegin),
-            barrier(Touch::Write, Touch::Update, &[Rays, PathStates, Segments, LivePaths]),
+            barrier(Touch::Write, Touch::Update, &[Rays, PathStates, ShadowRays, LivePaths]),
         ]);
     }
     bounce.extend([
         Step::Run(Pass::PathTrace),
-        barrier(Touch::Write, Touch::Update, &[Hits, PathStates, Segments, Counters, PixelFeatures]),
+        barrier(Touch::Write, Touch::Update, &[Hits, PathStates, ShadowRays, Counters, PixelFeatures]),
     ]);
     if depth == 0 && kind.features {
         bounce.extend([Step::Run(Pass::Features), barrier(Touch::Write, Touch::Update, &[PixelFeatures])]);
@@ -197,7 +197,7 @@ fn bounce_of_paths(kind: &FrameKind, depth: u32) -> Section {
     if kind.is_lit {
         bounce.extend([
             Step::Run(Pass::PathScatter),
-            barrier(Touch::Write, Touch::Update, &[Rays, PathStates, Segments, ChildKinds, ScanBlocks]),
+            barrier(Touch::Write, Touch::Update, &[Rays, PathStates, ShadowRays, ChildKinds, ScanBlocks]),
         ]);
     }
     if depth == 0 && kind.is_lit && kind.denoise == Denoise::Edge {

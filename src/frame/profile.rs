@@ -44,7 +44,7 @@ pub struct PassTime {
     /// Number of rays of the bounce, or of all bounces of the batch. None for passes that run once a frame.
     pub n_rays_in: Option<u64>,
     /// Number of rays that come out of the pass. For passes that find closest hits: rays that hit. For shadow:
-    /// segments that were tested. For compaction: rays of the next bounce. None for all other passes.
+    /// shadow rays that were tested. For compaction: rays of the next bounce. None for all other passes.
     pub n_rays_out: Option<u64>,
 }
 
@@ -70,7 +70,7 @@ pub struct BounceStats {
     pub n_rays: u64,
     /// Rays that hit something.
     pub n_hits: u64,
-    /// Shadow segments that were tested.
+    /// Shadow rays that were tested.
     pub n_shadow_rays: u64,
 }
 

@@ -10,12 +10,12 @@ pub enum Resource {
     /// The closest hit of each ray.
     Hits,
     /// The kinds of each ray's children, the rays that go on from its hit: reflected, refracted, both or none. In
-    /// frames of paths: whether each path goes on, and whether it has a segment.
+    /// frames of paths: whether each path goes on, and whether it has a shadow ray.
     ChildKinds,
     /// Index in `Rays` at which each ray's children begin, or would begin if it had any.
     FirstChildren,
     /// The number of children of each block of rays, then the exclusive prefix sums of these numbers. In frames of
-    /// paths, two numbers for each block: of paths that go on, and of segments.
+    /// paths, two numbers for each block: of paths that go on, and of shadow rays.
     ScanBlocks,
     /// The number of rays of each bounce, and the sizes of its dispatches.
     Bounces,
@@ -44,15 +44,15 @@ pub enum Resource {
     /// Triangles with large bounding rectangles, which `RasterizeBlocks` rasterizes, their number and that of their
     /// blocks, and the size of its dispatch.
     RasterGroups,
-    /// Numbers of hits and of shadow segments of each bounce of each batch.
+    /// Numbers of hits and of shadow rays of each bounce of each batch.
     Counters,
     /// States of stalled rays: rays that have spent the loop turns of a dispatch and go on in a further dispatch.
     Stalls,
     /// What is known of each path beside its ray: the light that it has brought, the pdf of its direction.
     PathStates,
-    /// The segment of each path from its last hit to a sampled light.
-    Segments,
-    /// The indices of the paths that are alive, for this bounce and the next, and of those with a segment.
+    /// The shadow ray of each path from its last hit to a sampled light.
+    ShadowRays,
+    /// The indices of the paths that are alive, for this bounce and the next, and of those with a shadow ray.
     LivePaths,
     /// The radiance of each path when the last layer of light was complete.
     PathSnapshots,
@@ -81,7 +81,7 @@ impl Resource {
         Self::Counters,
         Self::Stalls,
         Self::PathStates,
-        Self::Segments,
+        Self::ShadowRays,
         Self::LivePaths,
         Self::PathSnapshots,
     ];
@@ -109,7 +109,7 @@ impl Resource {
             Self::Counters => layout::BIND_COUNTERS,
             Self::Stalls => layout::BIND_STALLS,
             Self::PathStates => layout::BIND_PATH_STATES,
-            Self::Segments => layout::BIND_SEGMENTS,
+            Self::ShadowRays => layout::BIND_SHADOW_RAYS,
             Self::LivePaths => layout::BIND_LIVE_PATHS,
             Self::PathSnapshots => layout::BIND_PATH_SNAPSHOTS,
         }

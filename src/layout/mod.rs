@@ -43,7 +43,7 @@ mod tests {
             BIND_PIXEL_FEATURES => Some("Feature"),
             BIND_PIXEL_GUIDES => Some("Guide"),
             BIND_PATH_STATES => Some("PathState"),
-            BIND_SEGMENTS => Some("Segment"),
+            BIND_SHADOW_RAYS => Some("ShadowRay"),
             BIND_COUNTERS => Some("Counters"),
             BIND_RASTER_GROUPS => Some("RasterGroups"),
             BIND_GRID_BUILD => Some("GridBuild"),

@@ -19,7 +19,7 @@ impl PathBegin {
         Ok(Self { kernel: kernel(context, bindings, "path_begin", spirv!("path_begin.comp"), &Constants::new())? })
     }
 
-    /// Leaves `rays`, `path_states`, `segments` and the list of all paths in `live_paths`.
+    /// Leaves `rays`, `path_states`, `shadow_rays` and the list of all paths in `live_paths`.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         commands.dispatch(&self.kernel, Some(batch.depth), batch, resources.paths_dispatch(batch));
     }

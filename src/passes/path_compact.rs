@@ -1,5 +1,5 @@
-//! Path compact: lists the paths that go on and those with a segment, without gaps and in order, by a prefix sum. The
-//! kernels path_scatter and compact_spine have made the sum.
+//! Path compact: lists the paths that go on and those with a shadow ray, without gaps and in order, by a prefix sum.
+//! The kernels path_scatter and compact_spine have made the sum.
 
 use std::sync::Arc;
 
@@ -26,7 +26,7 @@ impl PathCompact {
     }
 
     /// Needs `child_kinds`, `scan_blocks` and the list of this bounce in `live_paths`. Leaves that of the next bounce
-    /// and that of the segments.
+    /// and that of the shadow rays.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         commands.dispatch(&self.list, Some(batch.depth), batch, resources.scan_dispatch(batch));
     }

@@ -1,4 +1,4 @@
-//! Path trace: finds the closest hits of paths, and tests the segments to lights of the bounce before.
+//! Path trace: finds the closest hits of paths, and tests the shadow rays to lights of the bounce before.
 
 use std::sync::Arc;
 
@@ -28,10 +28,11 @@ impl PathTrace {
         Ok(Self { kernel: kernel(context, bindings, "path_trace", shader, &constants)? })
     }
 
-    /// Needs `rays` of the paths that are alive, `segments`, and in `live_paths` the lists of this bounce and of the
-    /// segments. Leaves `hits`. Updates `segments` and `path_states`, the counters if the options ask for a profile,
-    /// and `pixel_features` if they ask for features. A ray that has stalled leaves a mark in place of its hit, a
-    /// segment in place of its state. `batch.round`: which of them are traced, all or those that have stalled.
+    /// Needs `rays` of the paths that are alive, `shadow_rays`, and in `live_paths` the lists of this bounce and of the
+    /// shadow rays. Leaves `hits`. Updates `shadow_rays` and `path_states`, the counters if the options ask for a
+    /// profile, and `pixel_features` if they ask for features. A ray that has stalled leaves a mark in place of its
+    /// hit, a shadow ray in place of its state. `batch.round`: which of them are traced, all or those that have
+    /// stalled.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         commands.dispatch(&self.kernel, Some(batch.depth), batch, resources.trace_dispatch(batch));
     }

@@ -1,4 +1,4 @@
-//! Shadow (the paper's section 2.1): tests whether anything is between each hit and each light. A segment is the
+//! Shadow (the paper's section 2.1): tests whether anything is between each hit and each light. A shadow ray is the
 //! shadow ray from a hit to a light.
 
 use std::sync::Arc;
@@ -23,14 +23,14 @@ impl Shadow {
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
         let shader = searching("shadow", bindings, options.traversal, Some(constants::SHADOW_GAPS));
-        // `COUNTS` is not set, since the pass shade counts the segments.
+        // `COUNTS` is not set, since the pass shade counts the shadow rays.
         let constants = search_constants(context)?.set(constants::COUNT_COSTS, options.features);
         Ok(Self { kernel: kernel(context, bindings, "shadow", shader, &constants)? })
     }
 
-    /// Needs `rays` and `hits` of all bounces of the batch. Leaves `light_visibility`; a segment that has stalled
+    /// Needs `rays` and `hits` of all bounces of the batch. Leaves `light_visibility`; a shadow ray that has stalled
     /// leaves a mark in place of its visibility. Updates `pixel_features` if the options ask for features.
-    /// `batch.round`: which segments are traced, all or those that have stalled.
+    /// `batch.round`: which shadow rays are traced, all or those that have stalled.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         commands.dispatch(&self.kernel, None, batch, resources.shadow_dispatch(batch));
     }

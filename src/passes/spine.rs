@@ -22,7 +22,7 @@ impl Spine {
     }
 
     /// Needs `scan_blocks`. Leaves their exclusive prefix sums there, and the next bounce's row of `bounces`. The row
-    /// of this bounce gets its number of segments.
+    /// of this bounce gets its number of shadow rays.
     pub fn record(&self, commands: &Commands, batch: &Batch) {
         commands.dispatch(&self.kernel, Some(batch.depth), batch, Dispatch::Threads([1, 1, 1], [1, 1, 1]));
     }

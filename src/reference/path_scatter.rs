@@ -9,17 +9,17 @@ use super::{
     path_vertex::{HitChoices, pairs_of_hit, step_path},
     paths::{key_of_path, pixel_of_path},
 };
-use crate::layout::{Batch, Hit, PathRay, PathState, SCAN_GROUP_SIZE, SEGMENT_NONE, Segment};
+use crate::layout::{Batch, Hit, PathRay, PathState, SCAN_GROUP_SIZE, SHADOW_RAY_NONE, ShadowRay};
 
 /// The paths of a batch, one element each.
 pub struct PathBuffers<'a> {
     pub rays: &'a mut [PathRay],
     pub states: &'a mut [PathState],
-    pub segments: &'a mut [Segment],
+    pub shadow_rays: &'a mut [ShadowRay],
 }
 
 /// Takes the paths `live` one step further. Writes whether the path at each place of the list goes on and has a
-/// segment (`child_kinds`). Counts both in each block of `SCAN_GROUP_SIZE` places (`scan_blocks`). `live` is in
+/// shadow ray (`child_kinds`). Counts both in each block of `SCAN_GROUP_SIZE` places (`scan_blocks`). `live` is in
 /// ascending order.
 pub fn path_scatter(
     inputs: &KernelInputs,
@@ -33,20 +33,20 @@ pub fn path_scatter(
     let of_paths = (
         parts(paths.rays, live, block_size),
         parts(paths.states, live, block_size),
-        parts(paths.segments, live, block_size),
+        parts(paths.shadow_rays, live, block_size),
     );
-    of_blocks.into_par_iter().zip(of_paths).for_each(|(of_block, (mut rays, mut states, mut segments))| {
+    of_blocks.into_par_iter().zip(of_paths).for_each(|(of_block, (mut rays, mut states, mut shadow_rays))| {
         let (live, kinds, counts) = of_block;
         for (&path_ix, kind) in live.iter().zip(&mut *kinds) {
             let key = key_of_path(inputs, path_ix, pixel_of_path(inputs.frame(), batch, path_ix));
             let (ray, state) = (rays.of_path(path_ix), states.of_path(path_ix));
             let choices = || HitChoices { pairs: pairs_of_hit(key, batch.depth), of_environment: None };
-            let (goes_on, segment) = step_path(inputs, choices, batch.depth, &hits[path_ix as usize], ray, state);
-            // A path without a segment has none already.
-            if segment.state != SEGMENT_NONE {
-                *segments.of_path(path_ix) = segment;
+            let (goes_on, shadow_ray) = step_path(inputs, choices, batch.depth, &hits[path_ix as usize], ray, state);
+            // A path without a shadow ray has none already.
+            if shadow_ray.state != SHADOW_RAY_NONE {
+                *shadow_rays.of_path(path_ix) = shadow_ray;
             }
-            *kind = kind_of_path(goes_on, segment.state != SEGMENT_NONE);
+            *kind = kind_of_path(goes_on, shadow_ray.state != SHADOW_RAY_NONE);
         }
         *counts = counts_of_block(kinds);
     });

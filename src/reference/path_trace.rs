@@ -1,4 +1,4 @@
-//! Path trace: the closest hits of paths, and the segments to lights. Twin of `path_trace.comp`.
+//! Path trace: the closest hits of paths, and the shadow rays to lights. Twin of `path_trace.comp`.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     accel::kdtree::Traversal,
-    layout::{Hit, NO_TRIANGLE, PathRay, PathState, SEGMENT_NONE, Segment},
+    layout::{Hit, NO_TRIANGLE, PathRay, PathState, SHADOW_RAY_NONE, ShadowRay},
 };
 
 /// Writes the closest hits of the paths `live`, which are in ascending order, to `hits`. Returns how many of them hit
@@ -49,52 +49,52 @@ pub fn closest_hits_by<T: Tracer>(
     chunks.map_init(new_tracer, |tracer, (live, hits)| trace(tracer, live, hits)).sum()
 }
 
-/// Tests the segments of the paths `with_segment`, which are in ascending order. Light that arrives is added to the
-/// paths' states, and the segments are removed.
-pub fn segments(
+/// Tests the shadow rays of the paths `with_shadow_ray`, which are in ascending order. Light that arrives is added to
+/// the paths' states, and the shadow rays are removed.
+pub fn shadow_rays(
     inputs: &KernelInputs,
     traversal: Traversal,
-    with_segment: &[u32],
-    segments: &mut [Segment],
+    with_shadow_ray: &[u32],
+    shadow_rays: &mut [ShadowRay],
     states: &mut [PathState],
 ) {
-    segments_by(inputs, || Traverser::new(inputs, traversal), with_segment, segments, states);
+    shadow_rays_by(inputs, || Traverser::new(inputs, traversal), with_shadow_ray, shadow_rays, states);
 }
 
-/// Does what [`segments`] does, by tracers that `new_tracer` makes, at least one for each thread that works.
-pub fn segments_by<T: Tracer>(
+/// Does what [`shadow_rays`] does, by tracers that `new_tracer` makes, at least one for each thread that works.
+pub fn shadow_rays_by<T: Tracer>(
     inputs: &KernelInputs,
     new_tracer: impl Fn() -> T + Sync + Send,
-    with_segment: &[u32],
-    segments: &mut [Segment],
+    with_shadow_ray: &[u32],
+    shadow_rays: &mut [ShadowRay],
     states: &mut [PathState],
 ) {
     let inputs = &inputs.through_veils_at_random();
-    let test = |tracer: &mut T, list: &[u32], mut segments: Part<Segment>, mut states: Part<PathState>| {
-        let search_ray = |&path_ix: &u32| (path_ix, SearchRay::from(&ray_of(segments.of_path(path_ix))));
+    let test = |tracer: &mut T, list: &[u32], mut shadow_rays: Part<ShadowRay>, mut states: Part<PathState>| {
+        let search_ray = |&path_ix: &u32| (path_ix, SearchRay::from(&ray_of(shadow_rays.of_path(path_ix))));
         let search_rays: Vec<_> = list.iter().map(search_ray).collect();
         tracer.trace_all::<true, _>(inputs, search_rays.into_iter(), |path_ix, hit| {
-            let segment = segments.of_path(path_ix);
-            segment.state = SEGMENT_NONE;
+            let shadow_ray = shadow_rays.of_path(path_ix);
+            shadow_ray.state = SHADOW_RAY_NONE;
             if hit.triangle_ix == NO_TRIANGLE {
-                states.of_path(path_ix).radiance += segment.light;
+                states.of_path(path_ix).radiance += shadow_ray.light;
             }
         });
     };
-    let of_paths = (parts(segments, with_segment, RAYS_PER_TASK), parts(states, with_segment, RAYS_PER_TASK));
-    let chunks = with_segment.par_chunks(RAYS_PER_TASK).zip(of_paths);
-    let test_chunk = |tracer: &mut T, (list, (segments, states))| test(tracer, list, segments, states);
+    let of_paths = (parts(shadow_rays, with_shadow_ray, RAYS_PER_TASK), parts(states, with_shadow_ray, RAYS_PER_TASK));
+    let chunks = with_shadow_ray.par_chunks(RAYS_PER_TASK).zip(of_paths);
+    let test_chunk = |tracer: &mut T, (list, (shadow_rays, states))| test(tracer, list, shadow_rays, states);
     chunks.for_each_init(new_tracer, test_chunk);
 }
 
-/// Returns the ray of a segment, without its pixel.
-pub(crate) fn ray_of(segment: &Segment) -> PathRay {
+/// Returns the ray of a shadow ray, without its pixel.
+pub(crate) fn ray_of(shadow_ray: &ShadowRay) -> PathRay {
     PathRay {
-        origin: segment.origin,
+        origin: shadow_ray.origin,
         pixel_ix: 0,
-        direction: segment.direction,
-        source_triangle: segment.source_triangle,
+        direction: shadow_ray.direction,
+        source_triangle: shadow_ray.source_triangle,
         throughput: Vec3::ZERO,
-        t_max: segment.t_max,
+        t_max: shadow_ray.t_max,
     }
 }

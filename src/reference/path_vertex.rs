@@ -15,8 +15,8 @@ use super::{
     surface::Surface,
 };
 use crate::layout::{
-    Hit, LEAST_SURVIVAL, NO_TRIANGLE, PathRay, PathState, ROULETTE_DEPTH, SEGMENT_NONE, SEGMENT_SHARE, SEGMENT_WAITS,
-    STUDIO_LEAST_PDF, Segment,
+    Hit, LEAST_SURVIVAL, NO_TRIANGLE, PathRay, PathState, ROULETTE_DEPTH, SHADOW_RAY_NONE, SHADOW_RAY_SHARE,
+    SHADOW_RAY_WAITS, STUDIO_LEAST_PDF, ShadowRay,
 };
 
 /// The number of pairs of random numbers that come before those of the first hit: in the pixel and in the lens.
@@ -76,9 +76,9 @@ fn met_environment(inputs: &KernelInputs, ray: &PathRay, state: &PathState, dept
     if mirrors { met + studio_radiance(inputs.frame(), ray.direction) } else { met }
 }
 
-const NO_SEGMENT: Segment = Segment {
+const NO_SHADOW_RAY: ShadowRay = ShadowRay {
     origin: Vec3::ZERO,
-    state: SEGMENT_NONE,
+    state: SHADOW_RAY_NONE,
     direction: Vec3::ZERO,
     source_triangle: NO_TRIANGLE,
     light: Vec3::ZERO,
@@ -94,46 +94,46 @@ struct Vertex<'a> {
     throughput: Vec3,
 }
 
-/// The segment to a light that is sampled at a hit.
-fn segment_to_light(inputs: &KernelInputs, choices: &HitChoices, vertex: &Vertex) -> Segment {
+/// The shadow ray to a light that is sampled at a hit.
+fn shadow_ray_to_light(inputs: &KernelInputs, choices: &HitChoices, vertex: &Vertex) -> ShadowRay {
     let &Vertex { depth, surface, terms, triangle_ix, throughput } = vertex;
     if is_smooth(terms.material) {
-        return NO_SEGMENT;
+        return NO_SHADOW_RAY;
     }
     let [to_light, which, ..] = choices.pairs;
     let u = vec3(to_light.x, to_light.y, which.x);
     let sample = sample_light_with(inputs, surface.point_world, u, choices.of_environment.as_ref());
     if sample.light == Vec3::ZERO {
-        return NO_SEGMENT;
+        return NO_SHADOW_RAY;
     }
     let scattered = eval_bsdf(terms, surface, sample.direction);
     if !scattered.value.cmpgt(Vec3::ZERO).any() {
-        return NO_SEGMENT;
+        return NO_SHADOW_RAY;
     }
     let weight = if sample.pdf > 0.0 { power_heuristic(sample.pdf, scattered.pdf) } else { 1.0 };
     let light = added_light(inputs, throughput * scattered.value * sample.light * weight, depth + 1);
     if !light.cmpgt(Vec3::ZERO).any() {
-        return NO_SEGMENT;
+        return NO_SHADOW_RAY;
     }
     let side = if sample.direction.dot(surface.geometric) < 0.0 { -surface.clearance } else { surface.clearance };
     let offset = side * surface.geometric;
-    let mut segment = Segment {
+    let mut shadow_ray = ShadowRay {
         origin: surface.point_world + offset,
-        state: SEGMENT_WAITS,
+        state: SHADOW_RAY_WAITS,
         direction: sample.direction,
         source_triangle: triangle_ix,
         light,
         t_max: sample.distance,
     };
     if sample.distance.is_infinite() {
-        return segment;
+        return shadow_ray;
     }
-    // From its start beside the surface, the segment still goes to the point that was sampled.
+    // From its start beside the surface, the shadow ray still goes to the point that was sampled.
     let to_light = sample.distance * sample.direction - offset;
     let distance = to_light.length();
-    segment.direction = to_light / distance;
-    segment.t_max = SEGMENT_SHARE * distance;
-    segment
+    shadow_ray.direction = to_light / distance;
+    shadow_ray.t_max = SHADOW_RAY_SHARE * distance;
+    shadow_ray
 }
 
 /// Whether a path survives Russian roulette. Its throughput is then larger, by the reciprocal of the probability.
@@ -147,7 +147,7 @@ fn survives(depth: u32, u: f32, throughput: &mut Vec3) -> bool {
 }
 
 /// Adds the light that the path's ray meets to its state, samples a light at the hit, and replaces the ray by the one
-/// with which the path goes on. Returns whether it does, and the segment to the light. `choices` is called if the
+/// with which the path goes on. Returns whether it does, and the shadow ray to the light. `choices` is called if the
 /// path makes random decisions.
 pub fn step_path(
     inputs: &KernelInputs,
@@ -156,13 +156,13 @@ pub fn step_path(
     hit: &Hit,
     ray: &mut PathRay,
     state: &mut PathState,
-) -> (bool, Segment) {
+) -> (bool, ShadowRay) {
     let is_miss = hit.triangle_ix == NO_TRIANGLE;
     let seen = seen_light(inputs, ray.origin, ray.direction, if is_miss { f32::INFINITY } else { hit.t });
     if seen.t < f32::INFINITY {
         let light = seen.radiance * mis_weight(state, seen.pdf);
         state.radiance += added_light(inputs, ray.throughput * light, depth);
-        return (false, NO_SEGMENT);
+        return (false, NO_SHADOW_RAY);
     }
     step_past_lights(inputs, choices, depth, hit, ray, state)
 }
@@ -175,10 +175,10 @@ pub fn step_past_lights(
     hit: &Hit,
     ray: &mut PathRay,
     state: &mut PathState,
-) -> (bool, Segment) {
+) -> (bool, ShadowRay) {
     if hit.triangle_ix == NO_TRIANGLE {
         state.radiance += added_light(inputs, ray.throughput * met_environment(inputs, ray, state, depth), depth);
-        return (false, NO_SEGMENT);
+        return (false, NO_SHADOW_RAY);
     }
     let (surface, mut material) = shaded_at(inputs, ray, hit);
     let mut throughput = ray.throughput * transmittance(&material, &surface, hit.t);
@@ -190,19 +190,19 @@ pub fn step_past_lights(
     }
     // The last ray of a path only meets light.
     if is_unlit(&material) || depth + 1 >= inputs.frame().max_depth {
-        return (false, NO_SEGMENT);
+        return (false, NO_SHADOW_RAY);
     }
     let terms = bsdf_terms(&mut material, &surface, -ray.direction);
     let choices = choices();
     let [_, survival, to_next, lobe] = choices.pairs;
     let vertex = Vertex { depth, surface: &surface, terms: &terms, triangle_ix: hit.triangle_ix, throughput };
-    let segment = segment_to_light(inputs, &choices, &vertex);
+    let shadow_ray = shadow_ray_to_light(inputs, &choices, &vertex);
     let next = sample_bsdf(&terms, &surface, vec3(to_next.x, to_next.y, lobe.x));
     throughput *= next.weight;
     if !throughput.cmpgt(Vec3::ZERO).any() || !survives(depth, survival.y, &mut throughput) {
-        return (false, segment);
+        return (false, shadow_ray);
     }
     *ray = surface.ray_from(next.direction, hit.triangle_ix, ray, throughput);
     state.pdf = if next.is_delta { 0.0 } else { next.pdf };
-    (true, segment)
+    (true, shadow_ray)
 }

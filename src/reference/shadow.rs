@@ -20,8 +20,8 @@ use crate::{
     layout::{Hit, LIGHT_LIT, LIGHT_SHADOWED, LIGHT_UNTESTED, Light, NO_TRIANGLE, PathRay},
 };
 
-/// The segment to the light, or none if the surface faces away from the light or would not show it.
-pub(crate) fn shadow_segment(inputs: &KernelInputs, ray: &PathRay, hit: &Hit, light: &Light) -> Option<PathRay> {
+/// The shadow ray to the light, or none if the surface faces away from the light or would not show it.
+pub(crate) fn shadow_ray_of(inputs: &KernelInputs, ray: &PathRay, hit: &Hit, light: &Light) -> Option<PathRay> {
     let (surface, material) = shaded_at(inputs, ray, hit);
     let to_light = incident_light(light, surface.point_world);
     // Not `<=`: a NaN is unlit.
@@ -39,14 +39,14 @@ pub(crate) fn shadow_segment(inputs: &KernelInputs, ray: &PathRay, hit: &Hit, li
         direction: to_light.direction,
         source_triangle: hit.triangle_ix,
         throughput: Vec3::ZERO,
-        // The segment ends where the light is seen from the surface's own point.
+        // The shadow ray ends where the light is seen from the surface's own point.
         t_max: to_light.distance - (origin - surface.point_world).dot(to_light.direction),
     })
 }
 
 /// Writes `light_visibility[light * queue_capacity + ray]`, one of `LIGHT_*`, for some of the queue's rays, those at
-/// the indices `places`. `rays` and `hits` are those of the whole queue. Returns the number of shadow rays
-/// ("segments") that were tested.
+/// the indices `places`. `rays` and `hits` are those of the whole queue. Returns the number of shadow rays that
+/// were tested.
 pub fn shadow(
     inputs: &KernelInputs,
     traversal: Traversal,
@@ -70,14 +70,14 @@ pub fn shadow_by<T: Tracer>(
     let of_light = |(light, visibility): (&Light, &mut [u32])| -> u32 {
         let of_task = |tracer: &mut T, ((rays, hits), visibility): ((&[PathRay], &[Hit]), &mut [u32])| {
             let mut n_tested = 0;
-            let segments = rays.iter().zip(hits).zip(visibility).filter_map(|((ray, hit), visible)| {
+            let shadow_rays = rays.iter().zip(hits).zip(visibility).filter_map(|((ray, hit), visible)| {
                 *visible = LIGHT_UNTESTED;
                 let is_hit = hit.triangle_ix != NO_TRIANGLE;
-                let segment = is_hit.then(|| shadow_segment(inputs, ray, hit, light)).flatten()?;
+                let shadow_ray = is_hit.then(|| shadow_ray_of(inputs, ray, hit, light)).flatten()?;
                 n_tested += 1;
-                Some((visible, SearchRay::from(&segment)))
+                Some((visible, SearchRay::from(&shadow_ray)))
             });
-            tracer.trace_all::<true, _>(inputs, segments, |visible, hit| {
+            tracer.trace_all::<true, _>(inputs, shadow_rays, |visible, hit| {
                 *visible = if hit.triangle_ix == NO_TRIANGLE { LIGHT_LIT } else { LIGHT_SHADOWED };
             });
             n_tested

@@ -13,8 +13,8 @@ use crate::{
 /// Upper limit of the queue's capacity, in rays, unless the caller sets the capacity. This number of rays keeps any
 /// device busy. They take some 100 bytes each, 1.7 GB together, which fits well into memory.
 const MOST_RAYS: u64 = 1 << 24;
-/// The same limit for paths. A dispatch traces all of them, and their segments. On an H200, batches of 2^24 paths are
-/// 10 to 40 % faster than those of 2^21: a dispatch ends with its slowest paths, and late bounces have few paths.
+/// The same limit for paths. A dispatch traces all of them, and their shadow rays. On an H200, batches of 2^24 paths
+/// are 10 to 40 % faster than those of 2^21: a dispatch ends with its slowest paths, and late bounces have few paths.
 const MOST_PATHS: u64 = 1 << 24;
 /// The number of paths of a batch on a device without much memory, or on a CPU, which has no use for more.
 const FEW_PATHS: u64 = 1 << 21;

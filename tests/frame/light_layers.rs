@@ -109,7 +109,7 @@ fn a_bound_leaves_emission_as_it_is() {
     for layer_ix in [1, 2] {
         assert!(mean(&bounded[layer_ix]) < mean(&free[layer_ix]));
     }
-    // A path adds direct light by a segment to a light, and by the ray that goes on.
+    // A path adds direct light by a shadow ray to a light, and by the ray that goes on.
     assert!(bounded[1].iter().all(|pixel| pixel[0] <= 2.0 * 0.05 * 1.0001));
 }
 

@@ -226,7 +226,7 @@ fn a_crop_is_a_part_of_the_whole() {
     }
 }
 
-/// Rays and segments that stall go on in further dispatches.
+/// Rays and shadow rays that stall go on in further dispatches.
 #[test]
 fn a_limit_of_loop_turns_changes_no_bit() {
     let (scene, options) = (scenes::mixed(), options(24, 18, 4));

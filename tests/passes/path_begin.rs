@@ -1,7 +1,7 @@
 //! Tests of the kernel path_begin against its twin: the camera rays of all samples of all pixels.
 
 use kdray::{
-    layout::{PathRay, PathState, SEGMENT_NONE},
+    layout::{PathRay, PathState, SHADOW_RAY_NONE},
     scene::Projection,
 };
 
@@ -39,7 +39,7 @@ fn agrees_with_its_twin() {
             let live = paths.live_paths.download_first(expected.len()).expect("live_paths");
             assert!(live.iter().copied().eq(0..expected.len() as u32));
             assert!(paths.path_states.download().expect("path_states").iter().all(|s| *s == PathState::default()));
-            assert!(paths.segments.download().expect("segments").iter().all(|s| s.state == SEGMENT_NONE));
+            assert!(paths.shadow_rays.download().expect("shadow_rays").iter().all(|s| s.state == SHADOW_RAY_NONE));
         }
     }
 }

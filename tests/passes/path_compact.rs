@@ -1,10 +1,10 @@
 //! Tests of the prefix sum over paths and of the kernel path_compact: the lists of the paths that go on and of those
-//! with a segment.
+//! with a shadow ray.
 
 use kdray::{
     frame::{Pass, Step, Touch},
     gpu::DeviceOverrides,
-    layout::{Batch, Bounce, PATH_GOES_ON, PATH_HAS_SEGMENT, SCAN_GROUP_SIZE, SPINE_ITEMS},
+    layout::{Batch, Bounce, PATH_GOES_ON, PATH_HAS_SHADOW_RAY, SCAN_GROUP_SIZE, SPINE_ITEMS},
     passes::Inputs,
     reference::path_compact::{self, counts_of_block, kind_of_path},
 };
@@ -21,9 +21,9 @@ const CAPACITY: usize = 1200 << 7;
 const ROUND: usize = (SCAN_GROUP_SIZE * SCAN_GROUP_SIZE * SPINE_ITEMS) as usize;
 
 /// Compacts `n` paths by the kernels and by their twin, and compares the results. The array has the share of the paths
-/// that go on, and the share of those with a segment.
-fn check(stage: &PathStage, n: usize, [going_on, with_segment]: [f32; 2], random: &mut Random) {
-    let kind = |random: &mut Random| kind_of_path(random.unit() < going_on, random.unit() < with_segment);
+/// that go on, and the share of those with a shadow ray.
+fn check(stage: &PathStage, n: usize, [going_on, with_shadow_ray]: [f32; 2], random: &mut Random) {
+    let kind = |random: &mut Random| kind_of_path(random.unit() < going_on, random.unit() < with_shadow_ray);
     let kinds: Vec<u32> = (0..n).map(|_| kind(random)).collect();
     let live: Vec<u32> = (0..n as u32).map(|ix| 7 * ix + 3).collect();
     let mut blocks: Vec<_> = kinds.chunks(SCAN_GROUP_SIZE as usize).map(counts_of_block).collect();
@@ -47,16 +47,16 @@ fn check(stage: &PathStage, n: usize, [going_on, with_segment]: [f32; 2], random
     stage.run(|commands| stage.passes.record_section(commands, &stage.resources, &section, &inputs));
 
     let found = stage.resources.bounces.download().expect("bounces");
-    let (mut this, mut next) = (Bounce { n_segments: 0, ..found[1] }, Bounce::of_paths(0, stage.frame()));
+    let (mut this, mut next) = (Bounce { n_shadow_rays: 0, ..found[1] }, Bounce::of_paths(0, stage.frame()));
     path_compact::spine(&mut blocks, stage.frame(), &mut this, &mut next);
     assert_eq!(found[1..3], [this, next], "{n} paths");
-    let (mut going_on, mut with_segment) = (vec![UNTOUCHED_WORD; CAPACITY], vec![UNTOUCHED_WORD; CAPACITY]);
-    path_compact::path_compact(&live, &kinds, &blocks, &mut going_on, &mut with_segment);
+    let (mut going_on, mut with_shadow_ray) = (vec![UNTOUCHED_WORD; CAPACITY], vec![UNTOUCHED_WORD; CAPACITY]);
+    path_compact::path_compact(&live, &kinds, &blocks, &mut going_on, &mut with_shadow_ray);
     let found = paths.live_paths.download().expect("live_paths");
     compare::exact(&going_on, &found[..CAPACITY]).unwrap();
-    compare::exact(&with_segment, &found[2 * CAPACITY..]).unwrap();
+    compare::exact(&with_shadow_ray, &found[2 * CAPACITY..]).unwrap();
     // The twin's lists are those that follow from the kinds.
-    let lists = [(PATH_GOES_ON, next.n_rays, going_on), (PATH_HAS_SEGMENT, this.n_segments, with_segment)];
+    let lists = [(PATH_GOES_ON, next.n_rays, going_on), (PATH_HAS_SHADOW_RAY, this.n_shadow_rays, with_shadow_ray)];
     for (bit, n_listed, list) in lists {
         let of_kind = live.iter().zip(&kinds).filter(|(_, kind)| **kind & bit != 0);
         let expected: Vec<_> = of_kind.map(|(ix, _)| *ix).collect();

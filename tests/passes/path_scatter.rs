@@ -1,5 +1,5 @@
-//! Tests of the kernel path_scatter against its twin: the light at the hits of paths, the segments to lights, and the
-//! rays with which they go on.
+//! Tests of the kernel path_scatter against its twin: the light at the hits of paths, the shadow rays to lights, and
+//! the rays with which they go on.
 
 use std::f32::consts::PI;
 
@@ -7,7 +7,7 @@ use glam::{Vec3, vec3};
 use kdray::{
     layout::{
         AREA_DISK, AREA_RECTANGLE, AREA_SPHERE, AreaLight, Batch, MATERIAL_CONDUCTOR, MATERIAL_MICROFACET,
-        MATERIAL_SOLID, Material, PathRay, PathState, SCAN_GROUP_SIZE, SEGMENT_NONE, Segment,
+        MATERIAL_SOLID, Material, PathRay, PathState, SCAN_GROUP_SIZE, SHADOW_RAY_NONE, ShadowRay,
     },
     reference::{
         path_compact::counts_of_block,
@@ -23,29 +23,29 @@ use super::{
 };
 use crate::support::{compare, meshes, random::Random, scenes};
 
-const NO_SEGMENT: Segment = Segment {
+const NO_SHADOW_RAY: ShadowRay = ShadowRay {
     origin: Vec3::ZERO,
-    state: SEGMENT_NONE,
+    state: SHADOW_RAY_NONE,
     direction: Vec3::ZERO,
     source_triangle: 0,
     light: Vec3::ZERO,
     t_max: 0.0,
 };
 
-/// A path's segment as a ray, so that it can be compared as one.
-fn as_ray(segment: &Segment) -> PathRay {
+/// A path's shadow ray as a ray, so that it can be compared as one.
+fn as_ray(shadow_ray: &ShadowRay) -> PathRay {
     PathRay {
-        origin: segment.origin,
-        pixel_ix: segment.state,
-        direction: segment.direction,
-        source_triangle: segment.source_triangle,
-        throughput: segment.light,
-        t_max: segment.t_max,
+        origin: shadow_ray.origin,
+        pixel_ix: shadow_ray.state,
+        direction: shadow_ray.direction,
+        source_triangle: shadow_ray.source_triangle,
+        throughput: shadow_ray.light,
+        t_max: shadow_ray.t_max,
     }
 }
 
 /// Takes the first `n` of the camera's paths a step further at this depth, by the kernel and by its twin, and compares
-/// them. Returns how many have a segment to a light, and how many go on.
+/// them. Returns how many have a shadow ray to a light, and how many go on.
 fn check(stage: &PathStage, depth: u32, n: u32) -> (usize, u32) {
     let (rays, hits) = stage.rays_and_hits();
     let (paths, n_all) = (stage.paths(), rays.len());
@@ -64,15 +64,15 @@ fn check(stage: &PathStage, depth: u32, n: u32) -> (usize, u32) {
     stage.resources.queue.hits.upload(&hits).expect("hits");
     stage.resources.queue.child_kinds.upload(&vec![UNTOUCHED_WORD; n_all]).expect("child_kinds");
     paths.path_states.upload(&states).expect("path_states");
-    paths.segments.upload(&vec![NO_SEGMENT; n_all]).expect("segments");
+    paths.shadow_rays.upload(&vec![NO_SHADOW_RAY; n_all]).expect("shadow_rays");
     paths.live_paths.upload(&list).expect("live_paths");
     let batch = Batch { n_pixels: 1200, bounce_ix: depth, depth, ..FIRST };
     stage.run(|commands| stage.passes.path_scatter.record(commands, &stage.resources, &batch));
 
-    let (mut rays, mut states, mut segments) = (rays, states, vec![NO_SEGMENT; n_all]);
+    let (mut rays, mut states, mut shadow_rays) = (rays, states, vec![NO_SHADOW_RAY; n_all]);
     let mut kinds = vec![UNTOUCHED_WORD; n_all];
     let mut blocks = vec![[0; 2]; n.div_ceil(SCAN_GROUP_SIZE) as usize];
-    let buffers = PathBuffers { rays: &mut rays, states: &mut states, segments: &mut segments };
+    let buffers = PathBuffers { rays: &mut rays, states: &mut states, shadow_rays: &mut shadow_rays };
     let counts = (&mut kinds[..n as usize], &mut blocks[..]);
     path_scatter(&stage.inputs(), &batch, (&live, &hits), buffers, counts);
     // Where rounding decides which lobe or which light is chosen, a path takes another way.
@@ -83,14 +83,14 @@ fn check(stage: &PathStage, depth: u32, n: u32) -> (usize, u32) {
     let sums: Vec<_> = found[..n as usize].chunks(SCAN_GROUP_SIZE as usize).flat_map(counts_of_block).collect();
     compare::exact(&sums, &queue.scan_blocks.download_first(sums.len()).expect("scan_blocks")).unwrap();
     compare::rays(1e-3, n_outliers, &rays, &queue.rays.download().expect("rays")).unwrap();
-    let found: Vec<_> = paths.segments.download().expect("segments").iter().map(as_ray).collect();
-    let expected: Vec<_> = segments.iter().map(as_ray).collect();
+    let found: Vec<_> = paths.shadow_rays.download().expect("shadow_rays").iter().map(as_ray).collect();
+    let expected: Vec<_> = shadow_rays.iter().map(as_ray).collect();
     compare::rays(1e-3, n_outliers, &expected, &found).unwrap();
     let pixels =
         |states: &[PathState]| -> Vec<_> { states.iter().map(|s| s.radiance.extend(s.pdf).to_array()).collect() };
     let found = paths.path_states.download().expect("path_states");
     compare::pixels(1e-3, n_outliers, &pixels(&states), &pixels(&found)).unwrap();
-    let n_lit = segments.iter().filter(|segment| segment.state != SEGMENT_NONE).count();
+    let n_lit = shadow_rays.iter().filter(|shadow_ray| shadow_ray.state != SHADOW_RAY_NONE).count();
     (n_lit, blocks.iter().map(|[n_going_on, _]| n_going_on).sum())
 }
 

@@ -116,14 +116,14 @@ impl PathStage {
         resumed.expect("all rays end");
     }
 
-    /// Uploads rows of bounces with these numbers of paths and of segments, and clears the counters.
-    pub fn set_n_paths(&self, n_paths_and_segments: &[(u32, u32)]) {
+    /// Uploads rows of bounces with these numbers of paths and of shadow rays, and clears the counters.
+    pub fn set_n_paths(&self, n_paths_and_shadow_rays: &[(u32, u32)]) {
         let mut rows = vec![Bounce::of_paths(0, self.frame()); self.frame().max_depth as usize];
         let mut before = 0;
-        for (row, &(n_paths, n_segments)) in rows.iter_mut().zip(n_paths_and_segments) {
+        for (row, &(n_paths, n_shadow_rays)) in rows.iter_mut().zip(n_paths_and_shadow_rays) {
             row.set_paths(n_paths, before, self.frame());
-            row.n_segments = n_segments;
-            before = n_segments;
+            row.n_shadow_rays = n_shadow_rays;
+            before = n_shadow_rays;
         }
         self.resources.bounces.upload(&rows).expect("bounces");
         self.context.run("clear", |commands| self.resources.clear_counters(commands)).expect("cleared counters");

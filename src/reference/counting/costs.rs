@@ -8,7 +8,7 @@ use super::table::ReadCounts;
 use crate::reference::{
     RAYS_PER_TASK,
     inputs::KernelInputs,
-    shadow::shadow_segment,
+    shadow::shadow_ray_of,
     traverser::{Tracer, Traverser},
 };
 use crate::{
@@ -40,7 +40,7 @@ pub fn count_rays<const ANY_HIT: bool>(
     }
 }
 
-/// Adds the cost of the shadow segments from the hits to all lights that the hits can show.
+/// Adds the cost of the shadow rays from the hits to all lights that the hits can show.
 pub fn count_shadow(
     inputs: &KernelInputs,
     traversal: Traversal,
@@ -55,8 +55,8 @@ pub fn count_shadow(
                 || Traverser::new(inputs, traversal),
                 |traverser, (ray, hit)| {
                     let is_hit = hit.triangle_ix != NO_TRIANGLE;
-                    let segment = is_hit.then(|| shadow_segment(inputs, ray, hit, light)).flatten()?;
-                    Some(steps_of::<true>(inputs, traverser, &segment))
+                    let shadow_ray = is_hit.then(|| shadow_ray_of(inputs, ray, hit, light)).flatten()?;
+                    Some(steps_of::<true>(inputs, traverser, &shadow_ray))
                 },
             )
             .collect();
