@@ -57,7 +57,8 @@ fn touches(pass: Pass, denoises: bool) -> Vec<(Resource, Touch)> {
     let reads = pass.reads().iter().map(|resource| (same(resource), Touch::Read));
     let writes = pass.writes().iter().map(|resource| (same(resource), Touch::Write));
     let indirect = pass.indirect().map(|resource| (resource, Touch::Indirect));
-    let ordered = |(resource, _): &(Resource, Touch)| !matches!(resource, Resource::TriangleIds | Resource::Stalls);
+    let ordered =
+        |(resource, _): &(Resource, Touch)| !matches!(resource, Resource::TriangleIds | Resource::SuspendedRays);
     reads.chain(writes).chain(indirect).filter(ordered).collect()
 }
 

@@ -80,7 +80,7 @@ fn traced(context: &Arc<Context>, world: &World, rays: &[PathRay], traversal: Tr
     resources.queue.rays.upload(rays).expect("rays");
     resources.bounces.upload(&[Bounce::of(rays.len() as u32, &constants)]).expect("bounces");
     context.run("clear", |commands| resources.clear_counters(commands)).expect("cleared counters");
-    let batch = Batch { first_pixel: 0, n_pixels: 0, bounce_ix: 0, depth: 0, round: 0 };
+    let batch = Batch { first_pixel: 0, n_pixels: 0, bounce_ix: 0, depth: 0, resume_pass: 0 };
     let record = |commands: &kdray::gpu::Commands| {
         resources.bind(commands);
         passes.trace.record(commands, &resources, &batch);

@@ -2,8 +2,8 @@
 #extension GL_GOOGLE_include_directive : require
 // Cast: finds each ray's closest hit in (t_min, t_max], or with ANY_HIT one that need not be the closest. There are
 // 2^lanes_log2 invocations per ray, the first of which works (lanes.glsl).
-// Reads cast_rays and the acceleration structure; updates cast_hits, in which a stalled ray leaves its mark
-// (stalls.glsl).
+// Reads cast_rays and the acceleration structure; updates cast_hits, in which a suspended ray leaves its mark
+// (suspended_rays.glsl).
 #include "layout.glsl"
 
 const bool COUNT_COSTS = false;
@@ -44,7 +44,7 @@ Hit cast_ray(Ray ray) {
 
 void main() {
     uint ray_ix = ray_of_lane(gl_GlobalInvocationID.x, batch.lanes_log2);
-    if (ray_ix >= batch.n_rays || !runs_in_round(batch.round, cast_hits[ray_ix].triangle_ix)) return;
+    if (ray_ix >= batch.n_rays || !runs_in_pass(batch.resume_pass, cast_hits[ray_ix].triangle_ix)) return;
     Ray ray = cast_rays[ray_ix];
     cast_hits[ray_ix] = is_ray(ray) ? cast_ray(ray) : miss();
 }

@@ -5,9 +5,9 @@
 // before. One dispatch does both: it lasts as long as its longest ray, and so waits for such a ray once a bounce, not
 // twice. There are 2^trace_lanes_log2 invocations per ray and shadow ray, the first of which works (lanes.glsl). The
 // shadow rays follow the rays. Rays pass through see-through surfaces at random (cutout.glsl). Reads rays, live_paths,
-// bounces and the acceleration structure; updates hits and shadow rays, in which stalled rays and shadow rays leave
-// their mark (stalls.glsl), path_states (light that arrives is added), counters and, with COUNT_COSTS, n_rays and
-// n_steps of pixel_features, which are about the first sample of the frame.
+// bounces and the acceleration structure; updates hits and shadow rays, in which suspended rays and shadow rays leave
+// their mark (suspended_rays.glsl), path_states (light that arrives is added), counters and, with COUNT_COSTS, n_rays
+// and n_steps of pixel_features, which are about the first sample of the frame.
 #include "layout.glsl"
 
 // Whether the cost of the rays of each pixel's first sample is added to pixel_features.
@@ -38,7 +38,7 @@ PathRay ray_of(ShadowRay ray, uint pixel_ix) {
 
 // Stores the result of a path's shadow ray, whose traversal has found this triangle, none, or a mark.
 void end_shadow_ray(uint path_ix, uint found) {
-    shadow_rays[path_ix].state = is_stalled(found) ? found : SHADOW_RAY_NONE;
+    shadow_rays[path_ix].state = is_suspended(found) ? found : SHADOW_RAY_NONE;
     if (found == NO_TRIANGLE) path_states[path_ix].xyz += shadow_rays[path_ix].light;
 }
 
@@ -52,7 +52,7 @@ bool traced(uint path_ix, bool is_shadow_ray) {
     PathRay ray = rays[path_ix];
     if (is_shadow_ray) ray = ray_of(shadow_rays[path_ix], ray.pixel_ix);
     Hit hit = traverse(ray, 0.0, is_shadow_ray);
-    bool ends = !is_stalled(hit.triangle_ix);
+    bool ends = !is_suspended(hit.triangle_ix);
     if (COUNT_COSTS && ends && sample_of_path(path_ix) == 0u) count(ray);
     if (is_shadow_ray) end_shadow_ray(path_ix, hit.triangle_ix);
     else store_hit(path_ix, hit);
@@ -70,7 +70,7 @@ void main() {
     if (in_list < (is_shadow_ray ? n_shadow_rays : n_rays)) {
         uint path_ix = live_paths[(is_shadow_ray ? list_of_shadow_rays() : list_of(batch.depth)) + in_list];
         uint mark = is_shadow_ray ? shadow_rays[path_ix].state : hits[path_ix].triangle_ix;
-        if (runs_in_round(batch.round, mark)) counts = traced(path_ix, is_shadow_ray);
+        if (runs_in_pass(batch.resume_pass, mark)) counts = traced(path_ix, is_shadow_ray);
     }
     if (COUNTS) {
         count_hits(batch.bounce_ix, gl_WorkGroupID.x, counts && !is_shadow_ray);

@@ -3,8 +3,8 @@
 // Shadow (the paper's section 2.1): tests the shadow rays. They go from the hits of all rays of the batch, in all
 // bounces, to each light that the surface could show. A light is hidden if its shadow ray hits anything.
 // There are 2^shadow_lanes_log2 invocations per ray and light, the first of which works (lanes.glsl).
-// Reads rays, hits, bounces and the scene; updates light_visibility[light * queue_capacity + ray], in which a stalled
-// shadow ray leaves its mark (stalls.glsl), and, with COUNT_COSTS, n_rays and n_steps of pixel_features.
+// Reads rays, hits, bounces and the scene; updates light_visibility[light * queue_capacity + ray], in which a suspended
+// shadow ray leaves its mark (suspended_rays.glsl), and, with COUNT_COSTS, n_rays and n_steps of pixel_features.
 #include "layout.glsl"
 
 // Whether the shadow rays' cost is added to pixel_features.
@@ -42,13 +42,13 @@ bool shadow_ray_of(PathRay ray, Hit hit, Light light, out PathRay shadow_ray) {
     return true;
 }
 
-// Returns the light's visibility from the ray's hit, one of LIGHT_*, or the mark of a stalled shadow ray.
+// Returns the light's visibility from the ray's hit, one of LIGHT_*, or the mark of a suspended shadow ray.
 uint visibility_of(Light light, uint ray_ix) {
     Hit hit = hits[ray_ix];
     PathRay shadow_ray;
     if (hit.triangle_ix == NO_TRIANGLE || !shadow_ray_of(ray_at(ray_ix), hit, light, shadow_ray)) return LIGHT_UNTESTED;
     uint found = traverse(shadow_ray, 0.0, true).triangle_ix;
-    if (is_stalled(found)) return found;
+    if (is_suspended(found)) return found;
     if (COUNT_COSTS) {
         atomicAdd(pixel_features[shadow_ray.pixel_ix].n_rays, 1u);
         atomicAdd(pixel_features[shadow_ray.pixel_ix].n_steps, n_steps);
@@ -66,6 +66,6 @@ void main() {
     uint ray_ix = ray_of_lane(lane, bounces[last_ix].shadow_lanes_log2);
     if (ray_ix >= bounces[last_ix].first_ray + bounces[last_ix].n_rays) return;
     uint place = light_ix * frame.queue_capacity + ray_ix;
-    if (!runs_in_round(batch.round, light_visibility[place])) return;
+    if (!runs_in_pass(batch.resume_pass, light_visibility[place])) return;
     light_visibility[place] = visibility_of(lights[light_ix], ray_ix);
 }

@@ -3,8 +3,8 @@
 #extension GL_KHR_shader_subgroup_arithmetic : require
 // Trace (the paper's section 2.3): finds the closest hit of each ray of the bounce. There are 2^trace_lanes_log2
 // invocations per ray, the first of which works (lanes.glsl).
-// Reads rays, bounces and the acceleration structure; updates hits, in which a stalled ray leaves its mark
-// (stalls.glsl), counters (n_hits) and, with COUNT_COSTS, n_rays and n_steps of pixel_features.
+// Reads rays, bounces and the acceleration structure; updates hits, in which a suspended ray leaves its mark
+// (suspended_rays.glsl), counters (n_hits) and, with COUNT_COSTS, n_rays and n_steps of pixel_features.
 #include "layout.glsl"
 
 // Whether the rays' cost is added to pixel_features.
@@ -30,13 +30,13 @@ void main() {
     uint place = ray_of_lane(gl_GlobalInvocationID.x, bounces[batch.bounce_ix].trace_lanes_log2);
     bool is_hit = false;
     uint ray_ix = bounces[batch.bounce_ix].first_ray + place;
-    if (place < bounces[batch.bounce_ix].n_rays && runs_in_round(batch.round, hits[ray_ix].triangle_ix)) {
+    if (place < bounces[batch.bounce_ix].n_rays && runs_in_pass(batch.resume_pass, hits[ray_ix].triangle_ix)) {
         PathRay ray;
         if (FROM_CAMERA) ray = camera_ray(pixel_of_ray(ray_ix));
         else ray = rays[ray_ix];
         Hit hit = traverse(ray, 0.0, false);
         store_hit(ray_ix, hit);
-        bool ends = !is_stalled(hit.triangle_ix);
+        bool ends = !is_suspended(hit.triangle_ix);
         if (COUNT_COSTS && ends) {
             atomicAdd(pixel_features[ray.pixel_ix].n_rays, 1u);
             atomicAdd(pixel_features[ray.pixel_ix].n_steps, n_steps);

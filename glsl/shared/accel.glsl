@@ -3,7 +3,7 @@
 // Needs the macros TRAVERSAL and, for scenes with gaps, WITH_GAPS (build.rs); and the constants `bool COUNT_COSTS`
 // (steps.glsl) and `bool PASSES_VEILS` (cutout.glsl), which the kernel declares before this file. Provides `traverse`,
 // and `traverse_any_length` for directions of any length, which are all that a kernel calls to find a hit. Kernels
-// also use `is_stalled` and `runs_in_round` of stalls.glsl. cast.comp checks its rays by `exponent_of`,
+// also use `is_suspended` and `runs_in_pass` of suspended_rays.glsl. cast.comp checks its rays by `exponent_of`,
 // `longest_bits` and `magnitude_bits`.
 //
 //   traversal_ray.glsl   the ray, clipped to the structure's box
@@ -16,7 +16,7 @@
 
 #include "layout.glsl"
 #include "scene.glsl"
-#include "stalls.glsl"
+#include "suspended_rays.glsl"
 #include "steps.glsl"
 #include "triangle.glsl"
 
@@ -29,14 +29,14 @@ layout(constant_id = CONSTANT_PREDICATES_BRANCHES) const bool PREDICATES_BRANCHE
 #include "kdtree.glsl"
 #include "grid.glsl"
 
-// Searches the structure that the scene has. Returns 0, or the mark of a ray that has stalled (stalls.glsl).
+// Searches the structure that the scene has. Returns 0, or the mark of a ray that was suspended (suspended_rays.glsl).
 uint search(TraversalRay ray, bool any_hit, inout Nearest best) {
     if (TRAVERSAL == TRAVERSAL_GRID) return search_grid(ray, any_hit, best);
     return search_kdtree(ray, any_hit, best);
 }
 
 // Returns the closest hit in (t_min, t_max], or with any_hit one that need not be the closest. The direction has
-// about unit length. A miss has t = t_max. If the ray has stalled, the hit's triangle_ix is its mark. During the
+// about unit length. A miss has t = t_max. If the ray was suspended, the hit's triangle_ix is its mark. During the
 // search, all t are half of the ray's own (traversal_ray.glsl).
 Hit traverse(PathRay ray_in, float t_min, bool any_hit) {
     float t_start;
@@ -45,7 +45,7 @@ Hit traverse(PathRay ray_in, float t_min, bool any_hit) {
     spill_pair(LENGTHS_SLOT, t_start, ray_in.t_max);
     Nearest best = Nearest(0.5 * ray_near.t_max, NO_TRIANGLE);
     uint mark = search(ray, any_hit, best);
-    if (CAN_STALL && mark != 0u) return Hit(0.0, mark, 0.0, 0.0);
+    if (CAN_SUSPEND && mark != 0u) return Hit(0.0, mark, 0.0, 0.0);
     vec2 lengths = spilled_pair(LENGTHS_SLOT);
     if (best.triangle_ix == NO_TRIANGLE) return Hit(lengths.y, NO_TRIANGLE, 0.0, 0.0);
     vec2 weights = spilled_pair(WEIGHTS_SLOT);

@@ -21,13 +21,13 @@ const uint IN_UPPER_LEVEL = 0xffffffffu;
 // The largest finite number. t_exit is at most this, so that exits at borders, which may be infinite, come later.
 const float LARGEST_T = 3.4028235e38;
 
-// How many cells, or triangles' planes, an invocation tests in one turn of the search. Lanes that search for cells
+// How many cells, or triangles' planes, an invocation tests in one iteration of the search. Lanes that search for cells
 // wait for lanes of their subgroup that search for triangles, and the reverse, so each search is limited. Measured on
 // an H200 with rays of a dragon in a room: the limit of 4 cells makes the search 1.2 to 2 times as fast as no limit.
 // The limit of 4 triangles makes it 1.1 to 1.6 times as fast in uniform grids, whose cells have many triangles. In
 // grids of two levels it would cost 5 %, so there it does not apply.
-const uint CELLS_PER_TURN = 4u;
-const uint TRIANGLES_PER_TURN = 4u;
+const uint CELLS_PER_ITERATION = 4u;
+const uint TRIANGLES_PER_ITERATION = 4u;
 
 // A ray's position on its way through the cells of one lattice. first_cell: the index of the lattice's first cell in
 // grid_cells. upper_cube: the packed cube of the upper level that this lattice is the block of, or IN_UPPER_LEVEL.
@@ -87,7 +87,7 @@ void enter_lattice(TraversalRay ray, inout GridWalk walk) {
     ivec3 last = ivec3(walk.lattice.n_cells) - 1;
     bool moves = true;
     while (moves) {
-        count_turn();
+        count_iteration();
         ivec3 before = clamp(cube - steps, ivec3(0), last);
         bvec3 are_late = lessThan(exits_of(walk.lattice, ray, uvec3(cube)), vec3(walk.t_enter));
         bvec3 are_early = greaterThanEqual(exits_of(walk.lattice, ray, uvec3(before)), vec3(walk.t_enter));
@@ -178,38 +178,38 @@ bool step_on(TraversalRay ray, float t_best, inout GridWalk walk) {
     return true;
 }
 
-// Goes to the next cell that has triangles, but no farther than CELLS_PER_TURN cells. Returns false if nothing nearer
-// than t_best can follow.
+// Goes to the next cell that has triangles, but no farther than CELLS_PER_ITERATION cells. Returns false if nothing
+// nearer than t_best can follow.
 bool find_cell(TraversalRay ray, float t_best, inout GridWalk walk, inout Visit visit) {
     bool goes_on = true;
     bool seeks = true;
-    uint n_left = CELLS_PER_TURN;
+    uint n_left = CELLS_PER_ITERATION;
     while (seeks) {
-        count_turn();
+        count_iteration();
         goes_on = step_on(ray, t_best, walk);
         if (goes_on) visit = visit_cell(ray, t_best, walk);
         n_left -= 1u;
-        seeks = goes_on && visit.entry_ix >= visit.end_ix && n_left > 0u && has_turns();
+        seeks = goes_on && visit.entry_ix >= visit.end_ix && n_left > 0u && has_iterations();
         if (!seeks) break;
     }
     return goes_on;
 }
 
 // Finds the cell's next triangle whose plane the ray meets within the cell. In uniform grids it tests at most
-// TRIANGLES_PER_TURN planes.
+// TRIANGLES_PER_ITERATION planes.
 bool find_candidate_soon(TraversalRay ray, inout Visit visit, out uint entry_ix) {
     if (GRID_LEVELS == 2u) return find_candidate(ray, visit, entry_ix);
     uint end_ix = visit.end_ix;
-    visit.end_ix = min(end_ix, visit.entry_ix + TRIANGLES_PER_TURN);
+    visit.end_ix = min(end_ix, visit.entry_ix + TRIANGLES_PER_ITERATION);
     bool found = find_candidate(ray, visit, entry_ix);
     visit.end_ix = end_ix;
     return found;
 }
 
-// Stores the ray's state, and returns the mark that takes the place of its result (stalls.glsl).
-uint stall_in_grid(GridWalk walk, Visit visit, Nearest best) {
+// Stores the ray's state, and returns the mark that takes the place of its result (suspended_rays.glsl).
+uint suspend_in_grid(GridWalk walk, Visit visit, Nearest best) {
     vec2 weights = spilled_pair(WEIGHTS_SLOT);
-    return stall(StalledRay(
+    return suspend(SuspendedRay(
         pack_cube(walk.cube), walk.t_enter, 0.0, visit.entry_ix, visit.end_ix,
         best.t, best.triangle_ix, weights.x, weights.y, steps_so_far(), uvec2(walk.upper_cube, 0u)
     ));
@@ -218,7 +218,7 @@ uint stall_in_grid(GridWalk walk, Visit visit, Nearest best) {
 // Loads the ray's stored state. The t of planes are computed by the same operations as in the first search, so they
 // have the same bits. The visit ends at the nearest hit so far, which can be nearer than when the visit began.
 void resume_in_grid(TraversalRay ray, out GridWalk walk, out Visit visit, out Nearest best) {
-    StalledRay state = stalled_rays[resumed_slot];
+    SuspendedRay state = suspended_rays[resumed_slot];
     walk.lattice = upper_lattice();
     walk.first_cell = 0u;
     walk.upper_cube = IN_UPPER_LEVEL;
@@ -240,9 +240,9 @@ void resume_in_grid(TraversalRay ray, out GridWalk walk, out Visit visit, out Ne
     count_steps(state.n_steps);
 }
 
-// Searches all cells that the ray meets in [t_enter, t_exit], until nothing nearer can follow. Each turn of the loop
-// tests at most one triangle. If the cell has no triangles left, the turn goes on towards the next cell that has
-// triangles, by at most CELLS_PER_TURN cells. Returns 0, or the mark of a stalled ray.
+// Searches all cells that the ray meets in [t_enter, t_exit], until nothing nearer can follow. Each iteration of the
+// loop tests at most one triangle. If the cell has no triangles left, the iteration goes on towards the next cell that
+// has triangles, by at most CELLS_PER_ITERATION cells. Returns 0, or the mark of a suspended ray.
 uint search_grid(TraversalRay ray, bool any_hit, inout Nearest best) {
     if (!is_in(ray)) return 0u;
     GridWalk walk;
@@ -256,17 +256,17 @@ uint search_grid(TraversalRay ray, bool any_hit, inout Nearest best) {
     uint mark = 0u;
     bool goes_on = true;
     while (goes_on) {
-        count_turn();
+        count_iteration();
         uint entry_ix;
         if (find_candidate_soon(ray, visit, entry_ix)) {
             LeafTriangle entry = leaf_triangle_at(entry_ix);
             intersect(ray, corners_of(entry), entry.triangle_ix, best);
             goes_on = !is_done(any_hit, best);
-        } else if (visit.entry_ix >= visit.end_ix && has_turns()) {
+        } else if (visit.entry_ix >= visit.end_ix && has_iterations()) {
             goes_on = find_cell(ray, best.t, walk, visit);
         }
-        if (goes_on && !has_turns()) {
-            mark = stall_in_grid(walk, visit, best);
+        if (goes_on && !has_iterations()) {
+            mark = suspend_in_grid(walk, visit, best);
             goes_on = false;
         }
         if (!goes_on) break;

@@ -1,7 +1,7 @@
 // Nodes of the kd-tree and the cells that a ray goes through. A part of kdtree.glsl.
 //
-// Needs scene.glsl, stalls.glsl, steps.glsl, traversal_ray.glsl and PREDICATES_BRANCHES. Provides `Cell`, `kd_node`,
-// the offsets of children, siblings and indices, and `crossing`.
+// Needs scene.glsl, suspended_rays.glsl, steps.glsl, traversal_ray.glsl and PREDICATES_BRANCHES. Provides `Cell`,
+// `kd_node`, the offsets of children, siblings and indices, and `crossing`.
 
 // A node and the interval that the ray spends in it, in the traversal's t.
 struct Cell {
@@ -28,10 +28,10 @@ uint sibling_of(uint node_offset) {
     return node_offset ^ KD_NODE_BYTES;
 }
 
-// Reads a node. Counts the read and a loop turn.
+// Reads a node. Counts the read and a loop iteration.
 KdNode kd_node(uint node_offset) {
     count_steps(1u);
-    count_turn();
+    count_iteration();
     return kd_node_at(node_ix_of(node_offset));
 }
 

@@ -6,7 +6,7 @@
 // the ray comes from, the second child is the other one. A subtree that is left for later is pending. The variants of
 // the traversal differ in how they keep pending subtrees (pending_*.glsl).
 //
-// Needs scene.glsl, stalls.glsl, steps.glsl, traversal_ray.glsl, local_memory.glsl, candidate.glsl and
+// Needs scene.glsl, suspended_rays.glsl, steps.glsl, traversal_ray.glsl, local_memory.glsl, candidate.glsl and
 // PREDICATES_BRANCHES, and the macro TRAVERSAL. Provides `search_kdtree`, and with leaf.glsl the `Visit` that
 // grid.glsl uses, too.
 
@@ -62,11 +62,11 @@ Visit next_leaf(TraversalRay ray, float t_best, inout Cell cell) {
     return visit_leaf(leaf, cell.t_enter, min(cell.t_exit, t_best));
 }
 
-// Searches in one loop, each of whose turns either tests a triangle or goes on to the next leaf. So lanes that test
-// stay together, and so do lanes that go on. If a turn tested all triangles of a leaf instead, lanes with few
-// triangles would wait for lanes with many. If a turn went from leaf to leaf until it has a triangle to test, lanes
-// that have one would wait for lanes that still seek. Returns 0, or the mark of a ray that has stalled.
-uint search_by_turns(TraversalRay ray, bool any_hit, inout Nearest best) {
+// Searches in one loop, each of whose iterations either tests a triangle or goes on to the next leaf. So lanes that
+// test stay together, and so do lanes that go on. If a iteration tested all triangles of a leaf instead, lanes with few
+// triangles would wait for lanes with many. If a iteration went from leaf to leaf until it has a triangle to test,
+// lanes that have one would wait for lanes that still seek. Returns 0, or the mark of a ray that was suspended.
+uint search_in_one_loop(TraversalRay ray, bool any_hit, inout Nearest best) {
     if (!is_in(ray)) return 0u;
     Cell cell = root_cell(ray);
     Visit visit;
@@ -75,21 +75,21 @@ uint search_by_turns(TraversalRay ray, bool any_hit, inout Nearest best) {
     uint mark = 0u;
     bool goes_on = true;
     do {
-        count_turn();
+        count_iteration();
         uint entry_ix;
         if (find_candidate(ray, visit, entry_ix)) {
             LeafTriangle entry = leaf_triangle_at(entry_ix);
             intersect(ray, corners_of(entry), entry.triangle_ix, best);
             goes_on = !is_done(any_hit, best);
-        } else if (has_turns()) {
+        } else if (has_iterations()) {
             goes_on = find_pending(ray, best.t, cell);
             if (goes_on) {
                 take_pending(ray, cell);
                 visit = next_leaf(ray, best.t, cell);
             }
         }
-        if (goes_on && !has_turns()) {
-            mark = stall_at(cell, visit, best);
+        if (goes_on && !has_iterations()) {
+            mark = suspend_at(cell, visit, best);
             goes_on = false;
         }
     } while (goes_on);
@@ -100,10 +100,10 @@ uint search_by_turns(TraversalRay ray, bool any_hit, inout Nearest best) {
 #include "brute.glsl"
 
 // Visits all leaves that the ray meets in [t_enter, t_exit], until no nearer hit can follow. With any_hit, the first
-// hit ends the search. TRAVERSAL_BRUTE tests all triangles instead. Returns 0, or the mark of a ray that has stalled.
+// hit ends the search. TRAVERSAL_BRUTE tests all triangles instead. Returns 0, or the mark of a ray that was suspended.
 uint search_kdtree(TraversalRay ray, bool any_hit, inout Nearest best) {
     if (TRAVERSAL == TRAVERSAL_BRUTE) return intersect_all(ray, any_hit, best);
     clear_pending();
     if (PREDICATES_BRANCHES) return search_in_step(ray, any_hit, best);
-    return search_by_turns(ray, any_hit, best);
+    return search_in_one_loop(ray, any_hit, best);
 }

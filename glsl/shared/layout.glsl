@@ -230,17 +230,17 @@
 // Mark of a ray whose traversal has stopped before its end. It replaces the triangle of the ray's hit, or the light's
 // visibility. The bits below it are the slot that holds the ray's state, or `NO_SLOT`. The mark never equals
 // `NO_TRIANGLE`.
-#define STALLED 0x80000000u
-// Slot of a stalled ray that found all slots taken.
+#define SUSPENDED 0x80000000u
+// Slot of a suspended ray that found all slots taken.
 #define NO_SLOT 0x7ffffffeu
-// Rows of four words that a slot takes in `stalls`. One row of counts precedes the slots.
-#define STALLED_RAY_ROWS 3u
-// `round` of a dispatch that takes all rays, from their beginning.
-#define ROUND_BEGIN 0u
-// `round` of a dispatch that takes the rays that have stalled, from the state in their slots.
-#define ROUND_RESUME 1u
-// `round` of a dispatch that takes the stalled rays that found no slot, from their beginning.
-#define ROUND_RESTART 2u
+// Rows of four words that a slot takes in `suspended_rays`. One row of counts precedes the slots.
+#define SUSPENDED_RAY_ROWS 3u
+// `resume_pass` of a dispatch that takes all rays, from their beginning.
+#define PASS_BEGIN 0u
+// `resume_pass` of a dispatch that takes the rays that were suspended, from the state in their slots.
+#define PASS_RESUME 1u
+// `resume_pass` of a dispatch that takes the suspended rays that found no slot, from their beginning.
+#define PASS_RESTART 2u
 
 // Value of `Light.kind`.
 #define LIGHT_POINT 0u
@@ -622,7 +622,7 @@ struct PathState {
 // path.
 //
 // - `origin`: world units.
-// - `state`: `SHADOW_RAY_NONE`, `SHADOW_RAY_WAITS`, or the mark of a shadow ray whose traversal has stalled.
+// - `state`: `SHADOW_RAY_NONE`, `SHADOW_RAY_WAITS`, or the mark of a shadow ray whose traversal was suspended.
 // - `direction`: unit length.
 // - `source_triangle`: the triangle on which the shadow ray starts, which it never hits again.
 // - `light`: what the shadow ray adds to the path's radiance.
@@ -1012,8 +1012,8 @@ struct AccelConstants {
 #define CONSTANT_SKIPS_HIDDEN 28u
 // Levels of cells of the scene's grid, 1 or 2. 0: the scene has a kd-tree.
 #define CONSTANT_GRID_LEVELS 27u
-// Loop turns that an invocation takes before its ray stalls. 0: any number.
-#define CONSTANT_TURN_BUDGET 29u
+// Loop iterations that an invocation takes before its ray is suspended. 0: any number.
+#define CONSTANT_ITERATION_BUDGET 29u
 // Words of the traversal's bit mask, 1 or 2.
 #define CONSTANT_MASK_WORDS 30u
 // How kernels read the scene: `READING_BOUND` and its like.
@@ -1031,13 +1031,13 @@ struct AccelConstants {
 // - `bounce_ix`: index of the batch's row in `bounces` for the bounce of this depth. Kernels that light the rays of
 //   all bounces get the batch's first row.
 // - `depth`: of the bounce, 0 for the camera's rays and for kernels that light all rays.
-// - `round`: `ROUND_BEGIN` and its like.
+// - `resume_pass`: `PASS_BEGIN` and its like.
 struct Batch {
     uint first_pixel;
     uint n_pixels;
     uint bounce_ix;
     uint depth;
-    uint round;
+    uint resume_pass;
 };
 
 // Values of `FalseColor.view`: the member of `Feature` that is displayed.
@@ -1109,11 +1109,11 @@ struct RasterPush {
 //
 // - `n_rays`: rays of the cast.
 // - `lanes_log2`: each ray has `2^lanes_log2` lanes, of which the first works.
-// - `round`: `ROUND_BEGIN` and its like.
+// - `resume_pass`: `PASS_BEGIN` and its like.
 struct CastBatch {
     uint n_rays;
     uint lanes_log2;
-    uint round;
+    uint resume_pass;
 };
 
 // Push constants of a cast by the driver's own ray tracing: the device address of its acceleration structure.
@@ -1295,8 +1295,8 @@ struct GridSort {
 #define BIND_PIXEL_NEAREST 28u
 // One `RasterGroups`, counts, and one `LargeTriangle` for each triangle of the scene.
 #define BIND_RASTER_GROUPS 29u
-// A row of counts, then `STALLED_RAY_ROWS` rows of four words for each slot (stalls.glsl).
-#define BIND_STALLS 32u
+// A row of counts, then `SUSPENDED_RAY_ROWS` rows of four words for each slot (suspended_rays.glsl).
+#define BIND_SUSPENDED_RAYS 32u
 
 // Bindings that only frames of paths have. `rays`, `hits`, `path_states`, `shadow_rays` and `path_snapshots` have an
 // element for each path of a batch: all samples of the first pixel, then those of the second one, and so on.
@@ -1321,7 +1321,7 @@ struct GridSort {
 #define BIND_TEXELS 64u
 
 // Bindings of a cast's descriptor set, which also has those that the traversal reads: the scene's arrays,
-// `BIND_ACCEL` and `BIND_STALLS`.
+// `BIND_ACCEL` and `BIND_SUSPENDED_RAYS`.
 
 // One `Ray` for each ray of the cast.
 #define BIND_CAST_RAYS 62u

@@ -1,7 +1,7 @@
 // The triangles of a leaf. A ray is tested only against those whose planes it meets within the leaf. A part of
 // kdtree.glsl, and used by grid.glsl, too.
 //
-// Needs scene.glsl, stalls.glsl, steps.glsl and slab.glsl. Provides `Visit`, `visit_leaf` and `find_candidate`.
+// Needs scene.glsl, suspended_rays.glsl, steps.glsl and slab.glsl. Provides `Visit`, `visit_leaf` and `find_candidate`.
 
 // A ray's visit to a leaf: the entries of leaf_triangles that are still to be tested, from entry_ix up to, but not
 // including, end_ix, and the ray's segment within the leaf.
@@ -19,13 +19,13 @@ Visit visit_leaf(KdNode leaf, float t_enter, float t_exit) {
 }
 
 // Finds the leaf's next triangle whose plane the ray meets within the leaf. Returns false if there is none, or if the
-// invocation's loop turns are spent. A triangle that is skipped can be hit only in another leaf, which has it, too.
-// Most triangles are in several leaves, so this saves most tests.
+// invocation's loop iterations are spent. A triangle that is skipped can be hit only in another leaf, which has it,
+// too. Most triangles are in several leaves, so this saves most tests.
 bool find_candidate(TraversalRay ray, inout Visit visit, out uint entry_ix) {
-    // If entry_ix were not set here, the compiler would keep its old value in a register from turn to turn.
+    // If entry_ix were not set here, the compiler would keep its old value in a register from iteration to iteration.
     entry_ix = 0u;
-    while (visit.entry_ix < visit.end_ix && has_turns()) {
-        count_turn();
+    while (visit.entry_ix < visit.end_ix && has_iterations()) {
+        count_iteration();
         entry_ix = visit.entry_ix;
         visit.entry_ix += 1u;
         if (!is_clear(ray, visit.interval, load_leaf_planes(entry_ix), accel.plane_epsilon)) return true;

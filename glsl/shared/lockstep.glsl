@@ -1,24 +1,25 @@
 // The search for devices that run both sides of a branch for all lanes, as software drivers do (predication,
-// PREDICATES_BRANCHES). A ray finds the same hits, in the same order, as by `search_by_turns`. A part of kdtree.glsl.
+// PREDICATES_BRANCHES). A ray finds the same hits, in the same order, as by `search_in_one_loop`. A part of
+// kdtree.glsl.
 //
 // On such devices, an `if` saves nothing: its body costs the same whether all lanes, some lanes or no lane take it. A
 // loop ends as soon as no lane continues, but runs its body at least once. So loops test at their end whether to
-// continue, which saves a turn in which no lane takes part. They test at their beginning, too. Without that second
+// continue, which saves a iteration in which no lane takes part. They test at their beginning, too. Without that second
 // test, lavapipe (Mesa 22.3) computes wrong results for lanes that leave the loop early: their variables get the
-// values of the loop's last turn.
+// values of the loop's last iteration.
 //
 // Needs everything that kdtree.glsl includes, and its `next_leaf`. Provides `search_in_step`.
 
 // Does what `find_candidate` does. The candidate is the entry before the visit's entry_ix. reach:
-// accel.plane_epsilon, which is passed in since loading it in each turn takes lavapipe 23 instructions of 145.
+// accel.plane_epsilon, which is passed in since loading it in each iteration takes lavapipe 23 instructions of 145.
 bool find_candidate_in_step(TraversalRay ray, float reach, inout Visit visit) {
     bool found = false;
-    bool looks = visit.entry_ix < visit.end_ix && has_turns();
+    bool looks = visit.entry_ix < visit.end_ix && has_iterations();
     while (looks) {
-        count_turn();
+        count_iteration();
         found = !is_clear(ray, visit.interval, load_leaf_planes(visit.entry_ix), reach);
         visit.entry_ix += 1u;
-        looks = !found && visit.entry_ix < visit.end_ix && has_turns();
+        looks = !found && visit.entry_ix < visit.end_ix && has_iterations();
         if (!looks) break;
     }
     return found;
@@ -55,10 +56,10 @@ bool go_on_in_step(TraversalRay ray, float t_best, inout bool begins, inout Cell
     return goes_on;
 }
 
-// Searches in turns. Each turn seeks a triangle to test in at most two leaves: the second one only if the first one
-// has none. Then it makes at most one test. If a turn went on until all lanes have something to test, most lanes
-// would wait. If it tested after every leaf, often no lane would have anything to test. Returns 0, or the mark of a
-// ray that has stalled.
+// Searches in one loop. Each iteration seeks a triangle to test in at most two leaves: the second one only if the first
+// one has none. Then it makes at most one test. If a iteration went on until all lanes have something to test, most
+// lanes would wait. If it tested after every leaf, often no lane would have anything to test. Returns 0, or the mark of
+// a ray that was suspended.
 uint search_in_step(TraversalRay ray, bool any_hit, inout Nearest best) {
     Cell cell = root_cell(ray);
     // The ray starts at the root, with a visit that has nothing left to test.
@@ -72,7 +73,7 @@ uint search_in_step(TraversalRay ray, bool any_hit, inout Nearest best) {
         begins = false;
     }
     while (goes_on) {
-        count_turn();
+        count_iteration();
         bool found = false;
         bool is_second = false;
         bool seeks = true;
@@ -85,8 +86,8 @@ uint search_in_step(TraversalRay ray, bool any_hit, inout Nearest best) {
         }
         intersect_in_step(ray, leaf_triangle_at(found ? visit.entry_ix - 1u : 0u), found, best);
         goes_on = goes_on && !is_done(any_hit, best);
-        if (goes_on && !has_turns()) {
-            mark = stall_at(cell, visit, best);
+        if (goes_on && !has_iterations()) {
+            mark = suspend_at(cell, visit, best);
             goes_on = false;
         }
         if (!goes_on) break;

@@ -16,7 +16,7 @@ uvec2 siblings_done;
 // than t_best.
 bool climb_by_boxes(TraversalRay ray, float t_best, inout Cell cell) {
     while (cell.node_offset != 0u) {
-        count_turn();
+        count_iteration();
         if ((siblings_done.x & 1u) == 0u) {
             vec2 interval = interval_in(ray, node_ix_of(sibling_of(cell.node_offset)));
             if (interval.x <= min(interval.y, t_best)) {

@@ -1,12 +1,12 @@
-// Stores the state of a stalled ray's traversal, and resumes the traversal where it stopped. A part of kdtree.glsl.
+// Stores the state of a suspended ray's traversal, and resumes the traversal where it stopped. A part of kdtree.glsl.
 //
-// Needs stalls.glsl, steps.glsl, local_memory.glsl, candidate.glsl, kd_nodes.glsl, pending.glsl and leaf.glsl.
-// Provides `stall_at` and `resume`.
+// Needs suspended_rays.glsl, steps.glsl, local_memory.glsl, candidate.glsl, kd_nodes.glsl, pending.glsl and leaf.glsl.
+// Provides `suspend_at` and `resume`.
 
 // Stores the state of the ray, and returns the mark for its result.
-uint stall_at(Cell cell, Visit visit, Nearest best) {
+uint suspend_at(Cell cell, Visit visit, Nearest best) {
     vec2 weights = spilled_pair(WEIGHTS_SLOT);
-    return stall(StalledRay(
+    return suspend(SuspendedRay(
         cell.node_offset, cell.t_enter, cell.t_exit, visit.entry_ix, visit.end_ix,
         best.t, best.triangle_ix, weights.x, weights.y, steps_so_far(), siblings_done
     ));
@@ -48,7 +48,7 @@ void walk_to(TraversalRay ray, uint node_offset) {
 
 // Loads the ray's stored state.
 void resume(TraversalRay ray, out Cell cell, out Visit visit, out Nearest best) {
-    StalledRay state = stalled_rays[resumed_slot];
+    SuspendedRay state = suspended_rays[resumed_slot];
     cell = Cell(state.node_offset, state.t_enter, state.t_exit);
     best = Nearest(state.t_best, state.triangle_ix);
     spill_pair(WEIGHTS_SLOT, state.u, state.v);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::{
-    Stalls,
+    SuspendedRays,
     scene_arrays::{Content, Contents, SceneAccess, SceneArrays},
     surface_kinds::SurfaceKinds,
     texture_words::TextureWords,
@@ -18,8 +18,8 @@ use crate::{
     },
     gpu::{Binding, Buffer, BufferUse, Constants, Context, GpuError, Timer},
     layout::{
-        AccelConstants, BIND_ACCEL, BIND_STALLS, BRUTE_MAX_TRIANGLES, KD_WORD_DEPTH, LeafTriangle, NO_WORDS, Slab,
-        TRIANGLE_HIDDEN, Triangle, constants,
+        AccelConstants, BIND_ACCEL, BIND_SUSPENDED_RAYS, BRUTE_MAX_TRIANGLES, KD_WORD_DEPTH, LeafTriangle, NO_WORDS,
+        Slab, TRIANGLE_HIDDEN, Triangle, constants,
     },
     passes::grid::GridBuilder,
     world::{Emitters, Geometry, World},
@@ -27,7 +27,7 @@ use crate::{
 
 /// Returns the numbers of the bindings of [`AccelBuffers`].
 pub(super) fn bindings() -> impl Iterator<Item = u32> {
-    [BIND_ACCEL, BIND_STALLS].into_iter().chain(SceneArrays::bindings())
+    [BIND_ACCEL, BIND_SUSPENDED_RAYS].into_iter().chain(SceneArrays::bindings())
 }
 
 /// Kind of acceleration structure, for which kernels are specialized.
@@ -46,8 +46,8 @@ pub struct AccelBuffers {
     /// The constants: one element.
     constants: Buffer<AccelConstants>,
     pub arrays: SceneArrays,
-    /// Rays that have stalled on their way through the structure.
-    pub stalls: Stalls,
+    /// Rays that were suspended on their way through the structure.
+    pub suspended_rays: SuspendedRays,
     access: SceneAccess,
     structure: Structure,
     /// Whether `arrays` have the emitters, which only paths read.
@@ -95,7 +95,7 @@ impl AccelBuffers {
         world: &World,
         of_paths: bool,
     ) -> Result<Self, GpuError> {
-        let mut next = self.with_own_stalls(context)?;
+        let mut next = self.with_own_suspended_rays(context)?;
         if of_paths && !self.has_emitters {
             next.add_words(context, &TextureWords::new(&world.scene().textures, world.emitters()))?;
             next.has_emitters = true;
@@ -104,12 +104,12 @@ impl AccelBuffers {
     }
 
     /// Returns buffers that share all arrays, for kernels that may run at the same time: each has room of its own for
-    /// the rays that stall.
+    /// the rays that are suspended.
     ///
     /// # Errors
     /// Memory runs out.
-    pub fn with_own_stalls(&self, context: &Arc<Context>) -> Result<Self, GpuError> {
-        Ok(Self { stalls: Stalls::new(context)?, ..self.clone() })
+    pub fn with_own_suspended_rays(&self, context: &Arc<Context>) -> Result<Self, GpuError> {
+        Ok(Self { suspended_rays: SuspendedRays::new(context)?, ..self.clone() })
     }
 
     /// Uploads triangles and their structure. `n_texture_words`: the length that `texture_words` will have.
@@ -222,7 +222,7 @@ impl AccelBuffers {
         let mut made = Self {
             constants: Buffer::new(context, "accel", 1, BufferUse::Uniform)?,
             arrays,
-            stalls: Stalls::new(context)?,
+            suspended_rays: SuspendedRays::new(context)?,
             access,
             has_emitters: false,
             filters: false,
@@ -314,7 +314,7 @@ impl AccelBuffers {
             .set(constants::SKIPS_HIDDEN, self.filters)
             .set(constants::MASK_WORDS, mask_words)
             .set(constants::GRID_LEVELS, n_levels)
-            .set(constants::TURN_BUDGET, self.stalls.turn_budget());
+            .set(constants::ITERATION_BUDGET, self.suspended_rays.iteration_budget());
         self.surface_kinds.set(constants, of_paths)
     }
 
@@ -330,7 +330,7 @@ impl AccelBuffers {
 
     /// Returns the objects that [`bindings`] are bound to.
     pub(super) fn objects(&self) -> Vec<(u32, Binding<'_>)> {
-        let own = [(BIND_ACCEL, Binding::Buffer(self.constants.any())), self.stalls.object()];
+        let own = [(BIND_ACCEL, Binding::Buffer(self.constants.any())), self.suspended_rays.object()];
         own.into_iter().chain(self.arrays.objects()).collect()
     }
 }

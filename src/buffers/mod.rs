@@ -9,7 +9,7 @@
 //! vertex_indices  the index buffer of the triangles that the graphics pipeline rasterizes
 //! texture_words   textures, and what leads from triangles to them
 //! surface_kinds   which kinds of surfaces a scene has, as specialization constants
-//! stalls          rays that have spent a dispatch's loop turns
+//! suspended_rays          rays that have spent a dispatch's loop iterations
 //! resources       all of these, with the frame's descriptor set
 //! grid            the build of a grid
 //! cast            given rays, their hits, and the cast's descriptor set
@@ -23,8 +23,8 @@ mod queue;
 mod raster_queue;
 mod resources;
 mod scene_arrays;
-mod stalls;
 mod surface_kinds;
+mod suspended_rays;
 mod texture_words;
 mod vertex_indices;
 
@@ -37,7 +37,7 @@ pub use self::{
     raster_queue::{RasterQueue, RasterState},
     resources::{Needs, Resources},
     scene_arrays::{SceneAccess, SceneArrays},
-    stalls::{Round, Stalls},
+    suspended_rays::{ResumePass, SuspendedRays},
 };
 pub(crate) use self::{accel::hidden_words, pixels::uses_graphics_pipeline};
 use crate::{

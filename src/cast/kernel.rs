@@ -5,7 +5,7 @@ use std::{rc::Rc, sync::Arc};
 use super::Contender;
 use crate::{
     accel::{Query, kdtree::Traversal},
-    buffers::{CastResources, Round},
+    buffers::{CastResources, ResumePass},
     gpu::{Access, BindingLayout, Commands, Context, GpuError},
     passes::Cast,
 };
@@ -50,7 +50,7 @@ impl Contender for Kernel {
     }
 
     fn record(&self, commands: &Commands) {
-        self.cast.record(commands, &self.resources.set, self.resources.cast_rays.len() as u32, Round::Begin);
+        self.cast.record(commands, &self.resources.set, self.resources.cast_rays.len() as u32, ResumePass::Begin);
     }
 
     fn resources(&self) -> &Rc<CastResources> {

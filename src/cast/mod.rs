@@ -31,7 +31,7 @@ use crate::{
         Query,
         kdtree::{Traversal, TraversalLinks},
     },
-    buffers::{AccelBuffers, CastResources, Round, hidden_words},
+    buffers::{AccelBuffers, CastResources, ResumePass, hidden_words},
     cpu,
     frame::{BadOptions, check::check},
     gpu::{Access, BindingLayout, CommandBuffer, Context, Device, GpuError, Limits, Statistic, Timer},
@@ -187,21 +187,21 @@ impl Caster {
                 }
                 // This repetition overwrites what the previous one has written: cast_hits.
                 commands.barrier(Access::ComputeWrite, Access::ComputeUpdate);
-                self.tree.stalls.reset(commands);
-                kernel.record(commands, &self.resources.set, n_rays, Round::Begin);
+                self.tree.suspended_rays.reset(commands);
+                kernel.record(commands, &self.resources.set, n_rays, ResumePass::Begin);
             })
         };
         let buffers = (0..n_times).map(record).collect::<Result<Vec<_>, _>>()?;
         self.context.wait_for(self.context.submit(buffers)?)?;
         let began_ms = Instant::now();
-        let n_rounds = self.tree.stalls.finish(&self.context, |commands, round| {
-            kernel.record(commands, &self.resources.set, n_rays, round);
+        let n_resume_passes = self.tree.suspended_rays.finish(&self.context, |commands, resume_pass| {
+            kernel.record(commands, &self.resources.set, n_rays, resume_pass);
         })?;
-        // The same rays stall in every repetition, but they are resumed only once, after the last repetition. The
-        // wall-clock time of resuming them is added to each repetition.
-        let stalled_ms = if n_rounds > 0 { began_ms.elapsed().as_secs_f64() * 1e3 } else { 0.0 };
+        // The same rays are suspended in every repetition, but they are resumed only once, after the last repetition.
+        // The wall-clock time of resuming them is added to each repetition.
+        let suspended_ms = if n_resume_passes > 0 { began_ms.elapsed().as_secs_f64() * 1e3 } else { 0.0 };
         let rows = timer.rows()?;
-        Ok(rows.iter().map(|row| row.span_ms.map(|(begin, end)| end - begin + stalled_ms)).collect())
+        Ok(rows.iter().map(|row| row.span_ms.map(|(begin, end)| end - begin + suspended_ms)).collect())
     }
 }
 

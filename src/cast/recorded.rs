@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{Caster, Hit, Ray, most_rays};
 use crate::{
     accel::Query,
-    buffers::{CastResources, Round, Stalls},
+    buffers::{CastResources, ResumePass, SuspendedRays},
     gpu::{BindingSet, Context, ExternalBuffer, ExternalCommands, GpuError},
     passes,
 };
@@ -16,7 +16,7 @@ pub struct RecordedCast {
     context: Arc<Context>,
     kernel: Arc<passes::Cast>,
     set: BindingSet,
-    stalls: Stalls,
+    suspended_rays: SuspendedRays,
     n_rays: u32,
 }
 
@@ -38,12 +38,12 @@ impl Caster {
         if n_rays > room {
             return Err(GpuError::Limit { what: "rays of a recorded cast", value: n_rays, limit: room });
         }
-        let tree = self.tree.with_own_stalls(&self.context)?;
+        let tree = self.tree.with_own_suspended_rays(&self.context)?;
         Ok(RecordedCast {
             context: Arc::clone(&self.context),
             kernel: self.prepare_kernel(query)?,
             set: CastResources::external(&self.bindings, &tree, rays, hits)?,
-            stalls: tree.stalls,
+            suspended_rays: tree.suspended_rays,
             n_rays: n_rays as u32,
         })
     }
@@ -58,8 +58,8 @@ impl RecordedCast {
     /// A cast may not run twice at the same time. Several casts of a [`Caster`] may.
     pub fn record(&self, commands: &ExternalCommands) {
         let commands = commands.commands(&self.context);
-        self.stalls.reset(&commands);
-        self.kernel.record(&commands, &self.set, self.n_rays, Round::Begin);
+        self.suspended_rays.reset(&commands);
+        self.kernel.record(&commands, &self.set, self.n_rays, ResumePass::Begin);
     }
 
     /// Finishes the rays that stopped at the driver's limit of loop iterations. Most drivers have no such limit. The
@@ -69,8 +69,8 @@ impl RecordedCast {
     /// # Errors
     /// A call fails.
     pub fn finish(&self) -> Result<u32, GpuError> {
-        self.stalls.finish(&self.context, |commands, round| {
-            self.kernel.record(commands, &self.set, self.n_rays, round);
+        self.suspended_rays.finish(&self.context, |commands, resume_pass| {
+            self.kernel.record(commands, &self.set, self.n_rays, resume_pass);
         })
     }
 }

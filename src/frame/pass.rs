@@ -5,7 +5,7 @@ use super::resource::{
     Resource::{
         Bounces, ChildKinds, Counters, FirstChildren, Hits, LightVisibility, LivePaths, PathSnapshots, PathStates,
         PixelAccumulated, PixelDisplay, PixelFeatures, PixelFiltered, PixelGuides, PixelNearest, PixelRadiance,
-        RasterGroups, RayRadiance, Rays, ScanBlocks, ShadowRays, Stalls, TriangleIds,
+        RasterGroups, RayRadiance, Rays, ScanBlocks, ShadowRays, SuspendedRays, TriangleIds,
     },
 };
 
@@ -158,8 +158,8 @@ const TABLE: [Info; 26] = [
         role: Role::ClosestHit,
         scope: Scope::Bounce,
         color: [240, 130, 60],
-        reads: &[Rays, Hits, Bounces, Counters, PixelFeatures, Stalls],
-        writes: &[Hits, Counters, PixelFeatures, Stalls],
+        reads: &[Rays, Hits, Bounces, Counters, PixelFeatures, SuspendedRays],
+        writes: &[Hits, Counters, PixelFeatures, SuspendedRays],
         indirect: Some(Bounces),
     },
     Info {
@@ -208,8 +208,8 @@ const TABLE: [Info; 26] = [
         role: Role::Shadow,
         scope: Scope::Batch,
         color: [150, 110, 200],
-        reads: &[Rays, Hits, Bounces, LightVisibility, PixelFeatures, Stalls],
-        writes: &[LightVisibility, PixelFeatures, Stalls],
+        reads: &[Rays, Hits, Bounces, LightVisibility, PixelFeatures, SuspendedRays],
+        writes: &[LightVisibility, PixelFeatures, SuspendedRays],
         indirect: Some(Bounces),
     },
     Info {
@@ -288,8 +288,8 @@ const TABLE: [Info; 26] = [
         role: Role::ClosestHit,
         scope: Scope::Bounce,
         color: [235, 110, 40],
-        reads: &[Rays, Hits, LivePaths, Bounces, PathStates, ShadowRays, Counters, PixelFeatures, Stalls],
-        writes: &[Hits, PathStates, ShadowRays, Counters, PixelFeatures, Stalls],
+        reads: &[Rays, Hits, LivePaths, Bounces, PathStates, ShadowRays, Counters, PixelFeatures, SuspendedRays],
+        writes: &[Hits, PathStates, ShadowRays, Counters, PixelFeatures, SuspendedRays],
         indirect: Some(Bounces),
     },
     Info {

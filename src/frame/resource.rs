@@ -46,8 +46,9 @@ pub enum Resource {
     RasterGroups,
     /// Numbers of hits and of shadow rays of each bounce of each batch.
     Counters,
-    /// States of stalled rays: rays that have spent the loop turns of a dispatch and go on in a further dispatch.
-    Stalls,
+    /// States of suspended rays: rays that have spent the loop iterations of a dispatch and go on in a further
+    /// dispatch.
+    SuspendedRays,
     /// What is known of each path beside its ray: the light that it has brought, the pdf of its direction.
     PathStates,
     /// The shadow ray of each path from its last hit to a sampled light.
@@ -79,7 +80,7 @@ impl Resource {
         Self::PixelNearest,
         Self::RasterGroups,
         Self::Counters,
-        Self::Stalls,
+        Self::SuspendedRays,
         Self::PathStates,
         Self::ShadowRays,
         Self::LivePaths,
@@ -107,7 +108,7 @@ impl Resource {
             Self::PixelNearest => layout::BIND_PIXEL_NEAREST,
             Self::RasterGroups => layout::BIND_RASTER_GROUPS,
             Self::Counters => layout::BIND_COUNTERS,
-            Self::Stalls => layout::BIND_STALLS,
+            Self::SuspendedRays => layout::BIND_SUSPENDED_RAYS,
             Self::PathStates => layout::BIND_PATH_STATES,
             Self::ShadowRays => layout::BIND_SHADOW_RAYS,
             Self::LivePaths => layout::BIND_LIVE_PATHS,

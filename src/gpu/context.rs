@@ -30,7 +30,7 @@ pub struct ContextOptions {
 }
 
 impl ContextOptions {
-    /// Returns options for the selected device, or for the best one if `device` is `None`. `validate` turns the
+    /// Returns options for the selected device, or for the best one if `device` is `None`. `validate` iterations the
     /// validation layer on.
     pub fn new(device: Option<DeviceSelector>, validate: bool) -> Self {
         Self { device, validate, overrides: DeviceOverrides::default() }
@@ -220,7 +220,7 @@ impl Context {
         Ok(*self.n_lanes.get_or_init(|| n_lanes))
     }
 
-    /// Returns the number of turns (iterations) that all loops of a kernel may take together. Beyond it, the driver
+    /// Returns the number of iterations that all loops of a kernel may take together. Beyond it, the driver
     /// ends the kernel without an error. `None` if there is no limit. The first call runs a kernel to find out. Only
     /// software drivers are tested: a GPU executes a loop as branches of the kernel's own code, and nothing counts
     /// the branches.

@@ -14,27 +14,33 @@ const LANES: Shader = Shader { file: "lanes.comp", spirv: include_bytes!(concat!
 /// Workgroup size of the lane probe. It is that of ray kernels.
 const GROUP_SIZE: u32 = 64;
 
-const LOOP_TURNS: Shader =
-    Shader { file: "loop_turns.comp", spirv: include_bytes!(concat!(env!("OUT_DIR"), "/loop_turns.comp.spv")) };
+const LOOP_ITERATIONS: Shader = Shader {
+    file: "loop_iterations.comp",
+    spirv: include_bytes!(concat!(env!("OUT_DIR"), "/loop_iterations.comp.spv")),
+};
 
-/// Returns the number of loop turns (iterations) after which the driver ends a kernel, or `None` if the probe meets
-/// no limit. The lavapipe of Mesa 22.3 ends every shader after 65,535 turns, that of Mesa 25.0 does not.
+/// Returns the number of loop iterations after which the driver ends a kernel, or `None` if the probe meets
+/// no limit. The lavapipe of Mesa 22.3 ends every shader after 65,535 iterations, that of Mesa 25.0 does not.
 pub(super) fn loop_limit(context: &Arc<Context>) -> Result<Option<u32>, GpuError> {
-    // The number of turns that the probe tries is twice the known limit.
-    const N_TURNS: u32 = 1 << 17;
+    // The number of iterations that the probe tries is twice the known limit.
+    const N_ITERATIONS: u32 = 1 << 17;
     let counts = Buffer::with(context, "counts", &[0u32], BufferUse::Storage)?;
     let bindings = BindingLayout::new(context, &[(0, BindingKind::Storage)], 4)?;
-    let set = BindingSet::new(&bindings, "loop_turns", &[(0, Binding::Buffer(counts.any()))])?;
-    let desc =
-        ComputeDesc { name: "loop_turns", shader: LOOP_TURNS, constants: &Constants::new(), full_subgroups: false };
+    let set = BindingSet::new(&bindings, "loop_iterations", &[(0, Binding::Buffer(counts.any()))])?;
+    let desc = ComputeDesc {
+        name: "loop_iterations",
+        shader: LOOP_ITERATIONS,
+        constants: &Constants::new(),
+        full_subgroups: false,
+    };
     let kernel = ComputePipeline::new(context, &bindings, &desc)?;
-    context.run("loop_turns", |commands| {
+    context.run("loop_iterations", |commands| {
         commands.bind(&set);
-        commands.dispatch(&kernel, None, &N_TURNS, Dispatch::Threads([1; 3], [1; 3]));
+        commands.dispatch(&kernel, None, &N_ITERATIONS, Dispatch::Threads([1; 3], [1; 3]));
         commands.barrier(Access::ComputeWrite, Access::TransferRead); // counts
     })?;
-    let n_turns = counts.download()?[0];
-    Ok((n_turns < N_TURNS).then_some(n_turns))
+    let n_iterations = counts.download()?[0];
+    Ok((n_iterations < N_ITERATIONS).then_some(n_iterations))
 }
 
 /// Whether GLSL's `fma` rounds once on this device. Vulkan allows it to round twice, and software drivers do.
@@ -60,7 +66,7 @@ pub(super) fn n_lanes(context: &Arc<Context>) -> Result<u32, GpuError> {
     // The probe dispatches more workgroups than any device has room for. Each workgroup runs for some 20,000 cycles,
     // longer than the device takes to begin all of them.
     const N_GROUPS: u32 = 16_384;
-    const N_TURNS: u32 = 2500;
+    const N_ITERATIONS: u32 = 2500;
     let counts = Buffer::with(context, "counts", &[0u32; 3], BufferUse::Storage)?;
     let bindings = BindingLayout::new(context, &[(0, BindingKind::Storage)], 4)?;
     let set = BindingSet::new(&bindings, "lanes", &[(0, Binding::Buffer(counts.any()))])?;
@@ -71,7 +77,7 @@ pub(super) fn n_lanes(context: &Arc<Context>) -> Result<u32, GpuError> {
         commands.dispatch(
             &kernel,
             None,
-            &N_TURNS,
+            &N_ITERATIONS,
             Dispatch::Threads([N_GROUPS * GROUP_SIZE, 1, 1], [GROUP_SIZE, 1, 1]),
         );
         commands.barrier(Access::ComputeWrite, Access::TransferRead); // counts

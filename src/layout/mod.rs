@@ -119,7 +119,7 @@ mod tests {
 
     /// Returns the struct name and the block of every binding and push constant of all modules, except for the probes'.
     fn blocks() -> Vec<(&'static str, Type)> {
-        let is_probe = |name: &str| ["fused_fma.comp", "lanes.comp", "loop_turns.comp"].contains(&name);
+        let is_probe = |name: &str| ["fused_fma.comp", "lanes.comp", "loop_iterations.comp"].contains(&name);
         let modules = CONSTANTS_OF_SHADERS.iter().map(|(name, _)| *name).filter(|name| !is_probe(name));
         let variables = modules.flat_map(|name| {
             let spirv = fs::read(format!("{}/{name}.spv", env!("OUT_DIR"))).expect("SPIR-V");

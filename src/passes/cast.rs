@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::{kernel, search_constants, searching};
 use crate::{
     accel::{Query, kdtree::Traversal},
-    buffers::Round,
+    buffers::ResumePass,
     frame::bounce::lanes_log2,
     gpu::{BindingLayout, BindingSet, Commands, ComputePipeline, Context, Dispatch, GpuError, Statistic},
     layout::{CastBatch, RAY_GROUP_SIZE, constants},
@@ -45,13 +45,18 @@ impl Cast {
         self.kernel.statistics()
     }
 
-    /// Needs the first `n_rays` elements of `cast_rays`. Leaves the first `n_rays` elements of `cast_hits`; a ray
-    /// that has stalled leaves a mark in place of its hit. `round`: which rays are traced, all or those that have
-    /// stalled.
-    pub fn record(&self, commands: &Commands, set: &BindingSet, n_rays: u32, round: Round) {
+    /// Needs the first `n_rays` elements of `cast_rays`. Leaves the first `n_rays` elements of `cast_hits`; a ray that
+    /// was suspended leaves a mark in place of its hit. `resume_pass`: which rays are traced, all or those that have
+    /// suspended.
+    pub fn record(&self, commands: &Commands, set: &BindingSet, n_rays: u32, pass: ResumePass) {
         commands.bind(set);
         let lanes_log2 = lanes_log2(n_rays, self.n_lanes);
         let dispatch = Dispatch::Threads([n_rays << lanes_log2, 1, 1], [RAY_GROUP_SIZE, 1, 1]);
-        commands.dispatch(&self.kernel, None, &CastBatch { n_rays, lanes_log2, round: round.constant() }, dispatch);
+        commands.dispatch(
+            &self.kernel,
+            None,
+            &CastBatch { n_rays, lanes_log2, resume_pass: pass.constant() },
+            dispatch,
+        );
     }
 }

@@ -30,9 +30,9 @@ impl PathTrace {
 
     /// Needs `rays` of the paths that are alive, `shadow_rays`, and in `live_paths` the lists of this bounce and of the
     /// shadow rays. Leaves `hits`. Updates `shadow_rays` and `path_states`, the counters if the options ask for a
-    /// profile, and `pixel_features` if they ask for features. A ray that has stalled leaves a mark in place of its
-    /// hit, a shadow ray in place of its state. `batch.round`: which of them are traced, all or those that have
-    /// stalled.
+    /// profile, and `pixel_features` if they ask for features. A ray that was suspended leaves a mark in place of its
+    /// hit, a shadow ray in place of its state. `batch.resume_pass`: which of them are traced, all or those that have
+    /// suspended.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         commands.dispatch(&self.kernel, Some(batch.depth), batch, resources.trace_dispatch(batch));
     }

@@ -28,9 +28,9 @@ impl Shadow {
         Ok(Self { kernel: kernel(context, bindings, "shadow", shader, &constants)? })
     }
 
-    /// Needs `rays` and `hits` of all bounces of the batch. Leaves `light_visibility`; a shadow ray that has stalled
+    /// Needs `rays` and `hits` of all bounces of the batch. Leaves `light_visibility`; a shadow ray that was suspended
     /// leaves a mark in place of its visibility. Updates `pixel_features` if the options ask for features.
-    /// `batch.round`: which shadow rays are traced, all or those that have stalled.
+    /// `batch.resume_pass`: which shadow rays are traced, all or those that were suspended.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         commands.dispatch(&self.kernel, None, batch, resources.shadow_dispatch(batch));
     }

@@ -35,9 +35,9 @@ impl Trace {
         Ok(Self { kernel: from(false)?, from_camera })
     }
 
-    /// Needs `rays` of the bounce; camera rays are computed, not read. Leaves `hits`; a ray that has stalled leaves a
+    /// Needs `rays` of the bounce; camera rays are computed, not read. Leaves `hits`; a ray that was suspended leaves a
     /// mark in place of its hit. Updates the counters if the options ask for a profile, and `pixel_features` if they
-    /// ask for features. `batch.round`: which rays are traced, all or those that have stalled.
+    /// ask for features. `batch.resume_pass`: which rays are traced, all or those that were suspended.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         let of_camera = self.from_camera.as_ref().filter(|_| batch.depth == 0);
         commands.dispatch(of_camera.unwrap_or(&self.kernel), Some(batch.depth), batch, resources.trace_dispatch(batch));

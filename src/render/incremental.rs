@@ -21,7 +21,7 @@ use crate::{
 /// A command buffer of a frame.
 pub(super) struct Part {
     commands: CommandBuffer,
-    /// The part's rays that can stall, if there are any. All of them must end before the next part begins.
+    /// The part's rays that can be suspended, if there are any. All of them must end before the next part begins.
     traced: Option<Traced>,
     /// Whether it is the last part of its batch.
     pub ends_batch: bool,
@@ -34,12 +34,12 @@ pub(super) struct Traced {
 }
 
 impl Part {
-    /// Creates a part without rays that can stall.
+    /// Creates a part without rays that can be suspended.
     pub fn plain(commands: CommandBuffer) -> Self {
         Self { commands, traced: None, ends_batch: false }
     }
 
-    /// Creates a part whose rays can stall.
+    /// Creates a part whose rays can be suspended.
     pub fn traced(commands: CommandBuffer, traced: Traced) -> Self {
         Self { commands, traced: Some(traced), ends_batch: false }
     }
@@ -195,8 +195,8 @@ impl Renderer {
         self.profile(&bounces, begun_at).map(Some)
     }
 
-    /// Runs parts and waits for their end. They are submitted together, except that a part whose rays can stall ends
-    /// a submission, since its rays must end before the next part begins.
+    /// Runs parts and waits for their end. They are submitted together, except that a part whose rays can be suspended
+    /// ends a submission, since its rays must end before the next part begins.
     fn run_parts(&self, parts: Vec<Part>) -> Result<(), GpuError> {
         let mut together = Vec::new();
         for Part { commands, traced, .. } in parts {

@@ -10,9 +10,9 @@
 //! end frame      mean of all samples, noise filter, encoding for display
 //! ```
 //!
-//! Each line except `each batch` is one command buffer, and each bounce has one of its own. Where rays can stall, a
-//! bounce or `light` has two command buffers. A ray stalls if the driver limits the loop turns of a kernel and the
-//! ray has spent its turns; it goes on in a further dispatch.
+//! Each line except `each batch` is one command buffer, and each bounce has one of its own. Where rays can be
+//! suspended, a bounce or `light` has two command buffers. A ray is suspended if the driver limits the loop iterations
+//! of a kernel and the ray has spent its turns; it goes on in a further dispatch.
 
 mod bands;
 mod external;
@@ -360,10 +360,10 @@ impl Renderer {
         }
     }
 
-    /// Records a section of a batch in one command buffer, or in two if rays of the section can stall: the host
+    /// Records a section of a batch in one command buffer, or in two if rays of the section can be suspended: the host
     /// submits the second when all rays of the first have ended.
     fn parts(&self, name: &str, section: &[Step], batch: &Batch) -> Result<Vec<Part>, GpuError> {
-        let traced = self.traced(section, batch).filter(|_| self.resources.accel.stalls.can_occur());
+        let traced = self.traced(section, batch).filter(|_| self.resources.accel.suspended_rays.can_occur());
         let Some(traced) = traced else {
             let all = |commands: &Commands| {
                 self.resources.bind(commands);
@@ -377,7 +377,7 @@ impl Renderer {
         let (trace, rest) = section.split_at(tracing_ix + 2);
         let tracing = |commands: &Commands| {
             self.resources.bind(commands);
-            self.resources.accel.stalls.reset(commands);
+            self.resources.accel.suspended_rays.reset(commands);
             self.record_section(commands, trace, batch);
         };
         let resting = |commands: &Commands| {
@@ -401,11 +401,11 @@ impl Renderer {
         })
     }
 
-    /// Repeats the tracing pass of a part, whose commands have run once, until none of its rays is stalled.
+    /// Repeats the tracing pass of a part, whose commands have run once, until none of its rays is suspended.
     fn finish_rays(&self, traced: &Traced) -> Result<(), GpuError> {
-        self.resources.accel.stalls.finish(&self.context, |commands, round| {
+        self.resources.accel.suspended_rays.finish(&self.context, |commands, resume_pass| {
             self.resources.bind(commands);
-            let batch = Batch { round: round.constant(), ..traced.batch };
+            let batch = Batch { resume_pass: resume_pass.constant(), ..traced.batch };
             self.record_section(commands, &[Step::Run(traced.pass)], &batch);
         })?;
         Ok(())

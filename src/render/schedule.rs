@@ -7,7 +7,7 @@ use crate::{
     buffers::PathQueue,
     frame::{FrameKind, Integrator, Plan, RenderOptions},
     gpu::{Buffer, BufferUse, Context, DeviceInfo, GpuError, Limits, Timer},
-    layout::{Batch, Bounce, Frame, MOST_SAMPLES_LOG2, PathRay, RAY_GROUP_SIZE, ROUND_BEGIN, SAMPLE_BLOCK_LOG2},
+    layout::{Batch, Bounce, Frame, MOST_SAMPLES_LOG2, PASS_BEGIN, PathRay, RAY_GROUP_SIZE, SAMPLE_BLOCK_LOG2},
 };
 
 /// Upper limit of the queue's capacity, in rays, unless the caller sets the capacity. This number of rays keeps any
@@ -51,7 +51,7 @@ impl Schedule {
                 n_pixels,
                 bounce_ix: batch_ix * max_depth,
                 depth: 0,
-                round: ROUND_BEGIN,
+                resume_pass: PASS_BEGIN,
             })
             .collect();
         let rows: Vec<_> = batches

@@ -141,7 +141,7 @@ fn steps_make_the_same_picture() {
             shares.push(renderer.progress());
         }
         // There are steps that begin and end the frame, and steps for its bounces and their light. There are more
-        // where rays can stall.
+        // where rays can be suspended.
         assert!(shares.len() >= options_of_parts().max_depth as usize + 3);
         assert!(shares.is_sorted_by(|a, b| a < b) && shares.iter().all(|share| *share < 1.0), "{shares:?}");
     }

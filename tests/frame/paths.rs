@@ -226,11 +226,12 @@ fn a_crop_is_a_part_of_the_whole() {
     }
 }
 
-/// Rays and shadow rays that stall go on in further dispatches.
+/// Rays and shadow rays that are suspended go on in further dispatches.
 #[test]
-fn a_limit_of_loop_turns_changes_no_bit() {
+fn a_limit_of_loop_iterations_changes_no_bit() {
     let (scene, options) = (scenes::mixed(), options(24, 18, 4));
-    let overrides = DeviceOverrides { loop_limit: Some(400), n_stall_slots: Some(50), ..DeviceOverrides::default() };
+    let overrides =
+        DeviceOverrides { loop_limit: Some(400), n_suspension_slots: Some(50), ..DeviceOverrides::default() };
     let context = pretended(overrides);
     let mut renderer = Renderer::new(context.clone(), &world_of(&scene), &options).expect("a renderer");
     assert!(identical(&draw(&mut renderer, 5), &on_device(&scene, &options, 5)));

@@ -101,16 +101,16 @@ impl PathStage {
         self.context.run("test", body).expect("the commands run");
     }
 
-    /// Does what [`PathStage::run`] does for a kernel whose rays can stall: repeats it until all have ended.
+    /// Does what [`PathStage::run`] does for a kernel whose rays can be suspended: repeats it until all have ended.
     pub fn trace(&self, batch: &Batch) {
-        let stalls = &self.resources.accel.stalls;
+        let suspended_rays = &self.resources.accel.suspended_rays;
         self.run(|commands| {
-            stalls.reset(commands);
+            suspended_rays.reset(commands);
             self.passes.path_trace.record(commands, &self.resources, batch);
         });
-        let resumed = stalls.finish(&self.context, |commands, round| {
+        let resumed = suspended_rays.finish(&self.context, |commands, resume_pass| {
             self.resources.bind(commands);
-            let batch = Batch { round: round.constant(), ..*batch };
+            let batch = Batch { resume_pass: resume_pass.constant(), ..*batch };
             self.passes.path_trace.record(commands, &self.resources, &batch);
         });
         resumed.expect("all rays end");

@@ -75,17 +75,17 @@ impl Stage {
         self.context.run("test", body).expect("the commands run");
     }
 
-    /// Does what [`Stage::run`] does for kernels whose rays can stall: repeats the dispatch until all rays have
-    /// ended. `record` receives the batch of a round.
+    /// Does what [`Stage::run`] does for kernels whose rays can be suspended: repeats the dispatch until all rays have
+    /// ended. `record` receives the batch of a resume pass.
     pub fn trace(&self, batch: &Batch, record: impl Fn(&Commands, &Batch)) {
-        let stalls = &self.resources.accel.stalls;
+        let suspended_rays = &self.resources.accel.suspended_rays;
         self.run(|commands| {
-            stalls.reset(commands);
+            suspended_rays.reset(commands);
             record(commands, batch);
         });
-        let resumed = stalls.finish(&self.context, |commands, round| {
+        let resumed = suspended_rays.finish(&self.context, |commands, resume_pass| {
             self.resources.bind(commands);
-            record(commands, &Batch { round: round.constant(), ..*batch });
+            record(commands, &Batch { resume_pass: resume_pass.constant(), ..*batch });
         });
         resumed.expect("all rays end");
     }
@@ -149,7 +149,7 @@ impl Drop for Stage {
 }
 
 /// The first batch at its bounce of depth 0.
-pub const FIRST: Batch = Batch { first_pixel: 0, n_pixels: 0, bounce_ix: 0, depth: 0, round: 0 };
+pub const FIRST: Batch = Batch { first_pixel: 0, n_pixels: 0, bounce_ix: 0, depth: 0, resume_pass: 0 };
 
 /// Returns `n` rays of every nasty kind at the stage's scene, each with its own pixel and throughput.
 pub fn some_rays(stage: &Stage, n: u32) -> Vec<PathRay> {

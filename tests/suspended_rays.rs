@@ -1,5 +1,5 @@
-//! Tests rays that take more loop turns than a dispatch allows. They end in a further dispatch, with the hits of rays
-//! that are never interrupted.
+//! Tests rays that take more loop iterations than a dispatch allows. They end in a further dispatch, with the hits of
+//! rays that are never interrupted.
 
 mod support;
 
@@ -19,11 +19,15 @@ use support::{
     MeshWithTree, assert_silent, compare, device, meshes, pretended, random::Random, rays::nasty_ray, scenes, world_of,
 };
 
-/// Opens the device as it is.
-/// Opens a device that ends shaders after `loop_limit` turns. With `n_lanes` it is a GPU of that many lanes, in place
-/// of a software driver.
-fn limited_device(loop_limit: u32, n_lanes: Option<u32>, n_stall_slots: Option<usize>) -> Arc<Context> {
-    pretended(DeviceOverrides { loop_limit: Some(loop_limit), n_lanes, n_stall_slots, ..DeviceOverrides::default() })
+/// Opens the device as it is. Opens a device that ends shaders after `loop_limit` iterations. With `n_lanes` it is a
+/// GPU of that many lanes, in place of a software driver.
+fn limited_device(loop_limit: u32, n_lanes: Option<u32>, n_suspension_slots: Option<usize>) -> Arc<Context> {
+    pretended(DeviceOverrides {
+        loop_limit: Some(loop_limit),
+        n_lanes,
+        n_suspension_slots,
+        ..DeviceOverrides::default()
+    })
 }
 
 fn cast(context: &Arc<Context>, world: &MeshWithTree, traversal: Traversal, query: Query, rays: &[Ray]) -> Vec<Hit> {
@@ -89,7 +93,7 @@ fn a_leaf_of_more_triangles_than_a_driver_takes_turns_is_searched_to_its_end() {
         }
     }
     assert_silent(&context);
-    // If kernels do not count turns, a driver with such a limit loses hits.
+    // If kernels do not count iterations, a driver with such a limit loses hits.
     if context.loop_limit().expect("a probe").is_some() {
         let careless = limited_device(u32::MAX, None, None);
         let hits = cast(&careless, &world, Traversal::Mask, Query::Closest, &rays);
@@ -115,14 +119,15 @@ fn a_far_soup_of_small_triangles_is_as_on_the_cpu() {
     assert_silent(&context);
 }
 
-/// The hits do not depend on the turn budget, the number of slots or the kind of search.
+/// The hits do not depend on the iteration budget, the number of slots or the kind of search.
 #[test]
 fn interrupted_casts_find_the_same() {
     let world = MeshWithTree::new([meshes::soup(500, 1), meshes::torus(20, 10)].concat());
     let rays = nasty_rays(&world, 300);
     for n_lanes in [None, Some(1000)] {
         let plain = pretended(DeviceOverrides { n_lanes, ..DeviceOverrides::default() });
-        let limited = [(1000, Some(100)), (5000, None)].map(|(turns, n_slots)| limited_device(turns, n_lanes, n_slots));
+        let limited =
+            [(1000, Some(100)), (5000, None)].map(|(iterations, n_slots)| limited_device(iterations, n_lanes, n_slots));
         for &traversal in Traversal::ALL {
             for query in [Query::Closest, Query::Any] {
                 let expected = cast(&plain, &world, traversal, query, &rays);
@@ -148,8 +153,8 @@ fn interrupted_casts_through_grids_find_the_same() {
         };
         for n_lanes in [None, Some(1000)] {
             let plain = pretended(DeviceOverrides { n_lanes, ..DeviceOverrides::default() });
-            for (turns, n_slots) in [(1000, Some(100)), (1000, None), (5000, None)] {
-                let limited = limited_device(turns, n_lanes, n_slots);
+            for (iterations, n_slots) in [(1000, Some(100)), (1000, None), (5000, None)] {
+                let limited = limited_device(iterations, n_lanes, n_slots);
                 for query in [Query::Closest, Query::Any] {
                     compare::exact(&cast(&plain, query), &cast(&limited, query))
                         .unwrap_or_else(|e| panic!("{} {query:?}: {e}", accel.kind()));
@@ -196,9 +201,9 @@ fn interrupted_frames_are_the_same() {
         for (loop_limit, n_slots) in [(400, Some(64)), (2000, None)] {
             let limited = limited_device(loop_limit, None, n_slots);
             let (found, found_features, found_profile) = draw(&limited, &options);
-            assert!(picture == found, "{traversal} {primary}, {loop_limit} turns");
+            assert!(picture == found, "{traversal} {primary}, {loop_limit} iterations");
             compare::exact(&features, &found_features).unwrap();
-            assert_eq!(profile.bounces, found_profile.bounces, "{traversal} {primary}, {loop_limit} turns");
+            assert_eq!(profile.bounces, found_profile.bounces, "{traversal} {primary}, {loop_limit} iterations");
             assert_silent(&limited);
         }
     }
