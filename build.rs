@@ -22,8 +22,7 @@ use std::{
 };
 
 /// The kernels that find hits. Each is compiled for every search of [`SEARCHES`], and those that are marked here also
-/// with `WITH_GAPS`, the code for parts of triangles through which rays pass. Casts know no materials, so they have no
-/// such gaps.
+/// with `WITH_ALPHA_TEST`. Casts know no materials, so they have no alpha test.
 const SEARCHING: [(&str, bool); 4] = [("cast", false), ("path_trace", true), ("shadow", true), ("trace", true)];
 
 /// The ways to search for hits: the traversals of the kd-tree, and the grid. A module has the code of one search, which
@@ -34,7 +33,7 @@ const SEARCHES: [&str; 9] =
 /// A module of SPIR-V: a shader, compiled with some macros.
 struct Module {
     /// The name by which Rust finds the module. It is that of the shader's file. In the names of kernels that find
-    /// hits, the search and `gaps` follow the kernel's name, as in `trace_mask_gaps.comp`.
+    /// hits, the search and `alpha` follow the kernel's name, as in `trace_mask_alpha.comp`.
     name: String,
     path: PathBuf,
     macros: Vec<(&'static str, Option<String>)>,
@@ -191,25 +190,26 @@ fn modules() -> Vec<Module> {
     for path in shaders_in_order() {
         let name = path.file_name().and_then(|name| name.to_str()).expect("a shader's name is UTF-8").to_owned();
         match SEARCHING.iter().find(|(kernel, _)| name.strip_suffix(".comp") == Some(kernel)) {
-            Some((kernel, has_gaps)) => modules.extend(searching_modules(kernel, *has_gaps, &path)),
+            Some((kernel, has_alpha_test)) => modules.extend(searching_modules(kernel, *has_alpha_test, &path)),
             None => modules.push(Module { name, path, macros: Vec::new() }),
         }
     }
     modules
 }
 
-/// Returns the modules of a kernel that finds hits. The code for gaps, through which rays pass, is inlined wherever a
-/// triangle is tested. Scenes without gaps are spared it.
-fn searching_modules(kernel: &str, has_gaps: bool, path: &Path) -> Vec<Module> {
+/// Returns the modules of a kernel that finds hits. The alpha test is inlined wherever a triangle is
+/// tested. Scenes without masked or blended materials are spared it.
+fn searching_modules(kernel: &str, has_alpha_test: bool, path: &Path) -> Vec<Module> {
     let of_search = |search: &str| {
         let traversal = ("TRAVERSAL", Some(format!("TRAVERSAL_{}", search.to_uppercase())));
-        let module = |gaps: &str, macros| Module {
-            name: format!("{kernel}_{search}{gaps}.comp"),
+        let module = |alpha: &str, macros| Module {
+            name: format!("{kernel}_{search}{alpha}.comp"),
             path: path.to_owned(),
             macros,
         };
-        let with_gaps = has_gaps.then(|| module("_gaps", vec![traversal.clone(), ("WITH_GAPS", None)]));
-        iter::once(module("", vec![traversal])).chain(with_gaps)
+        let macros = vec![traversal.clone(), ("WITH_ALPHA_TEST", None)];
+        let with_alpha_test = has_alpha_test.then(|| module("_alpha", macros));
+        iter::once(module("", vec![traversal])).chain(with_alpha_test)
     };
     SEARCHES.into_iter().flat_map(of_search).collect()
 }

@@ -151,9 +151,9 @@ fn found_in_kernels(pass: Pass) -> (BTreeSet<Resource>, BTreeSet<Resource>) {
     let files = match pass {
         Pass::Visibility => vec!["visibility.vert.spv".to_owned(), "visibility.frag.spv".to_owned()],
         // Kernels that find hits have modules that differ in their search alone.
-        Pass::Trace => vec!["trace_mask.comp.spv".to_owned(), "trace_grid_gaps.comp.spv".to_owned()],
-        Pass::PathTrace => vec!["path_trace_mask.comp.spv".to_owned(), "path_trace_grid_gaps.comp.spv".to_owned()],
-        Pass::Shadow => vec!["shadow_mask.comp.spv".to_owned(), "shadow_grid_gaps.comp.spv".to_owned()],
+        Pass::Trace => vec!["trace_mask.comp.spv".to_owned(), "trace_grid_alpha.comp.spv".to_owned()],
+        Pass::PathTrace => vec!["path_trace_mask.comp.spv".to_owned(), "path_trace_grid_alpha.comp.spv".to_owned()],
+        Pass::Shadow => vec!["shadow_mask.comp.spv".to_owned(), "shadow_grid_alpha.comp.spv".to_owned()],
         _ => vec![format!("{}.comp.spv", pass.name())],
     };
     let (mut reads, mut writes) = (BTreeSet::new(), BTreeSet::new());

@@ -7,7 +7,7 @@
 #include "layout.glsl"
 
 const bool COUNT_COSTS = false;
-const bool PASSES_VEILS = false;
+const bool TESTS_BLENDED = false;
 #include "accel.glsl"
 #include "lanes.glsl"
 

@@ -9,7 +9,7 @@
 
 // Whether the rays' cost is added to pixel_features.
 layout(constant_id = CONSTANT_COUNT_COSTS) const bool COUNT_COSTS = false;
-const bool PASSES_VEILS = false;
+const bool TESTS_BLENDED = false;
 #include "accel.glsl"
 #include "rays.glsl"
 #include "lanes.glsl"

@@ -1,10 +1,10 @@
 // The acceleration structure: finds the hit of a ray.
 //
-// Needs the macros TRAVERSAL and, for scenes with gaps, WITH_GAPS (build.rs); and the constants `bool COUNT_COSTS`
-// (steps.glsl) and `bool PASSES_VEILS` (cutout.glsl), which the kernel declares before this file. Provides `traverse`,
-// and `traverse_any_length` for directions of any length, which are all that a kernel calls to find a hit. Kernels
-// also use `is_suspended` and `runs_in_pass` of suspended_rays.glsl. cast.comp checks its rays by `exponent_of`,
-// `longest_bits` and `magnitude_bits`.
+// Needs the macros TRAVERSAL and, for scenes with alpha-tested materials, WITH_ALPHA_TEST (build.rs); and the constants
+// `bool COUNT_COSTS` (steps.glsl) and `bool TESTS_BLENDED` (alpha_test.glsl), which the kernel declares before this
+// file. Provides `traverse`, and `traverse_any_length` for directions of any length, which are all that a kernel calls
+// to find a hit. Kernels also use `is_suspended` and `runs_in_pass` of suspended_rays.glsl. cast.comp checks its rays
+// by `exponent_of`, `longest_bits` and `magnitude_bits`.
 //
 //   traversal_ray.glsl   the ray, clipped to the structure's box
 //   kdtree.glsl          the search through a kd-tree

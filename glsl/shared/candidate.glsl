@@ -1,10 +1,11 @@
 // Candidates, which are the triangles that a search comes to, and their test against the nearest hit so far. A part
 // of accel.glsl.
 //
-// Needs scene.glsl, triangle.glsl, traversal_ray.glsl, local_memory.glsl and PASSES_VEILS, whether the rays are shadow
-// rays, which pass through veils. Provides `Nearest`, `intersect`, `is_better`, `has_gaps`, `is_accepted`, `is_done`.
+// Needs scene.glsl, triangle.glsl, traversal_ray.glsl, local_memory.glsl and TESTS_BLENDED, whether the rays are shadow
+// rays, which test blended materials. Provides `Nearest`, `intersect`, `is_better`, `has_alpha_test`, `is_accepted`,
+// `is_done`.
 
-#include "cutout.glsl"
+#include "alpha_test.glsl"
 
 // Whether rays pass through triangles that are marked TRIANGLE_HIDDEN in `triangle_materials`.
 layout(constant_id = CONSTANT_SKIPS_HIDDEN) const bool SKIPS_HIDDEN = false;
@@ -23,21 +24,21 @@ bool is_better(TraversalRay ray, float t, uint triangle_ix, Nearest best) {
     return t > ray.t_min && nearer && triangle_ix != ray.source_triangle;
 }
 
-// Whether the rays pass through parts of triangles. Only modules that are compiled with WITH_GAPS have the code for it
-// (build.rs).
-bool has_gaps() {
-#ifdef WITH_GAPS
-    if (PASSES_VEILS) return SHADOW_GAPS;
-    return CUTOUTS;
+// Whether the rays pass through parts of triangles. Only modules that are compiled with WITH_ALPHA_TEST have the code
+// for it (build.rs).
+bool has_alpha_test() {
+#ifdef WITH_ALPHA_TEST
+    if (TESTS_BLENDED) return SHADOW_ALPHA_TEST;
+    return ALPHA_MASKS;
 #else
     return false;
 #endif
 }
 
-// Whether a hit counts. Without SKIPS_HIDDEN and gaps every hit does, and nothing is read. u, v: barycentric weights of
-// the hit.
+// Whether a hit counts. Without SKIPS_HIDDEN and alpha test every hit does, and nothing is read. u, v: barycentric
+// weights of the hit.
 bool is_accepted(uint triangle_ix, float u, float v) {
-    if (has_gaps()) return !is_gap(triangle_ix, u, v, PASSES_VEILS);
+    if (has_alpha_test()) return !fails_alpha_test(triangle_ix, u, v, TESTS_BLENDED);
     if (SKIPS_HIDDEN) return (load_triangle_materials(triangle_ix) & TRIANGLE_HIDDEN) == 0u;
     return true;
 }

@@ -166,7 +166,7 @@
 #define LEAST_INDEX_STEP 0.01
 // Lower bound of the roughness of sheen. Below, sheen would be a line at the horizon.
 #define LEAST_SHEEN_ROUGHNESS 0.25
-// Opacity below which light passes through a see-through surface on its way to another hit. A shadow ray cannot be
+// Opacity below which light passes through a blended surface on its way to another hit. A shadow ray cannot be
 // weakened, only stopped.
 #define LEAST_SHADOWING_OPACITY 0.5
 
@@ -411,7 +411,7 @@ struct Texture {
 // - `occlusion_strength`: how much of `occlusion` acts, 0..1.
 // - `alpha_cutoff`: opacity below which rays pass through the surface, as `flags` say.
 // - `opacity_factor`: opacity of the material, by which that of its textures is multiplied.
-// - `flags`: `MAPS_CUTOUT` and its like.
+// - `flags`: `MAPS_ALPHA_MASK` and its like.
 // - `coverage`: opacity of the material for rays of paths, by which that of its textures is multiplied.
 struct MaterialMaps {
     uint base_colour;
@@ -568,11 +568,11 @@ struct CornerSurface {
 #define MAP_OCCLUSION 9u
 
 // `MaterialMaps.flags`: rays pass through the surface where its opacity is below `alpha_cutoff`.
-#define MAPS_CUTOUT 1u
+#define MAPS_ALPHA_MASK 1u
 // `MaterialMaps.flags`: shadow rays, but no others, pass through the surface where its opacity is below `alpha_cutoff`.
-#define MAPS_VEIL 2u
+#define MAPS_SHADOW_TEST 2u
 // `MaterialMaps.flags`: rays of paths pass through the surface at random, as often as its opacity says.
-#define MAPS_COVERAGE 16u
+#define MAPS_ALPHA_BLEND 16u
 // `MaterialMaps.flags`: the opacity of the base colour's texture counts.
 #define MAPS_COLOUR_HAS_OPACITY 4u
 // `MaterialMaps.flags`: the opacity of the corners' colours counts.
@@ -1001,12 +1001,12 @@ struct AccelConstants {
 #define CONSTANT_TEXTURED 24u
 // Whether the scene has materials of microfacets.
 #define CONSTANT_MICROFACETS 25u
-// Whether rays of all kinds pass through parts of triangles: whether there are cut-outs (cutout.glsl).
-#define CONSTANT_CUTOUTS 26u
+// Whether rays of all kinds are alpha-tested: whether there are masked materials (alpha_test.glsl).
+#define CONSTANT_ALPHA_MASKS 26u
 // Whether some triangles have normals at their corners.
 #define CONSTANT_SMOOTH 22u
-// Whether shadow rays pass through parts of triangles: whether there are cut-outs or veils.
-#define CONSTANT_SHADOW_GAPS 23u
+// Whether shadow rays are alpha-tested: whether there are masked or blended materials.
+#define CONSTANT_SHADOW_ALPHA_TEST 23u
 
 // Whether rays pass through triangles with `TRIANGLE_HIDDEN` in `triangle_materials`.
 #define CONSTANT_SKIPS_HIDDEN 28u

@@ -34,7 +34,7 @@ void intersect_in_step(TraversalRay ray, LeafTriangle entry, bool tests, inout N
     bool is_hit = tests && is_inside(with_exact_signs(edges, errors));
     bool is_new = is_hit && is_better(ray, hit.t, entry.triangle_ix, best);
     if (SKIPS_HIDDEN) is_new = is_new && is_accepted(entry.triangle_ix, hit.u, hit.v);
-    if (has_gaps()) is_new = is_new && is_accepted(entry.triangle_ix, hit.u, hit.v);
+    if (has_alpha_test()) is_new = is_new && is_accepted(entry.triangle_ix, hit.u, hit.v);
     vec2 weights = spilled_pair(WEIGHTS_SLOT);
     best.t = is_new ? hit.t : best.t;
     best.triangle_ix = is_new ? entry.triangle_ix : best.triangle_ix;

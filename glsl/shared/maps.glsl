@@ -13,7 +13,7 @@
 #include "scene.glsl"
 #include "surface.glsl"
 #include "material.glsl"
-#include "cutout.glsl"
+#include "alpha_test.glsl"
 
 // A hit, as textures are looked up at it.
 struct TextureHit {
@@ -129,8 +129,8 @@ void apply_maps(MaterialMaps maps, vec4 values[N_MAPS], TextureHit hit, inout Ma
     vec4 map_colour = values[MAP_BASE_COLOUR];
     vec3 base = corner_colour.rgb * max(map_colour.rgb, 0.0);
     material.kd *= base;
-    // What is left of a surface with cut-outs is opaque.
-    if ((maps.flags & MAPS_CUTOUT) == 0u) {
+    // What is left of a masked surface is opaque.
+    if ((maps.flags & MAPS_ALPHA_MASK) == 0u) {
         if ((maps.flags & MAPS_CORNERS_HAVE_OPACITY) != 0u) material.d *= corner_colour.a;
         if ((maps.flags & MAPS_COLOUR_HAS_OPACITY) != 0u) material.d *= map_colour.a;
         material.d = clamp(material.d * values[MAP_OPACITY].x, 0.0, 1.0);

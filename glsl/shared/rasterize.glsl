@@ -11,7 +11,7 @@
 #include "scene.glsl"
 #include "camera.glsl"
 #include "triangle.glsl"
-#include "cutout.glsl"
+#include "alpha_test.glsl"
 
 layout(std430, set = 0, binding = BIND_PIXEL_NEAREST) buffer PixelNearestBlock { uint64_t pixel_nearest[]; };
 
@@ -41,7 +41,7 @@ void test_pixel(uvec2 pixel, Triangle triangle, uint triangle_ix) {
     Hit hit;
     Shear shear = shear_of(camera_origin(pixel), camera_direction(pixel));
     if (!intersect_triangle(shear, triangle, triangle_ix, hit)) return;
-    if (CUTOUTS && is_gap(triangle_ix, hit.u, hit.v, false)) return;
+    if (ALPHA_MASKS && fails_alpha_test(triangle_ix, hit.u, hit.v, false)) return;
     if (hit.t > 0.0) keep_nearest(pixel, hit.t, triangle_ix);
 }
 

@@ -21,11 +21,11 @@ pub struct SurfaceKinds {
     /// Whether some triangles have normals at their corners.
     is_smooth: bool,
     /// Whether rays of all kinds pass through parts of triangles.
-    has_cutouts: bool,
+    has_alpha_masks: bool,
     /// Whether shadow rays do.
-    has_shadow_gaps: bool,
+    has_shadow_alpha_test: bool,
     /// Whether rays of paths do.
-    has_path_gaps: bool,
+    has_path_alpha_test: bool,
     /// The lobes that materials have in the path tracer: `LOBE_INTERFACE` and its like.
     lobes: u32,
 }
@@ -56,9 +56,9 @@ impl SurfaceKinds {
             has_microfacets: scene.materials.iter().any(|material| is_microfacet(material.flags)),
             is_textured: scene.textures.is_in_use(),
             is_smooth: scene.triangles.par_iter().any(|t| ![t.n0, t.n1, t.n2].contains(&FLAT_NORMAL)),
-            has_cutouts: scene.textures.has_cutouts(),
-            has_shadow_gaps: scene.textures.has_shadow_gaps(),
-            has_path_gaps: scene.textures.has_path_gaps(),
+            has_alpha_masks: scene.textures.has_alpha_masks(),
+            has_shadow_alpha_test: scene.textures.has_shadow_alpha_test(),
+            has_path_alpha_test: scene.textures.has_path_alpha_test(),
             lobes: path_materials(scene).iter().map(lobes_of).fold(0, |lobes, more| lobes | more),
         }
     }
@@ -71,7 +71,10 @@ impl SurfaceKinds {
             .set(constants::TEXTURED, self.is_textured)
             .set(constants::SMOOTH, self.is_smooth)
             .set(constants::LOBES, self.lobes)
-            .set(constants::CUTOUTS, self.has_cutouts)
-            .set(constants::SHADOW_GAPS, if of_paths { self.has_path_gaps } else { self.has_shadow_gaps })
+            .set(constants::ALPHA_MASKS, self.has_alpha_masks)
+            .set(
+                constants::SHADOW_ALPHA_TEST,
+                if of_paths { self.has_path_alpha_test } else { self.has_shadow_alpha_test },
+            )
     }
 }

@@ -97,7 +97,7 @@ impl Paths {
         let live = &self.live[depth as usize % 2];
         let rays: Vec<_> = live.iter().filter(is_first).map(ray).collect();
         let shadow_rays: Vec<_> = self.with_shadow_ray.iter().filter(is_first).map(shadow_ray).collect();
-        let inputs = &inputs.through_veils_at_random();
+        let inputs = &inputs.with_stochastic_alpha();
         costs::count_rays::<false>(inputs, traversal, &rays, pixel_features);
         costs::count_rays::<true>(inputs, traversal, &shadow_rays, pixel_features);
     }

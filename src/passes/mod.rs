@@ -228,15 +228,20 @@ pub(crate) fn modules_of(kernel: &str) -> impl Iterator<Item = Shader> {
         .filter(move |module| module.file.strip_prefix(kernel).is_some_and(|rest| rest.starts_with('_')))
 }
 
-/// Returns the module of a kernel that finds hits: in the scene's grid, or in its kd-tree by the traversal. `gaps` is
-/// the constant that tells whether the kernel's rays pass through parts of triangles. Without it, they never do.
-fn searching(kernel: &str, bindings: &BindingLayout, traversal: Traversal, gaps: Option<Constant<bool>>) -> Shader {
+/// Returns the module of a kernel that finds hits: in the scene's grid, or in its kd-tree by the traversal.
+/// `alpha_test` is the constant that tells whether the kernel's rays are alpha-tested. Without it, they never are.
+fn searching(
+    kernel: &str,
+    bindings: &BindingLayout,
+    traversal: Traversal,
+    alpha_test: Option<Constant<bool>>,
+) -> Shader {
     let search = match bindings.value(constants::GRID_LEVELS) {
         0 => traversal.to_string().replace('-', "_"),
         _ => "grid".to_owned(),
     };
-    let gaps = if gaps.is_some_and(|gaps| bindings.value(gaps) != 0) { "_gaps" } else { "" };
-    let file = format!("{kernel}_{search}{gaps}.comp");
+    let alpha = if alpha_test.is_some_and(|it| bindings.value(it) != 0) { "_alpha" } else { "" };
+    let file = format!("{kernel}_{search}{alpha}.comp");
     *SEARCHING.iter().find(|module| module.file == file).unwrap_or_else(|| panic!("build.rs makes no {file}"))
 }
 

@@ -21,7 +21,7 @@ impl PathTrace {
         bindings: &Arc<BindingLayout>,
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
-        let shader = searching("path_trace", bindings, options.traversal, Some(constants::SHADOW_GAPS));
+        let shader = searching("path_trace", bindings, options.traversal, Some(constants::SHADOW_ALPHA_TEST));
         let constants = search_constants(context)?
             .set(constants::COUNTS, options.profile)
             .set(constants::COUNT_COSTS, options.features);

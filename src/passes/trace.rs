@@ -23,7 +23,7 @@ impl Trace {
         bindings: &Arc<BindingLayout>,
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
-        let shader = searching("trace", bindings, options.traversal, Some(constants::CUTOUTS));
+        let shader = searching("trace", bindings, options.traversal, Some(constants::ALPHA_MASKS));
         let constants = search_constants(context)?
             .set(constants::COUNTS, options.profile)
             .set(constants::COUNT_COSTS, options.features);

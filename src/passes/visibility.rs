@@ -19,8 +19,8 @@ impl Visibility {
         let desc = RasterDesc {
             name: "visibility",
             vertex: spirv!("visibility.vert"),
-            fragment: match bindings.value(constants::CUTOUTS) != 0 {
-                true => spirv!("visibility_cutout.frag"),
+            fragment: match bindings.value(constants::ALPHA_MASKS) != 0 {
+                true => spirv!("visibility_alpha_test.frag"),
                 false => spirv!("visibility.frag"),
             },
             targets: RasterTargets::Uint,

@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 
+use super::alpha_test::fails_alpha_test;
 use super::counting::table::{Counted, CountedSlice, NoCounter, ReadCounts};
-use super::cutout::is_gap;
 use crate::{
     accel::{
         Accel,
@@ -39,13 +39,13 @@ pub struct KernelInputs<'a, R = NoCounter> {
     /// The scene's textures; `None` if it has none.
     pub textures: Option<&'a Textures>,
     /// The textures if some of them cut out parts of triangles.
-    pub cutouts: Option<&'a Textures>,
+    pub alpha_masks: Option<&'a Textures>,
     /// The textures if rays of paths pass through some triangles.
-    pub path_gaps: Option<&'a Textures>,
-    /// Whether rays pass through see-through surfaces with an opacity below `LEAST_SHADOWING_OPACITY`.
-    pub passes_veils: bool,
-    /// Whether rays pass through see-through surfaces at random, as often as their opacity says.
-    pub random_opacity: bool,
+    pub path_alpha_test: Option<&'a Textures>,
+    /// Whether rays pass through blended surfaces with an opacity below `LEAST_SHADOWING_OPACITY`.
+    pub tests_blended: bool,
+    /// Whether rays pass through blended surfaces at random, as often as their opacity says.
+    pub stochastic_alpha: bool,
     pub lights: &'a [Light],
     /// What the path tracer samples lights from; `None` for rays that do not belong to a frame.
     pub emitters: Option<&'a Emitters>,
@@ -81,7 +81,7 @@ impl<'a, R> KernelInputs<'a, R> {
         self.frame.expect("rays of a frame")
     }
 
-    /// Returns whether a hit counts: rays pass through hidden triangles, and through cut-outs.
+    /// Returns whether a hit counts: rays pass through hidden triangles, and where the alpha test fails.
     #[inline(always)]
     pub fn is_accepted(&self, hit: &Hit) -> bool {
         !self.lets_rays_pass() || self.is_solid_at(hit)
@@ -90,14 +90,14 @@ impl<'a, R> KernelInputs<'a, R> {
     /// Returns whether triangles may let a ray pass, so that [`KernelInputs::is_accepted`] has to be asked.
     #[inline(always)]
     pub fn lets_rays_pass(&self) -> bool {
-        self.filters || self.cutouts.is_some()
+        self.filters || self.alpha_masks.is_some()
     }
 
     #[cold]
     fn is_solid_at(&self, hit: &Hit) -> bool {
         let word = self.triangle_materials[hit.triangle_ix as usize];
-        match self.cutouts {
-            Some(textures) => !is_gap(textures, word, hit, self.passes_veils, self.random_opacity),
+        match self.alpha_masks {
+            Some(textures) => !fails_alpha_test(textures, word, hit, self.tests_blended, self.stochastic_alpha),
             None => word & TRIANGLE_HIDDEN == 0,
         }
     }
@@ -111,8 +111,8 @@ impl<'a> KernelInputs<'a> {
             triangle_materials: &scene.triangle_materials,
             materials: &scene.materials,
             textures: scene.textures.is_in_use().then_some(&scene.textures),
-            cutouts: scene.textures.has_shadow_gaps().then_some(&scene.textures),
-            path_gaps: scene.textures.has_path_gaps().then_some(&scene.textures),
+            alpha_masks: scene.textures.has_shadow_alpha_test().then_some(&scene.textures),
+            path_alpha_test: scene.textures.has_path_alpha_test().then_some(&scene.textures),
             lights: &scene.lights,
             frame: Some(frame),
             ..Self::of_geometry(world.geometry())
@@ -166,10 +166,10 @@ impl<'a> KernelInputs<'a> {
             filters: false,
             materials: &[],
             textures: None,
-            cutouts: None,
-            path_gaps: None,
-            passes_veils: false,
-            random_opacity: false,
+            alpha_masks: None,
+            path_alpha_test: None,
+            tests_blended: false,
+            stochastic_alpha: false,
             lights: &[],
             emitters: None,
             kd_nodes: CountedSlice::from(&[][..]),
@@ -198,10 +198,10 @@ impl<'a> KernelInputs<'a> {
             filters: self.filters,
             materials: self.materials,
             textures: self.textures,
-            cutouts: self.cutouts,
-            path_gaps: self.path_gaps,
-            passes_veils: self.passes_veils,
-            random_opacity: self.random_opacity,
+            alpha_masks: self.alpha_masks,
+            path_alpha_test: self.path_alpha_test,
+            tests_blended: self.tests_blended,
+            stochastic_alpha: self.stochastic_alpha,
             lights: self.lights,
             emitters: self.emitters,
             kd_nodes: self.kd_nodes.with_counter(Counted(&counts.n_nodes)),
@@ -231,10 +231,10 @@ impl<'a> KernelInputs<'a> {
         Self { triangle_materials: words, filters: true, ..self }
     }
 
-    /// Returns the inputs of shadow rays, which pass through see-through surfaces with an opacity below
+    /// Returns the inputs of shadow rays, which pass through blended surfaces with an opacity below
     /// `LEAST_SHADOWING_OPACITY`.
-    pub fn through_veils(self) -> Self {
-        Self { passes_veils: true, ..self }
+    pub fn with_blended_tested(self) -> Self {
+        Self { tests_blended: true, ..self }
     }
 
     /// Returns the inputs of paths: with the materials that [`path_materials`](crate::world::path_materials) returns,
@@ -248,10 +248,10 @@ impl<'a> KernelInputs<'a> {
         Self { noise_tiles, ..self }
     }
 
-    /// Returns the inputs of paths, whose rays pass through see-through surfaces at random, as often as their opacity
+    /// Returns the inputs of paths, whose rays pass through blended surfaces at random, as often as their opacity
     /// says.
-    pub fn through_veils_at_random(self) -> Self {
-        Self { cutouts: self.path_gaps, passes_veils: true, random_opacity: true, ..self }
+    pub fn with_stochastic_alpha(self) -> Self {
+        Self { alpha_masks: self.path_alpha_test, tests_blended: true, stochastic_alpha: true, ..self }
     }
 
     /// Returns the same inputs with a kd-tree's boxes and ropes.

@@ -12,8 +12,8 @@ use super::{
 };
 use crate::{
     layout::{
-        FLAT_NORMAL, Frame, Hit, LEAST_COSINE, LEAST_NORMAL_SQUARED, MAPS_COLOUR_HAS_OPACITY,
-        MAPS_CORNERS_HAVE_OPACITY, MAPS_CUTOUT, Material, MaterialMaps, NO_TEXTURE, PathRay, Texture, Triangle,
+        FLAT_NORMAL, Frame, Hit, LEAST_COSINE, LEAST_NORMAL_SQUARED, MAPS_ALPHA_MASK, MAPS_COLOUR_HAS_OPACITY,
+        MAPS_CORNERS_HAVE_OPACITY, Material, MaterialMaps, NO_TEXTURE, PathRay, Texture, Triangle,
     },
     world::Textures,
 };
@@ -143,7 +143,7 @@ impl<'a> TextureHit<'a> {
     fn apply_maps(&self, maps: &MaterialMaps, material: &mut Material) {
         let (base, corner_colour, map_colour) = self.base_colour(maps);
         material.kd *= base;
-        if maps.flags & MAPS_CUTOUT == 0 {
+        if maps.flags & MAPS_ALPHA_MASK == 0 {
             if maps.flags & MAPS_CORNERS_HAVE_OPACITY != 0 {
                 material.d *= corner_colour.w;
             }

@@ -17,12 +17,13 @@
 //! light       light, material, microfacet, fresnel, children, display, tone_curves
 //! paths       sampler, path_camera, paths, path_vertex; bsdf: surfaces; emitters: lights; noise: variances;
 //!             sample_sums
-//! textures    texture, maps, cutout
+//! textures    texture, maps, alpha_test
 //! inputs      the data that kernels only read
 //! counting    the same traversal with its reads counted
 //! ```
 
 pub mod accumulate;
+pub mod alpha_test;
 pub mod brute;
 pub mod bsdf;
 pub mod camera;
@@ -33,7 +34,6 @@ pub(crate) mod chi_square;
 pub mod children;
 pub mod compact;
 pub mod counting;
-pub mod cutout;
 pub mod demodulate;
 pub mod denoise;
 pub mod display;

@@ -35,7 +35,7 @@ pub fn closest_hits_by<T: Tracer>(
     rays: &[PathRay],
     hits: &mut [Hit],
 ) -> u32 {
-    let inputs = &inputs.through_veils_at_random();
+    let inputs = &inputs.with_stochastic_alpha();
     let trace = |tracer: &mut T, live: &[u32], mut hits: Part<Hit>| {
         let mut n_hits = 0;
         let search_rays = live.iter().map(|&path_ix| (path_ix, SearchRay::from(&rays[path_ix as usize])));
@@ -69,7 +69,7 @@ pub fn shadow_rays_by<T: Tracer>(
     shadow_rays: &mut [ShadowRay],
     states: &mut [PathState],
 ) {
-    let inputs = &inputs.through_veils_at_random();
+    let inputs = &inputs.with_stochastic_alpha();
     let test = |tracer: &mut T, list: &[u32], mut shadow_rays: Part<ShadowRay>, mut states: Part<PathState>| {
         let search_ray = |&path_ix: &u32| (path_ix, SearchRay::from(&ray_of(shadow_rays.of_path(path_ix))));
         let search_rays: Vec<_> = list.iter().map(search_ray).collect();

@@ -66,7 +66,7 @@ pub fn shadow_by<T: Tracer>(
     light_visibility: &mut [u32],
 ) -> u32 {
     let (rays, hits) = (&rays[places.clone()], &hits[places.clone()]);
-    let inputs = &inputs.through_veils();
+    let inputs = &inputs.with_blended_tested();
     let of_light = |(light, visibility): (&Light, &mut [u32])| -> u32 {
         let of_task = |tracer: &mut T, ((rays, hits), visibility): ((&[PathRay], &[Hit]), &mut [u32])| {
             let mut n_tested = 0;

@@ -125,9 +125,9 @@ pub enum Alpha {
     Opaque,
     /// It is the share of what is behind the surface that the surface covers.
     #[default]
-    Coverage,
+    Blend,
     /// Where it is below this value, there is no surface.
-    Cutout(f32),
+    Mask(f32),
 }
 
 /// A clear layer above a surface.

@@ -133,7 +133,7 @@ impl MaterialSpec {
             lobes: Lobes::of_illum(illum).ok_or_else(|| format!("illum {illum} is not one of 0 to 10"))?,
             tf: colour("Tf", self.tf, Vec3::ONE)?,
             microfacet,
-            alpha: cutoff.map_or(Alpha::Coverage, Alpha::Cutout),
+            alpha: cutoff.map_or(Alpha::Blend, Alpha::Mask),
             is_unlit: self.unlit.unwrap_or(false),
             is_double_sided: true,
             clearcoat: Clearcoat {

@@ -141,7 +141,7 @@ fn override_opacity(material: &mut Material, spec: &MaterialSpec, stated: &Mater
     let is_stated = spec.d.is_some() || spec.tr.is_some();
     // Another opacity is meant to be seen.
     if is_stated && material.d != stated.d && material.alpha == Alpha::Opaque {
-        material.alpha = Alpha::Coverage;
+        material.alpha = Alpha::Blend;
     }
     set(&mut material.d, stated.d, is_stated);
     set(&mut material.alpha, stated.alpha, spec.cutoff.is_some());

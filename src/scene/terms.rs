@@ -38,7 +38,7 @@ impl Material {
             Some(microfacet) => self.microfacet_terms(microfacet),
             None => self.phong_terms(),
         };
-        if let Alpha::Cutout(cutoff) = self.alpha {
+        if let Alpha::Mask(cutoff) = self.alpha {
             terms.push(Term { key: "cutoff", value: TermValue::Number(cutoff), is_default: false });
         }
         terms.push(flag("unlit", self.is_unlit, false));

@@ -155,7 +155,7 @@ impl From<&scene::Material> for Material {
     fn from(material: &scene::Material) -> Self {
         let &scene::Material { kd, d, ks, ni, ke, is_unlit, microfacet, alpha, clearcoat, sheen, .. } = material;
         let unlit = if is_unlit { MATERIAL_UNLIT } else { 0 };
-        let d = if alpha == Alpha::Coverage { d } else { 1.0 };
+        let d = if alpha == Alpha::Blend { d } else { 1.0 };
         let layers = Self {
             clearcoat: clearcoat.factor,
             clearcoat_roughness: clearcoat.roughness,

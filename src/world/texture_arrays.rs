@@ -201,7 +201,7 @@ impl Textures {
             occlusion: index(&maps.occlusion),
             normal_scale: maps.normal_scale,
             occlusion_strength: maps.occlusion_strength,
-            alpha_cutoff: if let Alpha::Cutout(cutoff) = material.alpha { cutoff } else { 0.0 },
+            alpha_cutoff: if let Alpha::Mask(cutoff) = material.alpha { cutoff } else { 0.0 },
             opacity_factor: material.d,
             flags: 0,
             coverage: 1.0,
@@ -294,7 +294,7 @@ pub(crate) mod tests {
 
     #[test]
     fn a_scene_without_textures_has_no_texels() {
-        let scene = scene_of(vec![image(4, 4)], vec![with(|it| (it.alpha, it.d) = (Alpha::Cutout(0.25), 0.5))]);
+        let scene = scene_of(vec![image(4, 4)], vec![with(|it| (it.alpha, it.d) = (Alpha::Mask(0.25), 0.5))]);
         let (arrays, maps) = arrays_of(&scene).unwrap();
         assert_eq!(arrays, TextureArrays::default());
         assert_eq!((maps[0].base_colour, maps[0].occlusion), (NO_TEXTURE, NO_TEXTURE));
@@ -330,7 +330,7 @@ pub(crate) mod tests {
     fn only_see_through_colours_are_averaged_by_opacity() {
         let texture = || Some(scene::Texture::of_image(0));
         let leaf = with(|it| {
-            (it.maps.base_colour, it.maps.emission, it.alpha) = (texture(), texture(), Alpha::Cutout(0.5));
+            (it.maps.base_colour, it.maps.emission, it.alpha) = (texture(), texture(), Alpha::Mask(0.5));
         });
         let bark = with(|it| (it.maps.base_colour, it.alpha) = (texture(), Alpha::Opaque));
         let pixels = Pixels::Bytes(vec![[200, 0, 0, 255], [0, 0, 0, 0]]);

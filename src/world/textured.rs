@@ -12,8 +12,8 @@ use super::{
 };
 use crate::{
     layout::{
-        CornerSurface, LEAST_SHADOWING_OPACITY, MAPS_COLOUR_HAS_OPACITY, MAPS_CORNERS_HAVE_OPACITY, MAPS_COVERAGE,
-        MAPS_CUTOUT, MAPS_VEIL, MaterialMaps, NO_TEXTURE, Texture,
+        CornerSurface, LEAST_SHADOWING_OPACITY, MAPS_ALPHA_BLEND, MAPS_ALPHA_MASK, MAPS_COLOUR_HAS_OPACITY,
+        MAPS_CORNERS_HAVE_OPACITY, MAPS_SHADOW_TEST, MaterialMaps, NO_TEXTURE, Texture,
     },
     scene::{Alpha, Material, Scene},
     util::memory,
@@ -52,7 +52,7 @@ impl Textures {
             set_opacity(maps, material, |image_ix| opacities.is_see_through(image_ix), corners_have_opacity);
         }
         let has_colours = scene.meshes.iter().any(|mesh| !mesh.colours.is_empty());
-        let has_opacity = material_maps.iter().any(|maps| maps.flags & (MAPS_CUTOUT | MAPS_COVERAGE) != 0);
+        let has_opacity = material_maps.iter().any(|maps| maps.flags & (MAPS_ALPHA_MASK | MAPS_ALPHA_BLEND) != 0);
         if textures.is_empty() && !has_colours && !has_opacity {
             return Ok(Self::default());
         }
@@ -79,7 +79,7 @@ impl Textures {
     /// Returns whether the scene has textures, colours at corners, or opacity that rays have to ask for. Opacity that
     /// only rays of paths ask for does not count.
     pub fn is_in_use(&self) -> bool {
-        !self.textures.is_empty() || !self.corners.is_empty() || self.has_shadow_gaps()
+        !self.textures.is_empty() || !self.corners.is_empty() || self.has_shadow_alpha_test()
     }
 
     /// Returns the memory that the arrays take on a device, bytes.
@@ -90,18 +90,18 @@ impl Textures {
     }
 
     /// Returns whether rays of all kinds pass through parts of triangles.
-    pub fn has_cutouts(&self) -> bool {
-        self.material_maps.iter().any(|maps| maps.flags & MAPS_CUTOUT != 0)
+    pub fn has_alpha_masks(&self) -> bool {
+        self.material_maps.iter().any(|maps| maps.flags & MAPS_ALPHA_MASK != 0)
     }
 
     /// Returns whether shadow rays pass through parts of triangles.
-    pub fn has_shadow_gaps(&self) -> bool {
-        self.material_maps.iter().any(|maps| maps.flags & (MAPS_CUTOUT | MAPS_VEIL) != 0)
+    pub fn has_shadow_alpha_test(&self) -> bool {
+        self.material_maps.iter().any(|maps| maps.flags & (MAPS_ALPHA_MASK | MAPS_SHADOW_TEST) != 0)
     }
 
     /// Returns whether rays of paths pass through parts of triangles, or through triangles at random.
-    pub fn has_path_gaps(&self) -> bool {
-        self.material_maps.iter().any(|maps| maps.flags & (MAPS_CUTOUT | MAPS_COVERAGE) != 0)
+    pub fn has_path_alpha_test(&self) -> bool {
+        self.material_maps.iter().any(|maps| maps.flags & (MAPS_ALPHA_MASK | MAPS_ALPHA_BLEND) != 0)
     }
 
     /// Returns whether triangles have texture coordinates.
@@ -153,30 +153,30 @@ fn set_opacity(
     let is_microfacet = material.microfacet.is_some();
     maps.coverage = material.d;
     if material.alpha != Alpha::Opaque {
-        // Of MTL's materials, only a cut-out without an opacity map of its own takes that of the colours.
-        let takes_colours = matches!(material.alpha, Alpha::Cutout(_)) && material.maps.opacity.is_none();
+        // Of MTL's materials, only a masked one without an opacity map of its own takes that of the colours.
+        let takes_colours = matches!(material.alpha, Alpha::Mask(_)) && material.maps.opacity.is_none();
         maps.flags |= if is_microfacet || takes_colours { MAPS_COLOUR_HAS_OPACITY } else { 0 };
         maps.flags |= if corners_have_opacity { MAPS_CORNERS_HAVE_OPACITY } else { 0 };
     }
     match material.alpha {
         Alpha::Opaque => maps.opacity = NO_TEXTURE,
-        Alpha::Cutout(cutoff) => {
-            maps.flags |= MAPS_CUTOUT;
+        Alpha::Mask(cutoff) => {
+            maps.flags |= MAPS_ALPHA_MASK;
             maps.alpha_cutoff = cutoff;
         }
-        Alpha::Coverage => {
+        Alpha::Blend => {
             let is_glass = material.lobes.reflection || material.lobes.refraction;
             let colours = material.maps.base_colour.as_ref().filter(|_| is_microfacet);
             let by_colour = colours.is_some_and(|map| is_see_through(map.image_ix as usize));
             let by_map = material.maps.opacity.is_some() || by_colour || corners_have_opacity;
             // What refracts shows itself in full.
             let refracts = !is_microfacet && material.lobes.refraction;
-            maps.flags |= if (material.d < 1.0 || by_map) && !refracts { MAPS_COVERAGE } else { 0 };
+            maps.flags |= if (material.d < 1.0 || by_map) && !refracts { MAPS_ALPHA_BLEND } else { 0 };
             if is_microfacet {
-                maps.flags |= if material.d < 1.0 || by_colour || corners_have_opacity { MAPS_VEIL } else { 0 };
+                maps.flags |= if material.d < 1.0 || by_colour || corners_have_opacity { MAPS_SHADOW_TEST } else { 0 };
             } else if !is_glass && (corners_have_opacity || material.maps.opacity.is_some()) {
                 // MTL's own transparency `d` casts whole shadows, as in the paper.
-                maps.flags |= MAPS_VEIL;
+                maps.flags |= MAPS_SHADOW_TEST;
                 maps.opacity_factor = 1.0;
             }
             maps.alpha_cutoff = LEAST_SHADOWING_OPACITY;

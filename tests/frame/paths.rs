@@ -316,7 +316,7 @@ fn paths_see_sheets_as_often_as_their_opacity_says() {
     let sheet = textured::rough(Vec3::ZERO);
     let image = textured::add_image(&mut scene, [1, 1], |_, _| [0, 0, 0, 128]);
     let maps = Maps { base_colour: Some(Texture::of_image(image)), ..Maps::default() };
-    let sheet = scene::Material { ks: Vec3::ZERO, d: 0.5, alpha: Alpha::Coverage, maps, ..sheet };
+    let sheet = scene::Material { ks: Vec3::ZERO, d: 0.5, alpha: Alpha::Blend, maps, ..sheet };
     textured::add(&mut scene, textured::square(), textured::placed(3.0, DVec3::new(0.0, 0.0, 0.5)), sheet);
     scene.background = Vec3::ONE;
     let scene = FlatScene::new(&scene).expect("a scene that fits together");

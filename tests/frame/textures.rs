@@ -167,7 +167,7 @@ pub(super) fn holed_sheet() -> Scene {
     });
     let texture = Texture { is_smooth: false, ..Texture::of_image(image) };
     let maps = Maps { base_colour: Some(texture), ..Maps::default() };
-    let sheet = Material { alpha: Alpha::Cutout(0.5), maps, ..textured::rough(Vec3::ONE) };
+    let sheet = Material { alpha: Alpha::Mask(0.5), maps, ..textured::rough(Vec3::ONE) };
     add(&mut scene, square(), placed(1.0, DVec3::new(0.0, 0.0, 0.5)), sheet);
     add(&mut scene, square(), placed(3.0, DVec3::new(0.0, 0.0, -0.5)), textured::rough(Vec3::ONE));
     scene.lights = vec![Light::Directional { towards: Vec3::Z, irradiance: Vec3::ONE }];

@@ -212,7 +212,7 @@ fn stated_terms_override_those_of_the_file() {
     assert_eq!((wood.kd, wood.ka, wood.ns, &wood.maps), (Vec3::X, Vec3::X, 12.5, &plain.materials[1].maps));
     assert_eq!(glass, &plain.materials[2]);
     let microfacet = metal.microfacet.unwrap();
-    assert_eq!((microfacet.roughness, microfacet.metallic, metal.alpha), (0.75, 1.0, Alpha::Cutout(0.25)));
+    assert_eq!((microfacet.roughness, microfacet.metallic, metal.alpha), (0.75, 1.0, Alpha::Mask(0.25)));
     // A map brings the tangents that it needs.
     let mapped = load("glass = { metallic = 1, map_normal = 'a.png' }").unwrap();
     assert!(mapped.materials[1].microfacet.is_some() && mapped.materials[1].maps.normal.is_some());

@@ -151,13 +151,13 @@ fn physically_based_terms_make_microfacets() {
 fn opacity_is_in_alpha_or_in_the_colour() {
     let holes = png(|x, _| [9, 9, 9, if x < 2 { 0 } else { 255 }]);
     let m = material("map_d a.png", &[("a.png", &holes)]);
-    assert_eq!((m.maps.opacity.unwrap().channel, m.alpha), (Channel::Alpha, Alpha::Cutout(0.5)));
+    assert_eq!((m.maps.opacity.unwrap().channel, m.alpha), (Channel::Alpha, Alpha::Mask(0.5)));
     let black_and_white = png(|x, _| if x < 2 { [0, 0, 0, 255] } else { [255; 4] });
     let m = material("map_d a.png", &[("a.png", &black_and_white)]);
-    assert_eq!((m.maps.opacity.unwrap().channel, m.alpha), (Channel::Luminance, Alpha::Cutout(0.5)));
+    assert_eq!((m.maps.opacity.unwrap().channel, m.alpha), (Channel::Luminance, Alpha::Mask(0.5)));
     let m = material("map_d a.png", &[("a.png", &grey(100))]);
-    assert_eq!((m.maps.opacity.unwrap().channel, m.alpha), (Channel::Luminance, Alpha::Coverage));
-    assert_eq!(material("d 0.5\nmap_d a.png", &[("a.png", &holes)]).alpha, Alpha::Coverage);
+    assert_eq!((m.maps.opacity.unwrap().channel, m.alpha), (Channel::Luminance, Alpha::Blend));
+    assert_eq!(material("d 0.5\nmap_d a.png", &[("a.png", &holes)]).alpha, Alpha::Blend);
     let (scene, _) = load_mtl("map_Tr a.png", &[("a.png", &grey(100))]);
     // Transparency becomes opacity, whichever channel holds it.
     assert_eq!(first_pixel(&scene.images[0]), [155, 155, 155, 0]);
@@ -166,7 +166,7 @@ fn opacity_is_in_alpha_or_in_the_colour() {
     assert_eq!((map.channel, first_pixel(&scene.images[0])[3]), (Channel::Alpha, 155));
     // The base colour of microfacets brings the opacity of its image along.
     let m = material("Pr 1\nmap_Kd a.png\nmap_d a.png", &[("a.png", &holes)]);
-    assert_eq!((m.maps.opacity, m.alpha), (None, Alpha::Cutout(0.5)));
+    assert_eq!((m.maps.opacity, m.alpha), (None, Alpha::Mask(0.5)));
 }
 
 #[test]
@@ -313,7 +313,7 @@ fn scene_files_describe_maps_and_microfacets() {
     let pbr = m.microfacet.unwrap();
     assert_eq!((pbr.metallic, pbr.roughness, pbr.transmission, pbr.is_solid), (0.5, 0.25, 1.0, true));
     assert_eq!((pbr.attenuation_colour, pbr.attenuation_distance), (Vec3::new(0.5, 1.0, 1.0), 2.0));
-    assert_eq!((m.kd, m.ks, m.ni, m.alpha), (Vec3::ONE, Vec3::ONE, 1.33, Alpha::Cutout(0.25)));
+    assert_eq!((m.kd, m.ks, m.ni, m.alpha), (Vec3::ONE, Vec3::ONE, 1.33, Alpha::Mask(0.25)));
     assert_eq!(m.maps.base_colour, Some(Texture::of_image(0)));
     assert_eq!(m.maps.opacity, Some(Texture::of_data(1, Channel::Alpha)));
     assert_eq!(m.maps.occlusion, Some(Texture::of_data(0, Channel::Luminance)));

@@ -117,7 +117,7 @@ fn images_of_colours_that_are_cut_out_have_holes() {
     };
     let leaf = |x: u32| if x == 0 { 0 } else { 255 };
     let (material, notes) = of("", leaf);
-    assert_eq!(material.alpha, Alpha::Cutout(0.5));
+    assert_eq!(material.alpha, Alpha::Mask(0.5));
     assert_eq!(material.maps.opacity.unwrap().channel, Channel::Alpha);
     assert!(notes.len() == 1 && notes[0].contains("`m`: the image of `map_Kd` is cut out by its opacity"), "{notes:?}");
     // A material in tiles is one material.
@@ -128,11 +128,11 @@ fn images_of_colours_that_are_cut_out_have_holes() {
     assert!(notes.iter().any(|note| note.contains("material `m`: the image")), "{notes:?}");
     // The opacity of microfacets is that of their base colour.
     let (material, _) = of("Pr 0.4", leaf);
-    assert_eq!((material.alpha, material.maps.opacity), (Alpha::Cutout(0.5), None));
+    assert_eq!((material.alpha, material.maps.opacity), (Alpha::Mask(0.5), None));
     // A mask of another meaning has values in between. What the file states counts.
     for (mtl, opacity) in [("", (|x| 60 * x as u8) as fn(u32) -> u8), ("", |_| 0), ("d 0.5", leaf), ("illum 7", leaf)] {
         let (material, notes) = of(mtl, opacity);
-        assert!(!matches!(material.alpha, Alpha::Cutout(_)) && material.maps.opacity.is_none(), "{mtl}");
+        assert!(!matches!(material.alpha, Alpha::Mask(_)) && material.maps.opacity.is_none(), "{mtl}");
         assert!(notes.iter().all(|note| !note.contains("cut out")), "{notes:?}");
     }
 }

@@ -113,7 +113,7 @@ fn base() -> &'static FlatScene {
         let (base_colour, normal) = (Some(colour.clone()), Some(Texture::of_data(checks, Channel::Red)));
         let maps = Maps { base_colour, normal, roughness: Some(second), emission: Some(colour), ..Maps::default() };
         let ke = Vec3::splat(0.2);
-        let shining = Material { ke, maps: maps.clone(), alpha: Alpha::Cutout(0.3), ..rough(Vec3::ONE) };
+        let shining = Material { ke, maps: maps.clone(), alpha: Alpha::Mask(0.3), ..rough(Vec3::ONE) };
         let turned = Transform::new(DVec3::ONE, DQuat::from_rotation_x(-1.0), DVec3::new(0.0, -0.5, 0.0));
         let mut painted = sphere(2);
         painted.colours = painted.normals.iter().map(|n| n.map(|n| n.abs().extend(0.7))).collect();

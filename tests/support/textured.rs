@@ -170,7 +170,7 @@ pub fn every_kind() -> FlatScene {
     add(&mut scene, sphere(8), placed(0.5, DVec3::new(1.4, -0.3, 0.5)), see_through(true));
     add(&mut scene, square(), placed(0.5, DVec3::new(0.5, 0.8, 0.6)), see_through(false));
     let maps = Maps { base_colour: Some(Texture::of_image(leaves)), ..Maps::default() };
-    let cutout = Material { alpha: Alpha::Cutout(0.5), maps, ..rough(Vec3::ONE) };
+    let cutout = Material { alpha: Alpha::Mask(0.5), maps, ..rough(Vec3::ONE) };
     add(&mut scene, square(), placed(0.9, DVec3::new(-0.3, 0.3, 1.2)), cutout);
     let maps = Maps { base_colour: Some(Texture::of_image(fog)), ..Maps::default() };
     add(&mut scene, square(), placed(0.6, DVec3::new(1.0, -0.4, 1.5)), Material { maps, ..rough(Vec3::ONE) });

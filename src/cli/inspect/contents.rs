@@ -180,8 +180,8 @@ impl MaterialDetails {
             terms: terms(material),
             opacity: match material.alpha {
                 Alpha::Opaque => "opaque",
-                Alpha::Coverage => "coverage",
-                Alpha::Cutout(_) => "cutout",
+                Alpha::Blend => "coverage",
+                Alpha::Mask(_) => "cutout",
             },
             double_sided: material.is_double_sided,
             maps: maps.collect(),

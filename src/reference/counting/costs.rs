@@ -48,7 +48,7 @@ pub fn count_shadow(
     hits: &[Hit],
     pixel_features: &mut [Feature],
 ) {
-    let inputs = &inputs.through_veils();
+    let inputs = &inputs.with_blended_tested();
     for light in inputs.lights {
         let steps: Vec<_> = (rays.par_iter().zip(hits).with_min_len(RAYS_PER_TASK))
             .map_init(

@@ -111,10 +111,10 @@ impl Reader<'_> {
             }),
             alpha: match json.alpha_mode {
                 Valid(AlphaMode::Opaque) => Alpha::Opaque,
-                Valid(AlphaMode::Blend) => Alpha::Coverage,
+                Valid(AlphaMode::Blend) => Alpha::Blend,
                 Valid(AlphaMode::Mask) => {
                     let cutoff = json.alpha_cutoff.unwrap_or_default().0;
-                    Alpha::Cutout(self.within("alphaCutoff", cutoff, 0.0, f32::MAX)?)
+                    Alpha::Mask(self.within("alphaCutoff", cutoff, 0.0, f32::MAX)?)
                 }
                 _ => return Err(format!("{}: its alphaMode is none of OPAQUE, MASK and BLEND", self.path)),
             },

@@ -6,7 +6,7 @@ use std::cell::OnceCell;
 use crate::scene::texture::{Channel, Image};
 
 /// Share of the opacities that are 0 or 1 in the map of a surface with holes, such as a leaf.
-const CUTOUT_SHARE: f64 = 0.95;
+const ALPHA_MASK_SHARE: f64 = 0.95;
 
 /// Least and largest share of the pixels that are wholly transparent, in an image that is a cut-out. Fewer are a
 /// blemish, and an image of more shows nothing.
@@ -69,7 +69,7 @@ fn is_nearly_binary(Image { pixels, .. }: &Image, channel: Channel) -> bool {
     let n = pixels.len();
     // Whatever its encoding, a colour whose luminance is 0 or 1 is black or white.
     let n_ends = (0..n).filter(|ix| is_end(channel.of(pixels.get(*ix)))).count();
-    n_ends as f64 >= CUTOUT_SHARE * n as f64
+    n_ends as f64 >= ALPHA_MASK_SHARE * n as f64
 }
 
 fn has_holes(Image { pixels, .. }: &Image) -> bool {

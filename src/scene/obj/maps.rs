@@ -210,7 +210,7 @@ pub fn set_map(
         }
     }
     if is_cutout {
-        material.alpha = Alpha::Cutout(CUTOFF);
+        material.alpha = Alpha::Mask(CUTOFF);
     }
     Ok(())
 }

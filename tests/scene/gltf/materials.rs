@@ -73,7 +73,7 @@ fn every_term_is_read() {
         },
     }));
     assert_eq!((found.name.as_str(), found.is_double_sided), ("all", true));
-    assert_eq!((found.kd, found.d, found.alpha), (Vec3::new(0.1, 0.2, 0.3), 0.4, Alpha::Cutout(0.25)));
+    assert_eq!((found.kd, found.d, found.alpha), (Vec3::new(0.1, 0.2, 0.3), 0.4, Alpha::Mask(0.25)));
     assert_eq!((found.ke, found.ks, found.ni), (Vec3::new(4.0, 2.0, 0.0), Vec3::new(0.5, 0.25, 1.0), 1.3));
     let expected = Microfacet {
         metallic: 0.5,
@@ -89,7 +89,7 @@ fn every_term_is_read() {
     assert_eq!(found.clearcoat, Clearcoat { factor: 0.7, roughness: 0.1 });
     assert_eq!(found.sheen, Sheen { colour: Vec3::new(0.1, 0.5, 1.0), roughness: 0.3 });
     let blend = material(json!({ "alphaMode": "BLEND", "extensions": { "KHR_materials_unlit": {} } }));
-    assert_eq!((blend.alpha, blend.is_unlit), (Alpha::Coverage, true));
+    assert_eq!((blend.alpha, blend.is_unlit), (Alpha::Blend, true));
     let solid =
         |volume: Value| material(json!({ "extensions": { "KHR_materials_volume": volume } })).microfacet.unwrap();
     assert!(!solid(json!({})).is_solid && solid(json!({})).attenuation_distance == f32::INFINITY);

@@ -1,20 +1,21 @@
-// Gaps: the parts of a triangle through which rays pass, since the opacity there is too low. Rays of every kind pass
-// through the gaps of a cut-out, a material that is either opaque or not there. Shadow rays also pass through the gaps
-// of a veil, a see-through material. Kernels that define RANDOM_OPACITY trace paths, whose rays of all kinds pass
-// through see-through materials at random, as often as the opacity says. Twin of src/reference/cutout.rs.
+// The alpha test: a hit counts only where the surface's opacity is high enough. Rays of every kind test masked
+// materials, which are either opaque or not there. Shadow rays also test blended materials. Kernels that define
+// STOCHASTIC_ALPHA trace paths, whose rays of all kinds pass through blended materials at random, as often as the
+// opacity says. Twin of src/reference/alpha_test.rs.
 //
-// Needs nothing: it includes texture.glsl. Provides `CUTOUTS`, `SHADOW_GAPS`, `opacity_at` and `is_gap`.
-#ifndef KDRAY_CUTOUT
-#define KDRAY_CUTOUT
+// Needs nothing: it includes texture.glsl. Provides `ALPHA_MASKS`, `SHADOW_ALPHA_TEST`, `opacity_at` and
+// `fails_alpha_test`.
+#ifndef KDRAY_ALPHA_TEST
+#define KDRAY_ALPHA_TEST
 
 #include "layout.glsl"
 #include "texture_words.glsl"
 #include "texture.glsl"
 
-layout(constant_id = CONSTANT_CUTOUTS) const bool CUTOUTS = false;
-layout(constant_id = CONSTANT_SHADOW_GAPS) const bool SHADOW_GAPS = false;
+layout(constant_id = CONSTANT_ALPHA_MASKS) const bool ALPHA_MASKS = false;
+layout(constant_id = CONSTANT_SHADOW_ALPHA_TEST) const bool SHADOW_ALPHA_TEST = false;
 
-#ifdef RANDOM_OPACITY
+#ifdef STOCHASTIC_ALPHA
 #include "sampler.glsl"
 
 // A random number in [0, 1) for a point of a triangle. Different rays hit different points.
@@ -38,19 +39,19 @@ float opacity_at(MaterialMaps maps, float opacity, uint triangle_ix, float u, fl
     return opacity;
 }
 
-// Whether a ray passes through a triangle at a point. passes_veils: whether the gaps of veils count, too.
-bool is_gap(uint triangle_ix, float u, float v, bool passes_veils) {
+// Whether a ray passes through a triangle at a point. tests_blended: whether blended materials are tested, too.
+bool fails_alpha_test(uint triangle_ix, float u, float v, bool tests_blended) {
     uint material_ix = load_triangle_materials(triangle_ix);
-#ifdef RANDOM_OPACITY
-    uint kinds = MAPS_CUTOUT | MAPS_COVERAGE;
+#ifdef STOCHASTIC_ALPHA
+    uint kinds = MAPS_ALPHA_MASK | MAPS_ALPHA_BLEND;
 #else
-    uint kinds = passes_veils ? MAPS_CUTOUT | MAPS_VEIL : MAPS_CUTOUT;
+    uint kinds = tests_blended ? MAPS_ALPHA_MASK | MAPS_SHADOW_TEST : MAPS_ALPHA_MASK;
 #endif
     if ((map_flags_of(material_ix) & kinds) == 0u) return false;
     MaterialMaps maps = maps_of(material_ix);
-#ifdef RANDOM_OPACITY
-    if ((maps.flags & MAPS_COVERAGE) != 0u) {
-        // A random number is below 1, so an opaque point is never a gap; at opacity 0, every point is one.
+#ifdef STOCHASTIC_ALPHA
+    if ((maps.flags & MAPS_ALPHA_BLEND) != 0u) {
+        // A random number is below 1, so an opaque point never fails the test; at opacity 0, every point does.
         return random_at(triangle_ix, u, v) >= opacity_at(maps, maps.coverage, triangle_ix, u, v);
     }
 #endif

@@ -1,26 +1,26 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Visibility in scenes with cut-outs: one invocation per fragment does what visibility.frag does, but discards the
-// fragment where its triangle is cut out at the hit that primary_hit.comp will compute. (A fragment shader that can
-// discard would slow down all other scenes, since the depth test has to wait for it.)
-// Reads triangles, triangle_materials and texture_words.
+// Visibility in scenes with masked materials: one invocation per fragment does what visibility.frag does, but discards
+// the fragment where its triangle is cut out at the hit that primary_hit.comp will compute. (A fragment shader that can
+// discard would slow down all other scenes, since the depth test has to wait for it.) Reads triangles,
+// triangle_materials and texture_words.
 #include "layout.glsl"
 #include "scene.glsl"
 #include "camera.glsl"
 #include "triangle.glsl"
-#include "cutout.glsl"
+#include "alpha_test.glsl"
 
 layout(location = 0) flat in uint triangle_ix;
 layout(location = 0) out uint triangle_id;
 
-bool is_fragment_cut_out() {
+bool is_discarded() {
     uvec2 pixel = uvec2(gl_FragCoord.xy) - uvec2(frame.window_x, frame.window_y);
     Shear shear = shear_of(camera_origin(pixel), camera_direction(pixel));
     Hit hit = clamp_to_triangle(shear, triangle_at(triangle_ix), triangle_ix);
-    return is_gap(triangle_ix, hit.u, hit.v, false);
+    return fails_alpha_test(triangle_ix, hit.u, hit.v, false);
 }
 
 void main() {
-    if (is_fragment_cut_out()) discard;
+    if (is_discarded()) discard;
     triangle_id = triangle_ix;
 }

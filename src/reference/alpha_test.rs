@@ -1,4 +1,4 @@
-//! Gaps: the parts of a triangle through which rays pass, since the opacity there is too low. Twin of `cutout.glsl`.
+//! The alpha test: a hit counts only where the surface's opacity is high enough. Twin of `alpha_test.glsl`.
 
 use super::{
     sampler::{mixed, unit_number},
@@ -6,8 +6,8 @@ use super::{
 };
 use crate::{
     layout::{
-        Hit, MAPS_COLOUR_HAS_OPACITY, MAPS_CORNERS_HAVE_OPACITY, MAPS_COVERAGE, MAPS_CUTOUT, MAPS_VEIL, MaterialMaps,
-        NO_TEXTURE,
+        Hit, MAPS_ALPHA_BLEND, MAPS_ALPHA_MASK, MAPS_COLOUR_HAS_OPACITY, MAPS_CORNERS_HAVE_OPACITY, MAPS_SHADOW_TEST,
+        MaterialMaps, NO_TEXTURE,
     },
     world::Textures,
 };
@@ -39,21 +39,27 @@ fn random_at(hit: &Hit) -> f32 {
     unit_number(mixed(hit.u.to_bits() ^ mixed(hit.v.to_bits() ^ mixed(hit.triangle_ix))))
 }
 
-/// Whether a ray passes through a triangle at a hit. `passes_veils`: whether the ray is a shadow ray, which also
-/// passes through see-through surfaces with an opacity below `LEAST_SHADOWING_OPACITY`. `is_random`: whether it passes
+/// Whether a ray passes through a triangle at a hit. `tests_blended`: whether the ray is a shadow ray, which also
+/// passes through blended surfaces with an opacity below `LEAST_SHADOWING_OPACITY`. `is_random`: whether it passes
 /// through them at random instead, as often as the opacity says.
-pub fn is_gap(textures: &Textures, material_ix: u32, hit: &Hit, passes_veils: bool, is_random: bool) -> bool {
-    let kinds = match (is_random, passes_veils) {
-        (true, _) => MAPS_CUTOUT | MAPS_COVERAGE,
-        (false, true) => MAPS_CUTOUT | MAPS_VEIL,
-        (false, false) => MAPS_CUTOUT,
+pub fn fails_alpha_test(
+    textures: &Textures,
+    material_ix: u32,
+    hit: &Hit,
+    tests_blended: bool,
+    is_random: bool,
+) -> bool {
+    let kinds = match (is_random, tests_blended) {
+        (true, _) => MAPS_ALPHA_MASK | MAPS_ALPHA_BLEND,
+        (false, true) => MAPS_ALPHA_MASK | MAPS_SHADOW_TEST,
+        (false, false) => MAPS_ALPHA_MASK,
     };
     let maps = &textures.material_maps[material_ix as usize];
     if maps.flags & kinds == 0 {
         return false;
     }
     let at = [hit.u, hit.v];
-    if is_random && maps.flags & MAPS_COVERAGE != 0 {
+    if is_random && maps.flags & MAPS_ALPHA_BLEND != 0 {
         return random_at(hit) >= opacity_at(textures, maps, maps.coverage, hit.triangle_ix, at);
     }
     opacity_at(textures, maps, maps.opacity_factor, hit.triangle_ix, at) < maps.alpha_cutoff
