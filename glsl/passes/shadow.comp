@@ -35,7 +35,7 @@ bool shadow_ray_of(PathRay ray, Hit hit, Light light, out PathRay shadow_ray) {
     Material material = material_at(ray, hit, t, surface);
     if (!can_show(material, surface.shading, -ray.direction, to_light.direction)) return false;
     vec3 origin = lit_point(surface, hit, to_light.direction);
-    origin += surface.clearance * surface.geometric;
+    origin += surface.origin_offset * surface.geometric;
     // The shadow ray ends where the light is seen from the surface's own point.
     float t_max = to_light.distance - dot(origin - surface.point_world, to_light.direction);
     shadow_ray = PathRay(origin, ray.pixel_ix, to_light.direction, hit.triangle_ix, vec3(0.0), t_max);

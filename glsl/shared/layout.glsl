@@ -85,11 +85,11 @@
 // the corners' absolute coordinates, weighted by the hit's barycentric weights. The factor is 2^-18, which is 64
 // roundings. It covers the few roundings by which an interpolated point is off the plane, and the rounding in the
 // tests of the next ray against triangles in the same plane.
-#define SURFACE_CLEARANCE 0.0000038146973
-// Lower bound of the number that SURFACE_CLEARANCE multiplies, as a share of the largest component of m. Triangles in a
+#define ORIGIN_OFFSET 0.0000038146973
+// Lower bound of the number that ORIGIN_OFFSET multiplies, as a share of the largest component of m. Triangles in a
 // plane such as y = 0 need it: `dot(m, abs(normal))` is 0 there, but the tests of the next ray against triangles in the
 // same plane round as the other two coordinates do. The distance is then 16 roundings of the largest coordinate.
-#define LEAST_CLEARANCE_SHARE 0.25
+#define LEAST_ORIGIN_OFFSET_SHARE 0.25
 // Squared length below which an interpolated shading normal has no direction: the corners' normals cancel out.
 #define LEAST_NORMAL_SQUARED 1.0e-12
 // Reflectance, 2^-64, below which light is never visible. Outside its small bright spot, a narrow highlight reflects

@@ -73,7 +73,7 @@ ShadowRay shadow_ray_to_light(
     float weight = light_sample.pdf > 0.0 ? power_heuristic(light_sample.pdf, scattered.pdf) : 1.0;
     vec3 light = added_light(throughput * scattered.value * light_sample.light * weight, depth + 1u);
     if (!any(greaterThan(light, vec3(0.0)))) return shadow_ray;
-    float side = dot(light_sample.direction, surface.geometric) < 0.0 ? -surface.clearance : surface.clearance;
+    float side = dot(light_sample.direction, surface.geometric) < 0.0 ? -surface.origin_offset : surface.origin_offset;
     vec3 offset = side * surface.geometric;
     vec3 origin = surface.point_world + offset;
     shadow_ray = ShadowRay(origin, SHADOW_RAY_WAITS, light_sample.direction, triangle_ix, light, light_sample.distance);

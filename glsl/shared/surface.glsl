@@ -15,7 +15,7 @@ struct Surface {
     // Whether `interpolated` is the reverse of what the corners' normals give.
     bool is_reversed;
     // Distance along `geometric` at which a new ray starts so that it does not hit this surface, world units.
-    float clearance;
+    float origin_offset;
     // Whether the ray meets the triangle's back. The ray then counts as inside a solid.
     bool from_inside;
 };
@@ -64,14 +64,14 @@ Surface surface_at(PathRay ray, Hit hit, Triangle t) {
     s.interpolated = s.is_reversed ? -interpolated : interpolated;
     s.shading = s.interpolated;
     float largest = max(magnitude.x, max(magnitude.y, magnitude.z));
-    s.clearance = SURFACE_CLEARANCE * max(dot(magnitude, abs(s.geometric)), LEAST_CLEARANCE_SHARE * largest);
+    s.origin_offset = ORIGIN_OFFSET * max(dot(magnitude, abs(s.geometric)), LEAST_ORIGIN_OFFSET_SHARE * largest);
     return s;
 }
 
 // A child ray from the surface, with the parent's t_max. It starts on the side of the surface to which its direction
 // points. triangle_ix: the surface's triangle, which the ray does not hit.
 PathRay ray_from(Surface s, vec3 direction, uint triangle_ix, PathRay parent, vec3 throughput) {
-    float side = dot(direction, s.geometric) < 0.0 ? -s.clearance : s.clearance;
+    float side = dot(direction, s.geometric) < 0.0 ? -s.origin_offset : s.origin_offset;
     return PathRay(
         s.point_world + side * s.geometric, parent.pixel_ix, direction, triangle_ix, throughput, parent.t_max
     );

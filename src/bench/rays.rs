@@ -96,7 +96,7 @@ mod tests {
             interpolated: shading,
             shading,
             is_reversed: false,
-            clearance: 0.0,
+            origin_offset: 0.0,
             from_inside: false,
         }
     }

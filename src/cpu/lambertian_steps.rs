@@ -89,7 +89,7 @@ struct Surfaces<S: Simd> {
     normal: Vec3x16<S>,
     tangent: Vec3x16<S>,
     bitangent: Vec3x16<S>,
-    clearance: f32x16<S>,
+    origin_offset: f32x16<S>,
     kd: Vec3x16<S>,
     /// The surfaces that are not black.
     reflects: mask32x16<S>,
@@ -106,7 +106,7 @@ impl<S: Simd> Surfaces<S> {
             normal: Vec3x16::load(simd, &surfaces.normal),
             tangent: Vec3x16::load(simd, &surfaces.tangent),
             bitangent: Vec3x16::load(simd, &surfaces.bitangent),
-            clearance: f32x16::load_array_ref(simd, &surfaces.clearance),
+            origin_offset: f32x16::load_array_ref(simd, &surfaces.origin_offset),
             kd,
             reflects: ((r + g + b) / 3.0).simd_gt(0.0),
         }
@@ -123,7 +123,7 @@ impl<S: Simd> Surfaces<S> {
     #[inline(always)]
     fn offset(&self, direction: Vec3x16<S>) -> Vec3x16<S> {
         let is_below = direction.dot(self.geometric).simd_lt(0.0);
-        self.geometric * is_below.select(-self.clearance, self.clearance)
+        self.geometric * is_below.select(-self.origin_offset, self.origin_offset)
     }
 }
 
@@ -145,7 +145,7 @@ fn set_shadow_rays<S: Simd>(
     surfaces: &Surfaces<S>,
     (throughput, samples): (Vec3x16<S>, &Samples),
 ) {
-    let simd = surfaces.clearance.simd;
+    let simd = surfaces.origin_offset.simd;
     let (direction, distance) =
         (Vec3x16::load(simd, &samples.direction), f32x16::load_array_ref(simd, &samples.distance));
     let (light, sample_pdf) = (Vec3x16::load(simd, &samples.light), f32x16::load_array_ref(simd, &samples.pdf));
@@ -182,7 +182,7 @@ fn set_rays<S: Simd>(
     surfaces: &Surfaces<S>,
     (throughput, local, choices): (Vec3x16<S>, Vec3x16<S>, f32x16<S>),
 ) {
-    let simd = surfaces.clearance.simd;
+    let simd = surfaces.origin_offset.simd;
     let [x, y, z] = local.0;
     let direction = surfaces.tangent * x + surfaces.bitangent * y + surfaces.normal * z;
     let pdf = z / PI;

@@ -10,8 +10,8 @@ use super::{
 };
 use crate::{
     layout::{
-        FLAT_NORMAL, Hit, LEAST_CLEARANCE_SHARE, LEAST_COSINE, LEAST_NORMAL_SQUARED, LEAST_WEIGHT, MATERIAL_SOLID,
-        MATERIAL_UNLIT, Material, NO_TEXTURE, PathRay, SURFACE_CLEARANCE, Triangle,
+        FLAT_NORMAL, Hit, LEAST_COSINE, LEAST_NORMAL_SQUARED, LEAST_ORIGIN_OFFSET_SHARE, LEAST_WEIGHT, MATERIAL_SOLID,
+        MATERIAL_UNLIT, Material, NO_TEXTURE, ORIGIN_OFFSET, PathRay, Triangle,
     },
     reference::inputs::KernelInputs,
     world::Textures,
@@ -68,7 +68,7 @@ pub struct LambertianSurfaces {
     pub(super) normal: Vec3sSoa,
     pub(super) tangent: Vec3sSoa,
     pub(super) bitangent: Vec3sSoa,
-    pub(super) clearance: [f32; LANES],
+    pub(super) origin_offset: [f32; LANES],
 }
 
 impl LambertianHits {
@@ -146,7 +146,7 @@ pub fn lambertian_surfaces<S: Simd>(simd: S, hits: &LambertianHits) -> Lambertia
     let [x, y, z] = (weights / (x + y + z)).0;
     let (at_v0, at_v1, at_v2) = (v0 * x, v1 * y, v2 * z);
     let magnitude = at_v0.abs() + at_v1.abs() + at_v2.abs();
-    let least_clearance = magnitude.max_element() * LEAST_CLEARANCE_SHARE;
+    let least_offset = magnitude.max_element() * LEAST_ORIGIN_OFFSET_SHARE;
     let (e1, e2) = (v1 - v0, v2 - v0);
     let ([ax, ay, az], [bx, by, bz]) = (e1.abs().0, e2.abs().0);
     let scale = 1.0 / greater(greater(ax, bx), greater(greater(ay, by), greater(az, bz)));
@@ -169,7 +169,7 @@ pub fn lambertian_surfaces<S: Simd>(simd: S, hits: &LambertianHits) -> Lambertia
         normal: normal.to_arrays(),
         tangent: tangent.to_arrays(),
         bitangent: bitangent.to_arrays(),
-        clearance: (greater(magnitude.dot(geometric.abs()), least_clearance) * SURFACE_CLEARANCE).to_array(),
+        origin_offset: (greater(magnitude.dot(geometric.abs()), least_offset) * ORIGIN_OFFSET).to_array(),
     }
 }
 

@@ -115,7 +115,8 @@ fn shadow_ray_to_light(inputs: &KernelInputs, choices: &HitChoices, vertex: &Ver
     if !light.cmpgt(Vec3::ZERO).any() {
         return NO_SHADOW_RAY;
     }
-    let side = if sample.direction.dot(surface.geometric) < 0.0 { -surface.clearance } else { surface.clearance };
+    let side =
+        if sample.direction.dot(surface.geometric) < 0.0 { -surface.origin_offset } else { surface.origin_offset };
     let offset = side * surface.geometric;
     let mut shadow_ray = ShadowRay {
         origin: surface.point_world + offset,

@@ -32,7 +32,7 @@ pub(crate) fn shadow_ray_of(inputs: &KernelInputs, ray: &PathRay, hit: &Hit, lig
         return None;
     }
     let from = lit_point(&surface, hit, &inputs.triangles[hit.triangle_ix as usize], to_light.direction);
-    let origin = from + surface.clearance * surface.geometric;
+    let origin = from + surface.origin_offset * surface.geometric;
     Some(PathRay {
         origin,
         pixel_ix: ray.pixel_ix,

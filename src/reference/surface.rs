@@ -3,8 +3,8 @@
 use glam::{Vec2, Vec3};
 
 use crate::layout::{
-    CURVED_START_COSINE, FLAT_NORMAL, Hit, LEAST_CLEARANCE_SHARE, LEAST_NORMAL_SQUARED, LEAST_WEIGHT,
-    PLANE_START_COSINE, PathRay, SURFACE_CLEARANCE, Triangle,
+    CURVED_START_COSINE, FLAT_NORMAL, Hit, LEAST_NORMAL_SQUARED, LEAST_ORIGIN_OFFSET_SHARE, LEAST_WEIGHT,
+    ORIGIN_OFFSET, PLANE_START_COSINE, PathRay, Triangle,
 };
 
 /// The surface of a triangle at a hit, as the ray meets it.
@@ -20,7 +20,7 @@ pub struct Surface {
     /// Whether `interpolated` is the reverse of what the corners' normals give.
     pub is_reversed: bool,
     /// Distance along `geometric` at which a new ray starts so that it does not hit this surface, world units.
-    pub clearance: f32,
+    pub origin_offset: f32,
     /// Whether the ray meets the triangle's back. The ray then counts as inside a solid.
     pub from_inside: bool,
 }
@@ -78,8 +78,8 @@ pub fn surface_at(ray: &PathRay, hit: &Hit, t: &Triangle) -> Surface {
         interpolated,
         shading: interpolated,
         is_reversed,
-        clearance: SURFACE_CLEARANCE
-            * magnitude.dot(geometric.abs()).max(LEAST_CLEARANCE_SHARE * magnitude.max_element()),
+        origin_offset: ORIGIN_OFFSET
+            * magnitude.dot(geometric.abs()).max(LEAST_ORIGIN_OFFSET_SHARE * magnitude.max_element()),
         from_inside,
     }
 }
@@ -116,7 +116,7 @@ impl Surface {
     /// Returns a child ray from the surface, with the parent's `t_max`. It starts on the side of the surface to which
     /// its direction points. `triangle_ix`: the surface's triangle, which the ray does not hit.
     pub fn ray_from(&self, direction: Vec3, triangle_ix: u32, parent: &PathRay, throughput: Vec3) -> PathRay {
-        let side = if direction.dot(self.geometric) < 0.0 { -self.clearance } else { self.clearance };
+        let side = if direction.dot(self.geometric) < 0.0 { -self.origin_offset } else { self.origin_offset };
         PathRay {
             origin: self.point_world + side * self.geometric,
             pixel_ix: parent.pixel_ix,

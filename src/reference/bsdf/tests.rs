@@ -55,7 +55,7 @@ fn bent(shading: Vec3, from_inside: bool) -> Surface {
         interpolated: shading,
         shading,
         is_reversed: false,
-        clearance: 0.0,
+        origin_offset: 0.0,
         from_inside,
     }
 }
