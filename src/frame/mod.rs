@@ -87,7 +87,7 @@ pub struct RenderOptions {
     pub light_layers: bool,
     /// Whether [`Integrator::Whitted`] shows ambient light in place of light that only paths show: of an environment,
     /// of lights with an area and of surfaces that shine.
-    pub stands_in: bool,
+    pub approximates_ambient: bool,
     /// What only paths have: filters, lens, bounds.
     pub paths: PathOptions,
 }
@@ -162,7 +162,7 @@ impl Default for RenderOptions {
             profile: true,
             features: false,
             light_layers: false,
-            stands_in: false,
+            approximates_ambient: false,
             paths: PathOptions::default(),
         }
     }

@@ -164,7 +164,7 @@ impl Session {
         // What differs between integrators is what the scene states for this one.
         let RenderDefaults { max_depth, denoise, .. } = self.loaded.scene().defaults.for_integrator(Some(integrator));
         let max_depth = max_depth.min(at_rest.max_depth);
-        RenderOptions { integrator, max_depth, denoise, stands_in: true, ..whole }
+        RenderOptions { integrator, max_depth, denoise, approximates_ambient: true, ..whole }
     }
 
     /// Returns whether the picture has all its samples.

@@ -4,7 +4,7 @@ use crate::{
     frame::{Integrator, RenderOptions},
     layout::Frame,
     scene::{Ground, Up},
-    world::{World, stand_in::StandIn},
+    world::{World, ambient_approximation::AmbientApproximation},
 };
 
 impl World {
@@ -17,11 +17,11 @@ impl World {
     pub fn frame_constants(&self, options: &RenderOptions) -> Frame {
         let scene = self.scene();
         let ground = scene.ground.unwrap_or(Ground { ambient: scene.ambient, up: Up::Y });
-        let stand_in = match options.stands_in && options.integrator == Integrator::Whitted {
-            true => self.stand_in(ground.up),
-            false => StandIn::default(),
+        let approximation = match options.approximates_ambient && options.integrator == Integrator::Whitted {
+            true => self.ambient_approximation(ground.up),
+            false => AmbientApproximation::default(),
         };
-        let (sky, ground_ambient) = (scene.ambient + stand_in.sky, ground.ambient + stand_in.ground);
+        let (sky, ground_ambient) = (scene.ambient + approximation.sky, ground.ambient + approximation.ground);
         let mut frame = Frame {
             n_triangles: scene.triangles.len() as u32,
             n_lights: scene.lights.len() as u32,
@@ -29,7 +29,7 @@ impl World {
             ambient: sky + (ground_ambient - sky) / 2.0,
             ambient_tilt: (sky - ground_ambient) / 2.0,
             up_axis: if ground.up == Up::Z { 2 } else { 1 },
-            background: stand_in.background.unwrap_or(scene.background),
+            background: approximation.background.unwrap_or(scene.background),
             to_viewer: scene.studio.unwrap_or_default(),
             has_studio: scene.studio.is_some().into(),
             ..Frame::default()

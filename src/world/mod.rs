@@ -2,6 +2,7 @@
 //! by construction.
 
 mod alias;
+mod ambient_approximation;
 mod check;
 mod corners;
 mod emissive;
@@ -18,7 +19,6 @@ mod light_tree_tests;
 mod mismatch;
 mod path_materials;
 mod scene_hash;
-mod stand_in;
 mod texture_arrays;
 mod textured;
 
@@ -26,7 +26,7 @@ use std::sync::{Arc, OnceLock};
 
 use glam::Vec3;
 
-use self::stand_in::StandIn;
+use self::ambient_approximation::AmbientApproximation;
 #[cfg(test)]
 pub(crate) use self::texture_arrays::tests::{arrays_of, scene_of};
 pub use self::{
@@ -62,7 +62,7 @@ struct Parts {
     /// The wide hierarchy. There is none if the structure is a grid.
     wide_bvh: OnceLock<Option<WideBvh>>,
     /// The ambient light that stands for light of which only paths know, for each axis that may point up.
-    stand_ins: [OnceLock<StandIn>; 2],
+    ambient_approximations: [OnceLock<AmbientApproximation>; 2],
 }
 
 /// Returns what `cell` holds. If it is empty, calls `make` first. Other threads do not wait meanwhile, so two may both
@@ -130,8 +130,8 @@ impl World {
 
     /// Makes a world of parts that fit together.
     fn of_parts(scene: FlatScene, accel: Accel, accel_options: AccelOptions) -> Self {
-        let (emitters, wide_bvh, stand_ins) = Default::default();
-        Self(Arc::new(Parts { scene, accel, accel_options, emitters, wide_bvh, stand_ins }))
+        let (emitters, wide_bvh, ambient_approximations) = Default::default();
+        Self(Arc::new(Parts { scene, accel, accel_options, emitters, wide_bvh, ambient_approximations }))
     }
 
     /// The flattened scene.
@@ -152,8 +152,10 @@ impl World {
     }
 
     /// The ambient light that stands for light of which only paths know. It is made at the first call.
-    fn stand_in(&self, up: Up) -> StandIn {
-        *made_once(&self.0.stand_ins[usize::from(up == Up::Z)], || StandIn::new(&self.0.scene, up))
+    fn ambient_approximation(&self, up: Up) -> AmbientApproximation {
+        *made_once(&self.0.ambient_approximations[usize::from(up == Up::Z)], || {
+            AmbientApproximation::new(&self.0.scene, up)
+        })
     }
 
     /// The acceleration structure over the scene's triangles.

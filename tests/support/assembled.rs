@@ -249,7 +249,7 @@ fn options(bytes: &mut Bytes) -> RenderOptions {
         traversal: Traversal::Stack,
         features: bytes.below(8) == 7,
         light_layers: bytes.below(8) == 7,
-        stands_in: bytes.below(4) == 3,
+        approximates_ambient: bytes.below(4) == 3,
         paths: PathOptions {
             first_sample: if bytes.below(16) == 15 { bytes.word(16) } else { 0 },
             clamp: bytes.seldom(f32::INFINITY),

@@ -19,7 +19,7 @@ const HORIZON: f64 = 0.5;
 
 /// Ambient light, and what is seen beyond the scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct StandIn {
+pub(super) struct AmbientApproximation {
     /// Irradiance of surfaces that face up, which is added to that of the scene.
     pub sky: Vec3,
     /// Irradiance of surfaces that face down, likewise.
@@ -28,7 +28,7 @@ pub(super) struct StandIn {
     pub background: Option<Vec3>,
 }
 
-impl StandIn {
+impl AmbientApproximation {
     /// Adds up the light of a scene on the current rayon pool. `up`: the axis that points up.
     pub fn new(scene: &FlatScene, up: Up) -> Self {
         let around = scene.environment.as_ref().map(|environment| Around::new(environment, up));
@@ -128,7 +128,7 @@ mod tests {
         let environment = Environment::new([64, 32], vec![colour; 64 * 32], (30.0, 1.0)).unwrap().0;
         let scene = Scene { environment: Some(environment), ..Scene::empty(Path::new("scene")) };
         for up in [Up::Y, Up::Z] {
-            let made = StandIn::new(&FlatScene::new(&scene).unwrap(), up);
+            let made = AmbientApproximation::new(&FlatScene::new(&scene).unwrap(), up);
             // Rows and columns sample the cosine.
             assert_near(made.sky, colour, 5e-3);
             assert_near(made.ground, colour, 5e-3);
@@ -143,7 +143,7 @@ mod tests {
             let sky = Sky::new([40.0, 70.0], up).unwrap();
             let scene = Scene { sky: Some(sky), ..Scene::empty(Path::new("scene")) };
             let flat = FlatScene::new(&scene).unwrap();
-            let made = StandIn::new(&flat, up);
+            let made = AmbientApproximation::new(&flat, up);
             let scene::Light::Sun { irradiance, towards, .. } = sky.sun() else { panic!("{:?}", sky.sun()) };
             let of_sun = irradiance * towards.dot(up.vector());
             assert_near(made.ground, sky.ground_albedo * (made.sky + of_sun), 0.01);
@@ -163,13 +163,17 @@ mod tests {
             ..Scene::empty(Path::new("scene"))
         };
         let world = World::new(&scene, &Default::default()).unwrap();
-        let options = |stands_in, integrator| RenderOptions { stands_in, integrator, ..RenderOptions::default() };
+        let options = |approximates_ambient, integrator| RenderOptions {
+            approximates_ambient,
+            integrator,
+            ..RenderOptions::default()
+        };
         let plain = world.frame_constants(&options(false, Integrator::Whitted));
         let of_paths = world.frame_constants(&options(true, Integrator::Path));
         let light = |frame: &Frame| (frame.ambient, frame.ambient_tilt, frame.background);
         assert_eq!(light(&of_paths), light(&plain));
         let with = world.frame_constants(&options(true, Integrator::Whitted));
-        let made = world.stand_in(Up::Z);
+        let made = world.ambient_approximation(Up::Z);
         assert_eq!(with.ambient + with.ambient_tilt, Vec3::splat(0.25) + made.sky);
         assert_near(with.ambient - with.ambient_tilt, made.ground, 1e-6);
         assert_eq!((plain.background, Some(with.background)), (Vec3::ZERO, made.background));
@@ -190,13 +194,13 @@ mod tests {
         scene.lights = vec![scene::Light::Sphere { position: Vec3::ZERO, radius: 0.5, radiance: Vec3::splat(3.0) }];
         let flat = FlatScene::new(&scene).unwrap();
         let walls = 2.0 * (2.0 * 3.0 + 3.0 * 4.0 + 4.0 * 2.0);
-        let made = StandIn::new(&flat, Up::Y);
+        let made = AmbientApproximation::new(&flat, Up::Y);
         // The sphere's area is pi, and its light pi times that times its radiance.
         let mean = 2.0 * 3.0 * PI as f32 / walls;
         assert_near((made.sky + made.ground) / 2.0, Vec3::splat(mean), 1e-3);
         assert!(made.background.is_none() && made.sky.x > made.ground.x);
         // A material that shines on both sides adds to it.
         scene.materials[0].ke = Vec3::ONE;
-        assert!(StandIn::new(&FlatScene::new(&scene).unwrap(), Up::Y).sky.x > made.sky.x);
+        assert!(AmbientApproximation::new(&FlatScene::new(&scene).unwrap(), Up::Y).sky.x > made.sky.x);
     }
 }
