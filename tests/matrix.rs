@@ -141,9 +141,9 @@ fn can_combine(integrator: Integrator, denoise: Denoise, aov: Option<Aov>) -> bo
     integrator == Integrator::Path || (denoise != Denoise::Edge && !aov.is_some_and(Aov::is_of_paths))
 }
 
-/// Returns the layers that pictures have, those that show features or those of light.
+/// Returns the layers that pictures have, those that show AOVs or those of light.
 fn aovs_of(options: &RenderOptions) -> Vec<Aov> {
-    let is_asked = |aov: &&Aov| if aov.is_of_light() { options.light_layers } else { options.features };
+    let is_asked = |aov: &&Aov| if aov.is_of_light() { options.light_layers } else { options.pixel_aovs };
     let aovs = Aov::ALL.iter().filter(is_asked).copied();
     aovs.filter(|&aov| can_combine(options.integrator, options.denoise, Some(aov))).collect()
 }
@@ -160,12 +160,12 @@ fn write_and_check(options: &RenderOptions, n_samples: Option<u32>, (picture, dr
     let directory = TempDir::new().unwrap();
     let aovs = aovs_of(options);
     let light = drawn.light.0.each_ref().map(Vec::as_slice);
-    let layers = Layers { aovs: &aovs, features: &drawn.features, light, ..Layers::default() };
+    let layers = Layers { aovs: &aovs, pixel_aovs: &drawn.pixel_aovs, light, ..Layers::default() };
     let path = directory.path().join("x.png");
     let written = output::write_layers(&path.with_extension("exr"), picture, &layers);
     written.and_then(|()| output::write_picture(&path, picture)).unwrap_or_else(|error| panic!("{case}: {error}"));
-    if options.features {
-        let values = drawn.features.iter().map(|feature| feature.n_steps).collect();
+    if options.pixel_aovs {
+        let values = drawn.pixel_aovs.iter().map(|aovs| aovs.n_steps).collect();
         let map = HeatMap { title: "steps a pixel", width: picture.width, height: picture.height, values };
         map.write(&path.with_extension("cost.png")).unwrap();
     }
@@ -190,16 +190,16 @@ fn check_ranges(renderer: &mut Renderer, world: &World, options: &RenderOptions,
 }
 
 /// Draws pictures of these kinds. `crops`: parts of the picture to draw, and none for all of it. `layers`: whether
-/// pictures have features, and whether they have layers of light.
+/// pictures have AOVs, and whether they have layers of light.
 fn check_engine(engine: &Engine, kinds: impl Iterator<Item = Kind>, crops: &[Option<Crop>], layers: &[(bool, bool)]) {
     let world = &world();
     for (integrator, (filter, denoise)) in kinds {
-        for (&(features, light_layers), &crop) in
+        for (&(pixel_aovs, light_layers), &crop) in
             layers.iter().flat_map(|layers| crops.iter().map(move |crop| (layers, crop)))
         {
             let (width, height, max_depth) = (WIDTH, HEIGHT, 3);
             let of_picture = RenderOptions { width, height, crop, max_depth, ..RenderOptions::default() };
-            let options = RenderOptions { integrator, denoise, features, light_layers, ..of_picture };
+            let options = RenderOptions { integrator, denoise, pixel_aovs, light_layers, ..of_picture };
             let workload = Workload::of_pictures(&options, world.scene().lights.len(), 1);
             let options = engine.methods(world, &workload).unwrap().apply(&options);
             let mut renderer = engine.renderer(world, &options).unwrap();

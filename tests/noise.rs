@@ -29,7 +29,7 @@ fn options() -> RenderOptions {
         integrator: Integrator::Path,
         denoise: Denoise::Off,
         max_depth: 3,
-        features: true,
+        pixel_aovs: true,
         ..RenderOptions::default()
     }
 }
@@ -55,7 +55,7 @@ fn until(engine: &Engine, world: &World, options: &RenderOptions, goal: NoiseGoa
 /// Returns the samples that each tile has, row by row, which must be the same in all of its pixels.
 fn samples_of_tiles(drawn: &Drawn, options: &RenderOptions) -> Vec<u32> {
     let (width, height) = (options.width, options.height);
-    let at = |x: u32, y: u32| drawn.features[(y * width + x) as usize].n_samples;
+    let at = |x: u32, y: u32| drawn.pixel_aovs[(y * width + x) as usize].n_samples;
     let tiles = (0..height).step_by(SIDE as usize).flat_map(|y| (0..width).step_by(SIDE as usize).map(move |x| (x, y)));
     let samples = |(x0, y0): (u32, u32)| {
         for y in y0..(y0 + SIDE).min(height) {
@@ -84,13 +84,13 @@ fn tiles_have_the_bits_of_pictures_of_fixed_numbers_of_samples() {
         assert!(counts.len() >= 3, "tiles differ in what they need: {of_tiles:?}");
         assert_eq!(drawn.n_samples, counts[counts.len() - 1]);
         assert!(n_noisy <= of_tiles.iter().filter(|&&n| n == goal.most_samples).count());
-        let all = drawn.features.iter().map(|feature| f64::from(feature.n_samples)).sum::<f64>();
+        let all = drawn.pixel_aovs.iter().map(|aovs| f64::from(aovs.n_samples)).sum::<f64>();
         assert!((mean_samples - all / (72.0 * 56.0)).abs() < 1e-9);
         for n_samples in counts {
             let (whole, of_whole) = fixed(engine, &world, &options, n_samples);
-            for (ix, feature) in drawn.features.iter().enumerate().filter(|(_, it)| it.n_samples == n_samples) {
+            for (ix, aovs) in drawn.pixel_aovs.iter().enumerate().filter(|(_, it)| it.n_samples == n_samples) {
                 assert_eq!(picture.radiance[ix], whole.radiance[ix], "pixel {ix} of {n_samples} samples");
-                assert_eq!(feature, &of_whole.features[ix]);
+                assert_eq!(aovs, &of_whole.pixel_aovs[ix]);
             }
         }
         picture
@@ -146,7 +146,7 @@ fn without_an_end_the_picture_has_the_most_samples() {
         let (picture, of_picture) = fixed(&engine, &world, &options, 64);
         assert_eq!((drawn.n_noisy, drawn.n_tiles, drawn.mean_samples), (2, 2, 64.0));
         assert!(drawn.picture.radiance == picture.radiance);
-        assert!(drawn.drawn.features == of_picture.features);
+        assert!(drawn.drawn.pixel_aovs == of_picture.pixel_aovs);
         assert!(drawn.drawn.light == of_picture.light && !of_picture.light.is_empty());
     }
 }

@@ -8,7 +8,7 @@ use std::{
 
 use kdray::{
     frame::{Aov, Picture},
-    layout::Feature,
+    layout::PixelAovs,
     output::{self, Format, OutputError},
 };
 use tempfile::TempDir;
@@ -94,15 +94,15 @@ fn the_same_picture_is_the_same_file() {
 }
 
 #[test]
-fn features_that_contradict_the_size_are_an_error() {
+fn pixel_aovs_that_contradict_the_size_are_an_error() {
     let directory = TempDir::new().unwrap();
     let path = directory.path().join("x.exr");
     for n in [0, 3, 5] {
-        let features = vec![Feature::default(); n];
+        let pixel_aovs = vec![PixelAovs::default(); n];
         let error = output::write_layers(
             &path,
             &picture(2, 2),
-            &output::Layers { aovs: &[Aov::Depth], features: &features, ..Default::default() },
+            &output::Layers { aovs: &[Aov::Depth], pixel_aovs: &pixel_aovs, ..Default::default() },
         )
         .unwrap_err();
         assert!(matches!(error, OutputError::Encode { .. }), "{error}");

@@ -18,19 +18,19 @@ fn kinds() -> Vec<FrameKind> {
     let mut kinds = Vec::new();
     for (&primary, n_bounces) in Primary::ALL.iter().zip([3, 2, 1]).chain(Primary::ALL.iter().zip([1, 3, 2])) {
         for flags in 0..192_u32 {
-            let [features, is_lit, has_lights, adds_samples, shows_feature, of_paths] =
+            let [pixel_aovs, is_lit, has_lights, adds_samples, shows_aovs, of_paths] =
                 std::array::from_fn(|bit| flags & (1 << bit) != 0);
             let kind = FrameKind {
                 integrator: if of_paths { Integrator::Path } else { Integrator::Whitted },
                 primary,
                 n_bounces,
-                features,
+                pixel_aovs,
                 light_layers: of_paths && has_lights,
                 is_lit,
                 has_lights,
                 adds_samples,
                 denoise: [Denoise::Off, Denoise::Paper { threshold: 1.0 }, Denoise::Edge][flags as usize / 64],
-                shows_feature: shows_feature && features,
+                shows_aovs: shows_aovs && pixel_aovs,
             };
             if of_paths || kind.denoise != Denoise::Edge {
                 kinds.push(kind);
@@ -113,7 +113,7 @@ fn every_barrier_is_needed() {
         let options = RenderOptions {
             integrator,
             denoise,
-            features: true,
+            pixel_aovs: true,
             light_layers: true,
             max_depth: 3,
             primary: Primary::SoftwareRaster,

@@ -62,16 +62,16 @@ fn the_table_has_every_pass_and_tracing_takes_all_that_find_primary_hits() {
     let world = world_of(&scene);
     let mut names = BTreeSet::new();
     for &primary in primaries(&context) {
-        let options = RenderOptions { primary, features: true, ..options() };
+        let options = RenderOptions { primary, pixel_aovs: true, ..options() };
         let mut renderer = renderer(&context, &scene, &options, 8 * N_PIXELS);
         for view in [View::Picture, View::Depth, View::Rays] {
             renderer.set_view(view, 1.0);
             for _sample in 0..2 {
-                names.extend(checked_names(&renderer.draw_sample().expect("a sample"), "features"));
+                names.extend(checked_names(&renderer.draw_sample().expect("a sample"), "pixel_aovs"));
             }
         }
         let mut on_cpu = cpu::Renderer::new(&world, &options, Batching::default());
-        (0..2).for_each(|_sample| names.extend(checked_names(&on_cpu.draw_sample(), "features")));
+        (0..2).for_each(|_sample| names.extend(checked_names(&on_cpu.draw_sample(), "pixel_aovs")));
     }
     let software_raster = |name: &str| name.starts_with("rasterize_") && !context.has_int64_atomics();
     let of_paths = |name: &str| name.starts_with("path_") || ["guides", "demodulate", "edge_filter"].contains(&name);

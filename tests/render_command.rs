@@ -79,7 +79,7 @@ fn a_time_is_filled_with_samples() {
     refused(path, 2, &["--time", "1s", "--spp", "4"], "--spp");
 }
 
-/// Layers of light are written by their names, in a film as well. Without other layers, no features are computed.
+/// Layers of light are written by their names, in a film as well. Without other layers, no AOVs are computed.
 #[test]
 fn light_is_written_in_layers() {
     let directory = TempDir::new().unwrap();
@@ -92,7 +92,7 @@ fn light_is_written_in_layers() {
     let expected = ["B", "G", "R", "emission.B", "emission.G", "emission.R", "indirect.B", "indirect.G", "indirect.R"];
     assert_eq!(found, expected);
     let profile = fs::read_to_string(path.join("light.json")).unwrap();
-    assert!(profile.contains("path_layers") && !profile.contains("\"features\""), "{profile}");
+    assert!(profile.contains("path_layers") && !profile.contains("\"pixel_aovs\""), "{profile}");
     fs::write(path.join("p.toml"), PATH).unwrap();
     let film = ["--path", "p.toml", "--frames", "0-1", "-o", "f#.exr", "--aov", "direct"];
     render(path, &[&of_paths[..], &film].concat());

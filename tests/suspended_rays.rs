@@ -11,7 +11,7 @@ use kdray::{
     cast::{Caster, Hit, NO_TRIANGLE, Ray, cast_on_cpu},
     frame::{Picture, Primary, Profile, RenderOptions},
     gpu::{Context, DeviceOverrides},
-    layout::{Feature, Triangle},
+    layout::{PixelAovs, Triangle},
     render::Renderer,
     world::Geometry,
 };
@@ -172,19 +172,19 @@ fn options(traversal: Traversal, primary: Primary) -> RenderOptions {
         max_depth: 4,
         traversal,
         primary,
-        features: true,
+        pixel_aovs: true,
         ..RenderOptions::default()
     }
 }
 
 /// Draws a picture. Returns it with what its rays cost.
-fn draw(context: &Arc<Context>, options: &RenderOptions) -> (Picture, Vec<Feature>, Profile) {
+fn draw(context: &Arc<Context>, options: &RenderOptions) -> (Picture, Vec<PixelAovs>, Profile) {
     let scene = scenes::mixed();
     let world = world_of(&scene);
     let mut renderer = Renderer::new(context.clone(), &world, options).expect("a renderer");
     let (picture, profile) = renderer.render().expect("a frame");
-    let features = renderer.features().expect("features");
-    (picture, features, profile)
+    let pixel_aovs = renderer.pixel_aovs().expect("pixel_aovs");
+    (picture, pixel_aovs, profile)
 }
 
 #[test]
@@ -197,12 +197,12 @@ fn interrupted_frames_are_the_same() {
         (Traversal::Restart, Primary::Raster),
     ] {
         let options = options(traversal, primary);
-        let (picture, features, profile) = draw(&plain, &options);
+        let (picture, pixel_aovs, profile) = draw(&plain, &options);
         for (loop_limit, n_slots) in [(400, Some(64)), (2000, None)] {
             let limited = limited_device(loop_limit, None, n_slots);
-            let (found, found_features, found_profile) = draw(&limited, &options);
+            let (found, found_aovs, found_profile) = draw(&limited, &options);
             assert!(picture == found, "{traversal} {primary}, {loop_limit} iterations");
-            compare::exact(&features, &found_features).unwrap();
+            compare::exact(&pixel_aovs, &found_aovs).unwrap();
             assert_eq!(profile.bounces, found_profile.bounces, "{traversal} {primary}, {loop_limit} iterations");
             assert_silent(&limited);
         }

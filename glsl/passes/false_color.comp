@@ -1,14 +1,14 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// False colour: one invocation per pixel of the window, in tiles, displays one of the pixel's features (VIEW_*) in
+// False colour: one invocation per pixel of the window, in tiles, displays one of the pixel's AOVs (VIEW_*) in
 // place of its colour.
-// Reads pixel_features; writes pixel_display (R in the lowest byte).
+// Reads pixel_aovs; writes pixel_display (R in the lowest byte).
 #include "layout.glsl"
 #include "false_color.glsl"
 
 layout(local_size_x = TILE_SIZE, local_size_y = TILE_SIZE) in;
 layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
-layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) readonly buffer PixelFeaturesBlock { Feature pixel_features[]; };
+layout(std430, set = 0, binding = BIND_PIXEL_AOVS) readonly buffer PixelAovsBlock { PixelAovs pixel_aovs[]; };
 layout(std430, set = 0, binding = BIND_PIXEL_DISPLAY) writeonly buffer PixelDisplayBlock { uint pixel_display[]; };
 layout(push_constant) uniform FalseColorBlock { FalseColor push; };
 
@@ -16,7 +16,7 @@ void main() {
     uvec2 pixel = gl_GlobalInvocationID.xy;
     if (pixel.x >= frame.width || pixel.y >= frame.height) return;
     uint pixel_ix = pixel.y * frame.width + pixel.x;
-    vec3 color = false_color(pixel_features[pixel_ix], push.view, push.brightest);
+    vec3 color = false_color(pixel_aovs[pixel_ix], push.view, push.brightest);
     uvec3 bytes = uvec3(clamp(color, 0.0, 1.0) * 255.0 + 0.5);
     pixel_display[pixel_ix] = bytes.r | bytes.g << 8 | bytes.b << 16 | 0xff000000u;
 }

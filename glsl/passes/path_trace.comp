@@ -7,10 +7,10 @@
 // shadow rays follow the rays. Rays pass through blended surfaces at random (alpha_test.glsl). Reads rays,
 // live_paths, bounces and the acceleration structure; updates hits and shadow rays, in which suspended rays and shadow
 // rays leave their mark (suspended_rays.glsl), path_states (light that arrives is added), counters and, with
-// COUNT_COSTS, n_rays and n_steps of pixel_features, which are about the first sample of the frame.
+// COUNT_COSTS, n_rays and n_steps of pixel_aovs, which are about the first sample of the frame.
 #include "layout.glsl"
 
-// Whether the cost of the rays of each pixel's first sample is added to pixel_features.
+// Whether the cost of the rays of each pixel's first sample is added to pixel_aovs.
 layout(constant_id = CONSTANT_COUNT_COSTS) const bool COUNT_COSTS = false;
 const bool TESTS_BLENDED = true;
 #define STOCHASTIC_ALPHA
@@ -30,7 +30,7 @@ layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hit
 layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
 layout(std430, set = 0, binding = BIND_PATH_STATES) buffer PathStatesBlock { vec4 path_states[]; };
 layout(std430, set = 0, binding = BIND_SHADOW_RAYS) buffer ShadowRaysBlock { ShadowRay shadow_rays[]; };
-layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock { Feature pixel_features[]; };
+layout(std430, set = 0, binding = BIND_PIXEL_AOVS) buffer PixelAovsBlock { PixelAovs pixel_aovs[]; };
 
 PathRay ray_of(ShadowRay ray, uint pixel_ix) {
     return PathRay(ray.origin, pixel_ix, ray.direction, ray.source_triangle, vec3(0.0), ray.t_max);
@@ -43,8 +43,8 @@ void end_shadow_ray(uint path_ix, uint found) {
 }
 
 void count(PathRay ray) {
-    atomicAdd(pixel_features[ray.pixel_ix].n_rays, 1u);
-    atomicAdd(pixel_features[ray.pixel_ix].n_steps, n_steps);
+    atomicAdd(pixel_aovs[ray.pixel_ix].n_rays, 1u);
+    atomicAdd(pixel_aovs[ray.pixel_ix].n_steps, n_steps);
 }
 
 // Traces a ray, or a shadow ray. Returns whether it has a hit; or of a shadow ray, whether it was traced to its end.

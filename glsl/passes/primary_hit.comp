@@ -4,7 +4,7 @@
 // Primary hit (the paper's section 2.2): one invocation per pixel of the batch intersects the camera ray of its
 // sample with the triangle that the rasterizer found there.
 // Reads triangle_ids or pixel_nearest, triangles; writes hits and, with COUNT_COSTS, n_rays and n_steps of
-// pixel_features; updates counters (n_hits).
+// pixel_aovs; updates counters (n_hits).
 #include "layout.glsl"
 #include "scene.glsl"
 #include "rays.glsl"
@@ -16,11 +16,11 @@ layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(set = 0, binding = BIND_TRIANGLE_IDS, r32ui) readonly uniform uimage2D triangle_ids;
 
 layout(std430, set = 0, binding = BIND_PIXEL_NEAREST) readonly buffer PixelNearestBlock { uvec2 pixel_nearest[]; };
-layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock { Feature pixel_features[]; };
+layout(std430, set = 0, binding = BIND_PIXEL_AOVS) buffer PixelAovsBlock { PixelAovs pixel_aovs[]; };
 
 // Whether hits are counted.
 layout(constant_id = CONSTANT_COUNTS) const bool COUNTS = true;
-// Whether the ray's cost is written to pixel_features.
+// Whether the ray's cost is written to pixel_aovs.
 layout(constant_id = CONSTANT_COUNT_COSTS) const bool COUNT_COSTS = false;
 // Which rasterizer found the triangles. True: the kernels rasterize_*.comp, which wrote pixel_nearest. False: the
 // graphics pipeline, which wrote triangle_ids.
@@ -53,8 +53,8 @@ void main() {
         if (is_hit) hit = hit_of(ray, triangle_ix);
         store_hit(ray_ix, hit);
         if (COUNT_COSTS) {
-            pixel_features[ray.pixel_ix].n_rays = 1u;
-            pixel_features[ray.pixel_ix].n_steps = is_hit ? 1u : 0u;
+            pixel_aovs[ray.pixel_ix].n_rays = 1u;
+            pixel_aovs[ray.pixel_ix].n_steps = is_hit ? 1u : 0u;
         }
     }
     if (COUNTS) count_hits(batch.bounce_ix, gl_WorkGroupID.x, is_hit);

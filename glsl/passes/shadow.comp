@@ -4,10 +4,10 @@
 // bounces, to each light that the surface could show. A light is hidden if its shadow ray hits anything.
 // There are 2^shadow_lanes_log2 invocations per ray and light, the first of which works (lanes.glsl).
 // Reads rays, hits, bounces and the scene; updates light_visibility[light * queue_capacity + ray], in which a suspended
-// shadow ray leaves its mark (suspended_rays.glsl), and, with COUNT_COSTS, n_rays and n_steps of pixel_features.
+// shadow ray leaves its mark (suspended_rays.glsl), and, with COUNT_COSTS, n_rays and n_steps of pixel_aovs.
 #include "layout.glsl"
 
-// Whether the shadow rays' cost is added to pixel_features.
+// Whether the shadow rays' cost is added to pixel_aovs.
 layout(constant_id = CONSTANT_COUNT_COSTS) const bool COUNT_COSTS = false;
 const bool TESTS_BLENDED = true;
 #include "accel.glsl"
@@ -24,7 +24,7 @@ layout(std430, set = 0, binding = BIND_LIGHTS) readonly buffer LightsBlock { Lig
 layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hits[]; };
 layout(std430, set = 0, binding = BIND_LIGHT_VISIBILITY) buffer LightVisibilityBlock { uint light_visibility[]; };
 layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
-layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock { Feature pixel_features[]; };
+layout(std430, set = 0, binding = BIND_PIXEL_AOVS) buffer PixelAovsBlock { PixelAovs pixel_aovs[]; };
 
 // Computes the shadow ray to the light. Returns false if the surface faces away from the light or would not show it.
 bool shadow_ray_of(PathRay ray, Hit hit, Light light, out PathRay shadow_ray) {
@@ -50,8 +50,8 @@ uint visibility_of(Light light, uint ray_ix) {
     uint found = traverse(shadow_ray, 0.0, true).triangle_ix;
     if (is_suspended(found)) return found;
     if (COUNT_COSTS) {
-        atomicAdd(pixel_features[shadow_ray.pixel_ix].n_rays, 1u);
-        atomicAdd(pixel_features[shadow_ray.pixel_ix].n_steps, n_steps);
+        atomicAdd(pixel_aovs[shadow_ray.pixel_ix].n_rays, 1u);
+        atomicAdd(pixel_aovs[shadow_ray.pixel_ix].n_steps, n_steps);
     }
     return found == NO_TRIANGLE ? LIGHT_LIT : LIGHT_SHADOWED;
 }

@@ -4,10 +4,10 @@
 // Trace (the paper's section 2.3): finds the closest hit of each ray of the bounce. There are 2^trace_lanes_log2
 // invocations per ray, the first of which works (lanes.glsl).
 // Reads rays, bounces and the acceleration structure; updates hits, in which a suspended ray leaves its mark
-// (suspended_rays.glsl), counters (n_hits) and, with COUNT_COSTS, n_rays and n_steps of pixel_features.
+// (suspended_rays.glsl), counters (n_hits) and, with COUNT_COSTS, n_rays and n_steps of pixel_aovs.
 #include "layout.glsl"
 
-// Whether the rays' cost is added to pixel_features.
+// Whether the rays' cost is added to pixel_aovs.
 layout(constant_id = CONSTANT_COUNT_COSTS) const bool COUNT_COSTS = false;
 const bool TESTS_BLENDED = false;
 #include "accel.glsl"
@@ -24,7 +24,7 @@ layout(constant_id = CONSTANT_FROM_CAMERA) const bool FROM_CAMERA = false;
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
 layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hits[]; };
-layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock { Feature pixel_features[]; };
+layout(std430, set = 0, binding = BIND_PIXEL_AOVS) buffer PixelAovsBlock { PixelAovs pixel_aovs[]; };
 
 void main() {
     uint place = ray_of_lane(gl_GlobalInvocationID.x, bounces[batch.bounce_ix].trace_lanes_log2);
@@ -38,8 +38,8 @@ void main() {
         store_hit(ray_ix, hit);
         bool ends = !is_suspended(hit.triangle_ix);
         if (COUNT_COSTS && ends) {
-            atomicAdd(pixel_features[ray.pixel_ix].n_rays, 1u);
-            atomicAdd(pixel_features[ray.pixel_ix].n_steps, n_steps);
+            atomicAdd(pixel_aovs[ray.pixel_ix].n_rays, 1u);
+            atomicAdd(pixel_aovs[ray.pixel_ix].n_steps, n_steps);
         }
         is_hit = ends && hit.triangle_ix != NO_TRIANGLE;
     }

@@ -1,4 +1,4 @@
-// Colours that display a pixel's features, already encoded for display. Needs layout.glsl before it.
+// Colours that display a pixel's AOVs, already encoded for display. Needs layout.glsl before it.
 #ifndef KDRAY_FALSE_COLOR
 #define KDRAY_FALSE_COLOR
 
@@ -18,14 +18,14 @@ vec3 heat_color(float x) {
 
 // The colour of a pixel in one of the views VIEW_*; black for a pixel without a hit, except in the views of costs.
 // brightest: see `FalseColor`.
-vec3 false_color(Feature feature, uint view, float brightest) {
-    bool is_hit = feature.triangle_ix != NO_TRIANGLE;
-    if (view == VIEW_COST) return heat_color(float(feature.n_steps) / brightest);
-    if (view == VIEW_RAYS) return heat_color(float(feature.n_rays) / brightest);
+vec3 false_color(PixelAovs aovs, uint view, float brightest) {
+    bool is_hit = aovs.triangle_ix != NO_TRIANGLE;
+    if (view == VIEW_COST) return heat_color(float(aovs.n_steps) / brightest);
+    if (view == VIEW_RAYS) return heat_color(float(aovs.n_rays) / brightest);
     if (!is_hit) return vec3(0.0);
-    if (view == VIEW_NORMAL) return 0.5 + 0.5 * feature.normal_world;
-    if (view == VIEW_ID) return id_color(feature.triangle_ix);
-    return vec3(1.0 / (1.0 + feature.depth / brightest));
+    if (view == VIEW_NORMAL) return 0.5 + 0.5 * aovs.normal_world;
+    if (view == VIEW_ID) return id_color(aovs.triangle_ix);
+    return vec3(1.0 / (1.0 + aovs.depth / brightest));
 }
 
 #endif

@@ -836,7 +836,7 @@ struct Counters {
 // - `n_steps`: nodes, slabs, cells of a grid and triangles of leaves that all of these rays read.
 // - `variance`, `n_samples`: of the mean luminance of the pixel of a picture of paths, and the number of its samples.
 //   Kernels do not know them: the host sets them when the picture is complete.
-struct Feature {
+struct PixelAovs {
     vec3 position_world;
     uint triangle_ix;
     vec3 normal_world;
@@ -1040,7 +1040,7 @@ struct Batch {
     uint resume_pass;
 };
 
-// Values of `FalseColor.view`: the member of `Feature` that is displayed.
+// Values of `FalseColor.view`: the member of `PixelAovs` that is displayed.
 #define VIEW_DEPTH 1u
 #define VIEW_NORMAL 2u
 #define VIEW_ID 3u
@@ -1287,8 +1287,8 @@ struct GridSort {
 // A vec4 for each element of `pixel_radiance`: the sum of its samples' radiance. Frames of paths have several such
 // sums, one after the other (path_accumulate.comp).
 #define BIND_PIXEL_ACCUMULATED 24u
-// One `Feature` for each pixel.
-#define BIND_PIXEL_FEATURES 25u
+// One `PixelAovs` for each pixel.
+#define BIND_PIXEL_AOVS 25u
 // One `AccelConstants`.
 #define BIND_ACCEL 26u
 // Two words for each pixel: index of the nearest triangle, and above it the bits of its distance.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::{
     frame::{Denoise, Integrator, Primary, RenderOptions},
     gpu::{Buffer, BufferUse, Context, GpuError, Target, TargetKind},
-    layout::{Feature, Frame, Guide, LIGHT_LAYERS, SAMPLE_BLOCK_LOG2},
+    layout::{Frame, Guide, LIGHT_LAYERS, PixelAovs, SAMPLE_BLOCK_LOG2},
 };
 
 /// Sums of samples for which each pixel of a frame of paths has room at least. They are enough for 4096 samples.
@@ -30,8 +30,8 @@ pub struct Pixels {
     /// The nearest hit: the triangle's index in the lower half, the bits of the distance in the upper half. Empty
     /// unless compute kernels rasterize the primary rays ([`Primary::SoftwareRaster`]).
     pub pixel_nearest: Buffer<u64>,
-    /// The first-hit features. Empty unless the options request them.
-    pub pixel_features: Buffer<Feature>,
+    /// The first-hit AOVs. Empty unless the options request them.
+    pub pixel_aovs: Buffer<PixelAovs>,
     /// What the noise filter `edge` knows of the pixels. Empty unless it runs.
     pub pixel_guides: Buffer<Guide>,
     /// The index of the nearest triangle at each pixel of the whole picture, of which only the window's part is
@@ -52,7 +52,7 @@ impl Pixels {
         let n_pixels = n_pixels(frame);
         let size = (frame.picture_width, frame.picture_height);
         let storage = BufferUse::Storage;
-        let (features, software_raster) = (options.features, options.primary == Primary::SoftwareRaster);
+        let (pixel_aovs, software_raster) = (options.pixel_aovs, options.primary == Primary::SoftwareRaster);
         let n_guides = if options.noise_filter() == Denoise::Edge { n_pixels } else { 0 };
         let n_filtered = n_filtered(frame, options);
         let (triangle_ids, depth) = if uses_graphics_pipeline(options) {
@@ -69,7 +69,7 @@ impl Pixels {
                 .transpose()?,
             pixel_display: Buffer::new(context, "pixel_display", n_pixels, storage)?,
             pixel_nearest: Buffer::new(context, "pixel_nearest", if software_raster { n_pixels } else { 0 }, storage)?,
-            pixel_features: Buffer::new(context, "pixel_features", if features { n_pixels } else { 0 }, storage)?,
+            pixel_aovs: Buffer::new(context, "pixel_aovs", if pixel_aovs { n_pixels } else { 0 }, storage)?,
             pixel_guides: Buffer::new(context, "pixel_guides", n_guides, storage)?,
             triangle_ids,
             depth,
@@ -79,7 +79,7 @@ impl Pixels {
 
     /// Returns the bytes of a pixel in the widest buffer that the options need.
     pub fn bytes_per_pixel(options: &RenderOptions) -> u64 {
-        let widest = if options.features { size_of::<Feature>() } else { 0 };
+        let widest = if options.pixel_aovs { size_of::<PixelAovs>() } else { 0 };
         let n_sums = if options.integrator == Integrator::Path { SUMS_OF_PATHS } else { 0 };
         let sums = n_sums * n_layers(options) as usize * size_of::<[f32; 4]>();
         widest.max(sums).max(size_of::<[f32; 4]>()).max(size_of::<u64>()) as u64
@@ -104,7 +104,7 @@ impl Pixels {
             && self.pixel_radiance.len() >= n_pixels(frame) * self.n_layers as usize
             && (has_targets || !uses_graphics_pipeline(options))
             && self.depth.is_some() == uses_graphics_pipeline(options)
-            && self.pixel_features.is_empty() != options.features
+            && self.pixel_aovs.is_empty() != options.pixel_aovs
             && self.pixel_nearest.is_empty() == (options.primary != Primary::SoftwareRaster)
             && self.pixel_filtered.is_some() == (n_filtered(frame, options) > 0)
             && self.pixel_filtered.as_ref().map_or(0, Buffer::len) >= n_filtered(frame, options)

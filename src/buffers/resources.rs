@@ -35,7 +35,7 @@ const OWN_BINDINGS: [u32; 15] = [
     layout::BIND_PIXEL_ACCUMULATED,
     layout::BIND_PIXEL_FILTERED,
     layout::BIND_PIXEL_DISPLAY,
-    layout::BIND_PIXEL_FEATURES,
+    layout::BIND_PIXEL_AOVS,
     layout::BIND_COUNTERS,
     layout::BIND_TRIANGLE_IDS,
 ];
@@ -190,7 +190,7 @@ impl Resources {
             (layout::BIND_PIXEL_ACCUMULATED, Binding::Buffer(pixels.accumulated().any())),
             (layout::BIND_PIXEL_FILTERED, Binding::Buffer(pixels.filtered().any())),
             (layout::BIND_PIXEL_DISPLAY, Binding::Buffer(pixels.pixel_display.any())),
-            (layout::BIND_PIXEL_FEATURES, Binding::Buffer(pixels.pixel_features.any())),
+            (layout::BIND_PIXEL_AOVS, Binding::Buffer(pixels.pixel_aovs.any())),
             (layout::BIND_COUNTERS, Binding::Buffer(self.counters.any())),
             (layout::BIND_TRIANGLE_IDS, Binding::Image(&pixels.triangle_ids)),
         ];

@@ -415,9 +415,9 @@ impl RenderArgs {
         }
         // Passes are timed only if some output shows the times.
         let profile = !self.quiet || self.profile.is_some() || self.trace.is_some();
-        let features = self.aov.iter().any(|aov| !aov.is_of_light());
+        let pixel_aovs = self.aov.iter().any(|aov| !aov.is_of_light());
         let light_layers = self.aov.iter().any(|aov| aov.is_of_light());
-        Ok(RenderOptions { crop, features, light_layers, profile, ..options })
+        Ok(RenderOptions { crop, pixel_aovs, light_layers, profile, ..options })
     }
 }
 

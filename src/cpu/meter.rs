@@ -36,17 +36,17 @@ pub fn metered_exposure(world: &World) -> f32 {
         denoise: Denoise::Off,
         traversal: Traversal::Stack,
         primary: Primary::Trace,
-        features: true,
+        pixel_aovs: true,
         ..RenderOptions::default()
     };
     let mut renderer = Renderer::new(world, &options, Batching::default());
     for _ in 0..n_samples {
         renderer.draw_sample();
     }
-    let features = renderer.features();
-    let pixels = renderer.picture().radiance.into_iter().zip(features);
+    let pixel_aovs = renderer.pixel_aovs();
+    let pixels = renderer.picture().radiance.into_iter().zip(pixel_aovs);
     let luminance = |[r, g, b, _]: [f32; 4]| 0.2126 * r + 0.7152 * g + 0.0722 * b;
-    let of_surfaces = pixels.filter(|(_, feature)| feature.depth.is_finite());
+    let of_surfaces = pixels.filter(|(_, aovs)| aovs.depth.is_finite());
     let mut luminances: Vec<f32> = of_surfaces.map(|(radiance, _)| luminance(radiance)).collect();
     if needs_paths {
         leave_out_lamps(&mut luminances);

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     accel::{kdtree::Traversal, wide_bvh::WideBvh},
-    layout::{Batch, Bounce, Feature, Frame, Hit, PathRay, PathState, SCAN_GROUP_SIZE, ShadowRay},
+    layout::{Batch, Bounce, Frame, Hit, PathRay, PathState, PixelAovs, SCAN_GROUP_SIZE, ShadowRay},
     reference::{
         counting::costs,
         inputs::KernelInputs,
@@ -86,7 +86,7 @@ impl Paths {
         traversal: Traversal,
         depth: u32,
         queue: &Queue,
-        pixel_features: &mut [Feature],
+        pixel_aovs: &mut [PixelAovs],
     ) {
         let is_first = |path_ix: &&u32| sample_of_path(inputs.frame(), **path_ix) == 0;
         let ray = |path_ix: &u32| queue.rays[*path_ix as usize];
@@ -98,8 +98,8 @@ impl Paths {
         let rays: Vec<_> = live.iter().filter(is_first).map(ray).collect();
         let shadow_rays: Vec<_> = self.with_shadow_ray.iter().filter(is_first).map(shadow_ray).collect();
         let inputs = &inputs.with_stochastic_alpha();
-        costs::count_rays::<false>(inputs, traversal, &rays, pixel_features);
-        costs::count_rays::<true>(inputs, traversal, &shadow_rays, pixel_features);
+        costs::count_rays::<false>(inputs, traversal, &rays, pixel_aovs);
+        costs::count_rays::<true>(inputs, traversal, &shadow_rays, pixel_aovs);
     }
 
     fn trace_by<T: Tracer>(

@@ -10,16 +10,16 @@ use crate::{
         RenderOptions, opaque, plan::passes,
     },
     layout::{
-        Batch, Bounce, EdgeStep, Feature, Frame, Guide, Hit, LIGHT_LAYERS, MOST_SAMPLES_LOG2, Material, PathRay,
+        Batch, Bounce, EdgeStep, Frame, Guide, Hit, LIGHT_LAYERS, MOST_SAMPLES_LOG2, Material, PathRay, PixelAovs,
         SCAN_GROUP_SIZE,
     },
     reference::{
         accumulate,
         compact::{self, Parents},
         counting::costs,
-        demodulate, denoise, edge_filter, features, guides,
+        demodulate, denoise, edge_filter, guides,
         inputs::KernelInputs,
-        path_accumulate, path_resolve, primary_hit, resolve,
+        path_accumulate, path_resolve, pixel_aovs, primary_hit, resolve,
         shade::{self, LitRays},
         tonemap,
     },
@@ -66,8 +66,8 @@ pub struct Renderer {
     /// Radiances after the noise filter. Empty if there is no filter.
     pixel_filtered: Vec<[f32; 4]>,
     pixel_display: Vec<[u8; 4]>,
-    /// Empty unless the options request features.
-    pixel_features: Vec<Feature>,
+    /// Empty unless the options request AOVs.
+    pixel_aovs: Vec<PixelAovs>,
     /// Empty unless the noise filter `edge` runs.
     pixel_guides: Vec<Guide>,
     /// The next step of that filter.
@@ -114,7 +114,7 @@ impl Renderer {
             layers_accumulated: Vec::new(),
             pixel_filtered: Vec::new(),
             pixel_display: vec![[0; 4]; n_pixels],
-            pixel_features: vec![Feature::default(); if options.features { n_pixels } else { 0 }],
+            pixel_aovs: vec![PixelAovs::default(); if options.pixel_aovs { n_pixels } else { 0 }],
             pixel_guides: vec![Guide::default(); if options.noise_filter() == Denoise::Edge { n_pixels } else { 0 }],
             edge_step: 0,
             queue: Queue::default(),
@@ -152,7 +152,7 @@ impl Renderer {
         if self.n_samples == 1 && !of_paths {
             self.pixel_accumulated.clone_from(&self.pixel_radiance);
         }
-        self.pixel_features.fill(Feature::default());
+        self.pixel_aovs.fill(PixelAovs::default());
         let plan = Plan::new(&self.frame_kind());
         passes(&plan.visibility).for_each(|pass| self.run(pass, 0));
         let n_pixels = self.pixel_radiance.len() as u32;
@@ -208,7 +208,7 @@ impl Renderer {
         self.pixel_radiance.resize(n_pixels, [0.0; 4]);
         self.pixel_layers.resize(n_layers * n_pixels, [0.0; 4]);
         self.pixel_display.resize(n_pixels, [0; 4]);
-        self.pixel_features.resize(if self.options.features { n_pixels } else { 0 }, Feature::default());
+        self.pixel_aovs.resize(if self.options.pixel_aovs { n_pixels } else { 0 }, PixelAovs::default());
     }
 
     /// Returns the means of the samples, and in the fourth component of their squared luminance, of the whole window.
@@ -244,15 +244,15 @@ impl Renderer {
         }
     }
 
-    /// Returns the features of each pixel of the picture: the first hit, and the costs of the pixel's rays, in the
+    /// Returns the AOVs of each pixel of the picture: the first hit, and the costs of the pixel's rays, in the
     /// sample that was drawn last. Of paths, they are those of the first sample of the frame that was drawn last, and
     /// only the first frame of a picture has costs.
     ///
     /// # Panics
-    /// The options do not request features.
-    pub fn features(&self) -> Vec<Feature> {
-        assert!(self.options.features, "the options ask for features");
-        self.options.window().part(&self.pixel_features, &self.options.crop_or_whole())
+    /// The options do not request AOVs.
+    pub fn pixel_aovs(&self) -> Vec<PixelAovs> {
+        assert!(self.options.pixel_aovs, "the options ask for pixel_aovs");
+        self.options.window().part(&self.pixel_aovs, &self.options.crop_or_whole())
     }
 
     /// Returns the layers of the picture's light, which are empty if the options do not request them.
@@ -264,10 +264,10 @@ impl Renderer {
         layers
     }
 
-    /// Adds to features what the samples of each pixel tell of its noise. The frames must trace paths.
-    pub(crate) fn note_noise(&self, features: &mut [Feature]) {
+    /// Adds to AOVs what the samples of each pixel tell of its noise. The frames must trace paths.
+    pub(crate) fn note_noise(&self, pixel_aovs: &mut [PixelAovs]) {
         let means = self.options.window().part(&self.pixel_radiance, &self.options.crop_or_whole());
-        features.iter_mut().zip(means).for_each(|(feature, mean)| feature.set_noise(mean, self.n_samples));
+        pixel_aovs.iter_mut().zip(means).for_each(|(aovs, mean)| aovs.set_noise(mean, self.n_samples));
     }
 
     /// Returns the properties that decide the passes of the next sample. The CPU does not rasterize: for both kinds
@@ -297,7 +297,7 @@ impl Renderer {
                 _ => break,
             }
         }
-        if self.options.features {
+        if self.options.pixel_aovs {
             self.note_costs();
         }
         passes(&plan.light).for_each(|pass| self.run(pass, 0));
@@ -327,7 +327,7 @@ impl Renderer {
         match pass {
             Pass::Visibility => self.visibility(),
             Pass::PrimaryHit | Pass::Trace => self.closest_hits(pass, depth),
-            Pass::Features => self.note_features(),
+            Pass::PixelAovs => self.note_aovs(),
             Pass::CompactReduce => self.compact_reduce(depth),
             Pass::CompactSpine if self.options.integrator == Integrator::Path => self.path_spine(depth),
             Pass::CompactSpine => self.compact_spine(depth),
@@ -367,8 +367,8 @@ impl Renderer {
         let inputs = KernelInputs::new(world, frame).with_links(links).of_paths(path_materials, world.emitters());
         let traversal = self.options.traversal;
         // Rays are traced a second time to be counted, so later frames, whose counts nobody reads, go without.
-        if self.options.features && self.n_samples == 0 {
-            paths.note_costs(&inputs, traversal, depth, queue, &mut self.pixel_features);
+        if self.options.pixel_aovs && self.n_samples == 0 {
+            paths.note_costs(&inputs, traversal, depth, queue, &mut self.pixel_aovs);
         }
         let trace = || paths.trace(&inputs, (traversal, wide_bvh_for(world, traversal)), depth, queue);
         let (n_hits, n_shadow_rays) = self.clock.time(Pass::PathTrace, Some(depth), trace);
@@ -469,20 +469,20 @@ impl Renderer {
         self.batch_stats.push(BounceStats { n_rays: rays.len() as u64, n_hits: n_hits.into(), n_shadow_rays: 0 });
     }
 
-    /// Records the features of the primary rays' hits.
-    fn note_features(&mut self) {
+    /// Records the AOVs of the primary rays' hits.
+    fn note_aovs(&mut self) {
         let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
-        let (Queue { rays, hits, .. }, pixels) = (&self.queue, &mut self.pixel_features);
+        let (Queue { rays, hits, .. }, pixels) = (&self.queue, &mut self.pixel_aovs);
         let of_paths = self.options.integrator == Integrator::Path;
         let rays_per_pixel = if of_paths { 1 << self.frame.samples_log2 } else { 1 };
         let first_hits = rays.iter().zip(hits).step_by(rays_per_pixel);
-        self.clock.time(Pass::Features, Some(0), || features::features(&inputs, first_hits, pixels));
+        self.clock.time(Pass::PixelAovs, Some(0), || pixel_aovs::pixel_aovs(&inputs, first_hits, pixels));
     }
 
-    /// Adds the traversal costs of the rays of all bounces to the features.
+    /// Adds the traversal costs of the rays of all bounces to the AOVs.
     fn note_costs(&mut self) {
         let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
-        let (traversal, pixels) = (self.options.traversal, &mut self.pixel_features);
+        let (traversal, pixels) = (self.options.traversal, &mut self.pixel_aovs);
         let Queue { rays, bounces, hits, .. } = &self.queue;
         let n_rasterized = if self.options.primary != Primary::Trace { bounces[0].n_rays as usize } else { 0 };
         let (rasterized, traced) = rays.split_at(n_rasterized);

@@ -19,7 +19,7 @@ use crate::{
         TileSamples, check::check,
     },
     gpu::GpuError,
-    layout::{Feature, LIGHT_LAYERS, SAMPLE_BLOCK_LOG2},
+    layout::{LIGHT_LAYERS, PixelAovs, SAMPLE_BLOCK_LOG2},
 };
 
 /// Number of pixels of a tile.
@@ -123,8 +123,8 @@ pub(super) fn draw_until(
         let len_of_tile = n_parts as usize * N_PIXELS;
         noisy.into_par_iter().enumerate().for_each(|(tile_ix, tile)| {
             let pixels = tile_ix * len_of_tile..(tile_ix + 1) * len_of_tile;
-            if block.first == 0 && options.features {
-                tile.features = drawn.features[pixels.clone()].to_vec();
+            if block.first == 0 && options.pixel_aovs {
+                tile.pixel_aovs = drawn.pixel_aovs[pixels.clone()].to_vec();
             }
             let sums = layers.iter().flat_map(|layer| sum_of_parts(&layer[pixels.clone()], len as f32)).collect();
             tile.add(block, sums, options);
@@ -145,14 +145,14 @@ struct Tile {
     /// any.
     sums: Vec<[f32; 4]>,
     /// What the first sample of each pixel shows; empty unless the options ask for it.
-    features: Vec<Feature>,
+    pixel_aovs: Vec<PixelAovs>,
     /// Infinite before there are two halves of samples.
     noise: f32,
 }
 
 impl Tile {
     fn new(place: UVec2) -> Self {
-        Self { place, n_samples: 0, sums: Vec::new(), features: Vec::new(), noise: f32::INFINITY }
+        Self { place, n_samples: 0, sums: Vec::new(), pixel_aovs: Vec::new(), noise: f32::INFINITY }
     }
 
     /// Adds the sums of a block with as many samples as there are, or of the first one.
@@ -225,7 +225,7 @@ fn joined(tiles: &[Tile], goal: NoiseGoal, options: &RenderOptions, profile: Pro
     let has_layers = tiles.iter().any(|tile| tile.sums.len() > N_PIXELS);
     let mut radiance = vec![[0.0; 4]; n_pixels];
     let mut light = LightLayers(std::array::from_fn(|_| vec![[0.0; 4]; if has_layers { n_pixels } else { 0 }]));
-    let mut features = vec![Feature::default(); if options.features { n_pixels } else { 0 }];
+    let mut pixel_aovs = vec![PixelAovs::default(); if options.pixel_aovs { n_pixels } else { 0 }];
     let mut n_samples = 0.0;
     for tile in tiles {
         let mean = |ix: usize| tile.sums[ix].map(|sum| sum / tile.n_samples as f32);
@@ -234,9 +234,9 @@ fn joined(tiles: &[Tile], goal: NoiseGoal, options: &RenderOptions, profile: Pro
             let [r, g, b, squared] = mean(pixel_ix);
             radiance[ix] = [r, g, b, 1.0];
             n_samples += f64::from(tile.n_samples);
-            if let Some(feature) = tile.features.get(pixel_ix) {
-                features[ix] = *feature;
-                features[ix].set_noise([r, g, b, squared], tile.n_samples);
+            if let Some(aovs) = tile.pixel_aovs.get(pixel_ix) {
+                pixel_aovs[ix] = *aovs;
+                pixel_aovs[ix].set_noise([r, g, b, squared], tile.n_samples);
             }
             if has_layers {
                 (0..N_LAYERS).for_each(|layer| light.0[layer][ix] = mean((1 + layer) * N_PIXELS + pixel_ix));
@@ -247,7 +247,7 @@ fn joined(tiles: &[Tile], goal: NoiseGoal, options: &RenderOptions, profile: Pro
     let most = tiles.iter().map(|tile| tile.n_samples).max().unwrap_or(0);
     NoisePicture {
         picture: Picture { width: crop.width(), height: crop.height(), radiance, display },
-        drawn: Drawn { features, light, profile, n_samples: most },
+        drawn: Drawn { pixel_aovs, light, profile, n_samples: most },
         mean_samples: n_samples / n_pixels as f64,
         n_tiles: tiles.len(),
         n_noisy: tiles.iter().filter(|tile| tile.noise > goal.noise).count(),

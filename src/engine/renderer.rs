@@ -21,12 +21,12 @@ use crate::{
     world::World,
 };
 
-/// A picture, with the measurements and features of its drawing.
+/// A picture, with the measurements and AOVs of its drawing.
 #[derive(Clone, Debug)]
 pub struct Rendered {
     /// The picture.
     pub picture: Picture,
-    /// Times, counts and features.
+    /// Times, counts and AOVs.
     pub drawn: Drawn,
 }
 
@@ -78,7 +78,7 @@ impl Renderer {
     }
 
     /// Draws the samples of a range with the path tracer, one aligned block after the other. Returns their sums, from
-    /// which [`SampleSums::mean`](crate::frame::SampleSums::mean) makes the picture. The features are those of the
+    /// which [`SampleSums::mean`](crate::frame::SampleSums::mean) makes the picture. The AOVs are those of the
     /// first block, with the noise of all. The layers of light are those of all blocks.
     ///
     /// # Errors
@@ -104,7 +104,7 @@ impl Renderer {
                 Some(all) => {
                     all.profile.add(&next.profile);
                     all.n_samples += next.n_samples;
-                    all.features.iter_mut().zip(&next.features).for_each(|(all, next)| all.join_noise(next));
+                    all.pixel_aovs.iter_mut().zip(&next.pixel_aovs).for_each(|(all, next)| all.join_noise(next));
                 }
             }
         }
@@ -251,13 +251,13 @@ fn draw_on_cpu(renderer: &mut cpu::Renderer, goal: Goal, watcher: &mut impl Watc
         let profile = info_span!("render").in_scope(|| renderer.draw_sample_with(|share| watcher.part(share)));
         (drawn.n_samples..renderer.n_samples()).for_each(|_| watcher.sample());
         drawn.profile.add(&profile);
-        if drawn.n_samples == 0 && renderer.options().features {
-            drawn.features = renderer.features();
+        if drawn.n_samples == 0 && renderer.options().pixel_aovs {
+            drawn.pixel_aovs = renderer.pixel_aovs();
         }
         drawn.n_samples = renderer.n_samples();
     }
     if integrator == Integrator::Path {
-        renderer.note_noise(&mut drawn.features);
+        renderer.note_noise(&mut drawn.pixel_aovs);
     }
     drawn.light = renderer.light_layers();
     drawn

@@ -3,7 +3,7 @@
 
 use super::variance_of_joined;
 use crate::{
-    layout::{Feature, LIGHT_LAYERS},
+    layout::{LIGHT_LAYERS, PixelAovs},
     reference::noise,
 };
 
@@ -74,7 +74,7 @@ pub enum Samples {
     Uint(Vec<u32>),
 }
 
-impl Feature {
+impl PixelAovs {
     /// Notes the noise of a pixel of paths. `mean`: of the radiance of its samples and of their squared luminance.
     pub(crate) fn set_noise(&mut self, mean: [f32; 4], n_samples: u32) {
         self.variance = noise::variance_of_mean(mean, n_samples);
@@ -83,7 +83,7 @@ impl Feature {
 
     /// Adds the noise of further samples of the pixel.
     pub(crate) fn join_noise(&mut self, next: &Self) {
-        let ranges = [&*self, next].map(|feature| (feature.n_samples, feature.variance));
+        let ranges = [&*self, next].map(|aovs| (aovs.n_samples, aovs.variance));
         self.variance = variance_of_joined(ranges.into_iter());
         self.n_samples += next.n_samples;
     }
@@ -103,15 +103,15 @@ impl Aov {
         Self::OF_LIGHT.contains(&self)
     }
 
-    /// Returns the output's channels, from a picture's features. Those of light are none of them.
-    pub fn channels(self, features: &[Feature]) -> Vec<Channel> {
-        let float = |component: &str, value: fn(&Feature) -> f32| Channel {
+    /// Returns the output's channels, from a picture's AOVs. Those of light are none of them.
+    pub fn channels(self, pixel_aovs: &[PixelAovs]) -> Vec<Channel> {
+        let float = |component: &str, value: fn(&PixelAovs) -> f32| Channel {
             name: format!("{self}.{component}"),
-            samples: Samples::Float(features.iter().map(value).collect()),
+            samples: Samples::Float(pixel_aovs.iter().map(value).collect()),
         };
-        let uint = |component: &str, value: fn(&Feature) -> u32| Channel {
+        let uint = |component: &str, value: fn(&PixelAovs) -> u32| Channel {
             name: format!("{self}.{component}"),
-            samples: Samples::Uint(features.iter().map(value).collect()),
+            samples: Samples::Uint(pixel_aovs.iter().map(value).collect()),
         };
         match self {
             Self::Depth => vec![float("Z", |f| f.depth)],

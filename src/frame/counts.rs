@@ -81,7 +81,7 @@ mod tests {
     fn each_pass_has_the_rays_of_its_batch_and_bounce() {
         let mut passes = vec![pass("visibility", None)];
         for _ in 0..2 {
-            passes.extend(["primary_hit", "features", "compact_scatter"].map(|name| pass(name, Some(0))));
+            passes.extend(["primary_hit", "pixel_aovs", "compact_scatter"].map(|name| pass(name, Some(0))));
             passes.push(pass("trace", Some(1)));
             passes.extend(["shadow", "shade", "resolve"].map(|name| pass(name, None)));
         }

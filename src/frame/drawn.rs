@@ -1,14 +1,14 @@
 //! Results of drawing a picture, and the watcher that follows its progress.
 
 use super::{LightLayers, Profile};
-use crate::layout::Feature;
+use crate::layout::PixelAovs;
 
 /// Results of drawing, beside the picture.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Drawn {
     /// What the primary ray of each pixel hits in the first sample, and what all rays of that sample cost. Empty
-    /// unless the options ask for features.
-    pub features: Vec<Feature>,
+    /// unless the options ask for AOVs.
+    pub pixel_aovs: Vec<PixelAovs>,
     /// The layers of the picture's light, the means of all samples. Empty unless the options ask for them.
     pub light: LightLayers,
     /// Times and counts of all samples of all bands.
@@ -20,7 +20,7 @@ pub struct Drawn {
 /// Samples of noise tiles, tile by tile.
 #[derive(Clone, Debug, Default)]
 pub struct DrawnTiles {
-    /// The features and layers of the tiles' pixels, and the sums of times and counts.
+    /// The AOVs and layers of the tiles' pixels, and the sums of times and counts.
     pub drawn: Drawn,
     /// The means of the samples of each pixel. The fourth component is the mean of their squared luminance.
     pub means: Vec<[f32; 4]>,
@@ -30,7 +30,7 @@ impl DrawnTiles {
     /// Appends further tiles.
     pub(crate) fn append(&mut self, mut next: Self) {
         self.drawn.profile.add(&next.drawn.profile);
-        self.drawn.features.append(&mut next.drawn.features);
+        self.drawn.pixel_aovs.append(&mut next.drawn.pixel_aovs);
         self.drawn.light.append(next.drawn.light);
         self.means.append(&mut next.means);
     }

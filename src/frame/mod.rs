@@ -1,4 +1,4 @@
-//! A frame's options, its plan of passes, and its results: the picture, the profile and the features of pixels. GPU
+//! A frame's options, its plan of passes, and its results: the picture, the profile and the AOVs of pixels. GPU
 //! and CPU share these types.
 //!
 //! ```text
@@ -80,8 +80,8 @@ pub struct RenderOptions {
     pub primary: Primary,
     /// Whether the device measures times and counts rays. If not, its frames have empty profiles.
     pub profile: bool,
-    /// Whether the features of each pixel are written: what its primary ray hits, and what all its rays cost.
-    pub features: bool,
+    /// Whether the AOVs of each pixel are written: what its primary ray hits, and what all its rays cost.
+    pub pixel_aovs: bool,
     /// Whether the picture has layers of its light: emission, direct and indirect light ([`Aov::OF_LIGHT`]). Only
     /// frames of [`Integrator::Path`] have them. They take three times the memory of the pixels' samples in addition.
     pub light_layers: bool,
@@ -160,7 +160,7 @@ impl Default for RenderOptions {
             traversal: Traversal::OF_GPUS,
             primary: Primary::Raster,
             profile: true,
-            features: false,
+            pixel_aovs: false,
             light_layers: false,
             approximates_ambient: false,
             paths: PathOptions::default(),

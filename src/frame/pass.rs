@@ -4,7 +4,7 @@ use super::resource::{
     Resource,
     Resource::{
         Bounces, ChildKinds, Counters, FirstChildren, Hits, LightVisibility, LivePaths, PathSnapshots, PathStates,
-        PixelAccumulated, PixelDisplay, PixelFeatures, PixelFiltered, PixelGuides, PixelNearest, PixelRadiance,
+        PixelAccumulated, PixelAovs, PixelDisplay, PixelFiltered, PixelGuides, PixelNearest, PixelRadiance,
         RasterGroups, RayRadiance, Rays, ScanBlocks, ShadowRays, SuspendedRays, TriangleIds,
     },
 };
@@ -22,7 +22,7 @@ pub enum Role {
     Light,
     /// Makes the rays of the next bounce, without gaps between them.
     Compaction,
-    /// Works on pixels: samples, features, filter, display.
+    /// Works on pixels: samples, AOVs, filter, display.
     Image,
 }
 
@@ -34,8 +34,8 @@ pub enum Scope {
     /// Once for each batch, for the rays of all its bounces together.
     Batch,
     /// Once for a bounce of a batch, in each bounce that has the pass. Not all bounces have it: `primary_hit`,
-    /// `features` and `guides` run for bounce 0 only, and the last bounce has no compaction. `path_layers` runs for the
-    /// bounces 0 and 1, and once for all others together.
+    /// `pixel_aovs` and `guides` run for bounce 0 only, and the last bounce has no compaction. `path_layers` runs for
+    /// the bounces 0 and 1, and once for all others together.
     Bounce,
 }
 
@@ -54,7 +54,7 @@ pub enum Pass {
     /// Finds each ray's closest hit through the acceleration structure.
     Trace,
     /// Writes what each pixel's primary ray hits: depth, normal, position, albedo and indices.
-    Features,
+    PixelAovs,
     /// Counts the rays that go on from the hits, the child rays, for each block of rays.
     CompactReduce,
     /// Turns the blocks' counts into prefix sums, and sizes the next bounce.
@@ -71,7 +71,7 @@ pub enum Pass {
     Accumulate,
     /// Smooths pixels that differ much from their neighbours.
     Denoise,
-    /// Displays a feature in place of the picture.
+    /// Displays a AOVs in place of the picture.
     FalseColor,
     /// Encodes radiance for display.
     Tonemap,
@@ -148,8 +148,8 @@ const TABLE: [Info; 26] = [
         role: Role::ClosestHit,
         scope: Scope::Bounce,
         color: [70, 130, 220],
-        reads: &[TriangleIds, PixelNearest, Counters, PixelFeatures],
-        writes: &[Hits, Counters, PixelFeatures],
+        reads: &[TriangleIds, PixelNearest, Counters, PixelAovs],
+        writes: &[Hits, Counters, PixelAovs],
         indirect: None,
     },
     Info {
@@ -158,18 +158,18 @@ const TABLE: [Info; 26] = [
         role: Role::ClosestHit,
         scope: Scope::Bounce,
         color: [240, 130, 60],
-        reads: &[Rays, Hits, Bounces, Counters, PixelFeatures, SuspendedRays],
-        writes: &[Hits, Counters, PixelFeatures, SuspendedRays],
+        reads: &[Rays, Hits, Bounces, Counters, PixelAovs, SuspendedRays],
+        writes: &[Hits, Counters, PixelAovs, SuspendedRays],
         indirect: Some(Bounces),
     },
     Info {
-        pass: Pass::Features,
-        name: "features",
+        pass: Pass::PixelAovs,
+        name: "pixel_aovs",
         role: Role::Image,
         scope: Scope::Bounce,
         color: [60, 160, 90],
-        reads: &[Rays, Hits, PixelFeatures],
-        writes: &[PixelFeatures],
+        reads: &[Rays, Hits, PixelAovs],
+        writes: &[PixelAovs],
         indirect: None,
     },
     Info {
@@ -208,8 +208,8 @@ const TABLE: [Info; 26] = [
         role: Role::Shadow,
         scope: Scope::Batch,
         color: [150, 110, 200],
-        reads: &[Rays, Hits, Bounces, LightVisibility, PixelFeatures, SuspendedRays],
-        writes: &[LightVisibility, PixelFeatures, SuspendedRays],
+        reads: &[Rays, Hits, Bounces, LightVisibility, PixelAovs, SuspendedRays],
+        writes: &[LightVisibility, PixelAovs, SuspendedRays],
         indirect: Some(Bounces),
     },
     Info {
@@ -258,7 +258,7 @@ const TABLE: [Info; 26] = [
         role: Role::Image,
         scope: Scope::Frame,
         color: [190, 140, 140],
-        reads: &[PixelFeatures],
+        reads: &[PixelAovs],
         writes: &[PixelDisplay],
         indirect: None,
     },
@@ -288,8 +288,8 @@ const TABLE: [Info; 26] = [
         role: Role::ClosestHit,
         scope: Scope::Bounce,
         color: [235, 110, 40],
-        reads: &[Rays, Hits, LivePaths, Bounces, PathStates, ShadowRays, Counters, PixelFeatures, SuspendedRays],
-        writes: &[Hits, PathStates, ShadowRays, Counters, PixelFeatures, SuspendedRays],
+        reads: &[Rays, Hits, LivePaths, Bounces, PathStates, ShadowRays, Counters, PixelAovs, SuspendedRays],
+        writes: &[Hits, PathStates, ShadowRays, Counters, PixelAovs, SuspendedRays],
         indirect: Some(Bounces),
     },
     Info {

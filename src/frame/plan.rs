@@ -9,7 +9,7 @@ use super::{
         Resource,
         Resource::{
             Bounces, ChildKinds, Counters, FirstChildren, Hits, LightVisibility, LivePaths, PathSnapshots, PathStates,
-            PixelAccumulated, PixelFeatures, PixelFiltered, PixelGuides, PixelNearest, PixelRadiance, RasterGroups,
+            PixelAccumulated, PixelAovs, PixelFiltered, PixelGuides, PixelNearest, PixelRadiance, RasterGroups,
             RayRadiance, Rays, ScanBlocks, ShadowRays,
         },
     },
@@ -59,11 +59,11 @@ pub struct FrameKind {
     pub primary: Primary,
     /// Number of bounces, the primary rays included. The last one of paths only meets light.
     pub n_bounces: u32,
-    /// Whether the features of each pixel are written: what its primary ray hits, and what all its rays cost.
-    pub features: bool,
+    /// Whether the AOVs of each pixel are written: what its primary ray hits, and what all its rays cost.
+    pub pixel_aovs: bool,
     /// Whether the picture has layers of light. Only frames that trace paths have them.
     pub light_layers: bool,
-    /// Whether hits are lit. They are not if the frame displays a feature, such as depth, that depends on the hits of
+    /// Whether hits are lit. They are not if the frame displays a AOVs, such as depth, that depends on the hits of
     /// primary rays only.
     pub is_lit: bool,
     /// Whether the scene has lights that cast shadows.
@@ -72,25 +72,25 @@ pub struct FrameKind {
     pub adds_samples: bool,
     /// The noise filter.
     pub denoise: Denoise,
-    /// Whether a feature is displayed in place of the picture.
-    pub shows_feature: bool,
+    /// Whether a AOVs is displayed in place of the picture.
+    pub shows_aovs: bool,
 }
 
 impl FrameKind {
     /// Returns the kind of a frame with the most passes that frames of these options can have: the frame is lit, and
-    /// its sample is added to earlier ones. It displays the picture. To display a feature takes no more passes.
+    /// its sample is added to earlier ones. It displays the picture. To display a AOVs takes no more passes.
     pub fn new(options: &RenderOptions, n_lights: u32) -> Self {
         Self {
             integrator: options.integrator,
             primary: options.primary,
             n_bounces: options.n_bounces(),
-            features: options.features,
+            pixel_aovs: options.pixel_aovs,
             light_layers: options.has_light_layers(),
             is_lit: true,
             has_lights: n_lights > 0,
             adds_samples: true,
             denoise: options.noise_filter(),
-            shows_feature: false,
+            shows_aovs: false,
         }
     }
 }
@@ -189,10 +189,10 @@ fn bounce_of_paths(kind: &FrameKind, depth: u32) -> Section {
     }
     bounce.extend([
         Step::Run(Pass::PathTrace),
-        barrier(Touch::Write, Touch::Update, &[Hits, PathStates, ShadowRays, Counters, PixelFeatures]),
+        barrier(Touch::Write, Touch::Update, &[Hits, PathStates, ShadowRays, Counters, PixelAovs]),
     ]);
-    if depth == 0 && kind.features {
-        bounce.extend([Step::Run(Pass::Features), barrier(Touch::Write, Touch::Update, &[PixelFeatures])]);
+    if depth == 0 && kind.pixel_aovs {
+        bounce.extend([Step::Run(Pass::PixelAovs), barrier(Touch::Write, Touch::Update, &[PixelAovs])]);
     }
     if kind.is_lit {
         bounce.extend([
@@ -229,8 +229,8 @@ fn layer() -> [Step; 2] {
 /// rays.
 fn bounce(kind: &FrameKind, depth: u32) -> Section {
     let mut bounce = closest_hits(kind, depth);
-    if depth == 0 && kind.features {
-        bounce.extend([Step::Run(Pass::Features), barrier(Touch::Write, Touch::Update, &[PixelFeatures])]);
+    if depth == 0 && kind.pixel_aovs {
+        bounce.extend([Step::Run(Pass::PixelAovs), barrier(Touch::Write, Touch::Update, &[PixelAovs])]);
     }
     if depth + 1 < kind.n_bounces {
         bounce.extend(next_rays());
@@ -244,7 +244,7 @@ fn closest_hits(kind: &FrameKind, depth: u32) -> Section {
     let is_rasterized = depth == 0 && kind.primary != Primary::Trace;
     vec![
         Step::Run(if is_rasterized { Pass::PrimaryHit } else { Pass::Trace }),
-        barrier(Touch::Write, Touch::Update, &[Hits, Counters, PixelFeatures]),
+        barrier(Touch::Write, Touch::Update, &[Hits, Counters, PixelAovs]),
     ]
 }
 
@@ -269,8 +269,7 @@ pub fn next_rays() -> Section {
 fn light(has_lights: bool) -> Section {
     let mut light = Section::new();
     if has_lights {
-        light
-            .extend([Step::Run(Pass::Shadow), barrier(Touch::Write, Touch::Update, &[LightVisibility, PixelFeatures])]);
+        light.extend([Step::Run(Pass::Shadow), barrier(Touch::Write, Touch::Update, &[LightVisibility, PixelAovs])]);
     }
     light.extend([
         Step::Run(Pass::Shade),
@@ -292,13 +291,13 @@ fn samples(kind: &FrameKind) -> Section {
     vec![Step::Run(Pass::Accumulate), barrier(Touch::Write, Touch::Read, &[PixelAccumulated, PixelRadiance])]
 }
 
-/// Returns the steps that turn the mean of all samples into the displayed picture, or display a feature in its place.
+/// Returns the steps that turn the mean of all samples into the displayed picture, or display a AOVs in its place.
 pub fn display(kind: &FrameKind) -> Section {
     let mut display = Section::new();
     if kind.is_lit {
         display.extend(noise_filter(kind.denoise));
     }
-    display.push(Step::Run(if kind.shows_feature { Pass::FalseColor } else { Pass::Tonemap }));
+    display.push(Step::Run(if kind.shows_aovs { Pass::FalseColor } else { Pass::Tonemap }));
     display
 }
 

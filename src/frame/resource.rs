@@ -34,7 +34,7 @@ pub enum Resource {
     /// Each pixel as it is displayed, sRGB bytes.
     PixelDisplay,
     /// What each pixel shows, and what its rays cost.
-    PixelFeatures,
+    PixelAovs,
     /// What the noise filter `edge` knows of each pixel beside its colour.
     PixelGuides,
     /// Index of the triangle that the graphics pipeline found in each pixel.
@@ -74,7 +74,7 @@ impl Resource {
         Self::PixelAccumulated,
         Self::PixelFiltered,
         Self::PixelDisplay,
-        Self::PixelFeatures,
+        Self::PixelAovs,
         Self::PixelGuides,
         Self::TriangleIds,
         Self::PixelNearest,
@@ -102,7 +102,7 @@ impl Resource {
             Self::PixelAccumulated => layout::BIND_PIXEL_ACCUMULATED,
             Self::PixelFiltered => layout::BIND_PIXEL_FILTERED,
             Self::PixelDisplay => layout::BIND_PIXEL_DISPLAY,
-            Self::PixelFeatures => layout::BIND_PIXEL_FEATURES,
+            Self::PixelAovs => layout::BIND_PIXEL_AOVS,
             Self::PixelGuides => layout::BIND_PIXEL_GUIDES,
             Self::TriangleIds => layout::BIND_TRIANGLE_IDS,
             Self::PixelNearest => layout::BIND_PIXEL_NEAREST,

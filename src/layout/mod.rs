@@ -40,7 +40,7 @@ mod tests {
             BIND_BOUNCES => Some("Bounce"),
             BIND_HITS | BIND_CAST_HITS => Some("Hit"),
             BIND_CAST_RAYS => Some("Ray"),
-            BIND_PIXEL_FEATURES => Some("Feature"),
+            BIND_PIXEL_AOVS => Some("PixelAovs"),
             BIND_PIXEL_GUIDES => Some("Guide"),
             BIND_PATH_STATES => Some("PathState"),
             BIND_SHADOW_RAYS => Some("ShadowRay"),

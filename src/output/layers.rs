@@ -12,16 +12,16 @@ use tracing::info_span;
 use super::{OutputError, RECORD_ATTRIBUTE, Record, dimension_mismatch, write};
 use crate::{
     frame::{Aov, BlockSum, Channel, Crop, Picture, SampleRange, Samples},
-    layout::Feature,
+    layout::PixelAovs,
 };
 
 /// What an OpenEXR file has beside the radiance. The default is nothing.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Layers<'a> {
-    /// Output variables, made from `features`.
+    /// Output variables, made from `pixel_aovs`.
     pub aovs: &'a [Aov],
     /// An entry for each pixel; may be empty without AOVs.
-    pub features: &'a [Feature],
+    pub pixel_aovs: &'a [PixelAovs],
     /// The layers of light. Those that `aovs` lists have the pixels of the picture.
     pub light: [&'a [[f32; 4]]; Aov::OF_LIGHT.len()],
     /// Sums of blocks of samples, for parts of a picture whose means do not tell the sums.
@@ -87,7 +87,7 @@ fn channels(picture: &Picture, layers: &Layers) -> Vec<Channel> {
             Some(layer_ix) => {
                 channels.extend(colours(&format!("{aov}."), layers.light[layer_ix], layers.light_sums[layer_ix]));
             }
-            None => channels.extend(aov.channels(layers.features)),
+            None => channels.extend(aov.channels(layers.pixel_aovs)),
         }
     }
     channels

@@ -1,4 +1,4 @@
-//! False colour: displays a feature of each pixel in place of the picture.
+//! False colour: displays a AOVs of each pixel in place of the picture.
 
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ impl FalseColor {
         Ok(Self { kernel: kernel(context, bindings, "false_color", spirv!("false_color.comp"), &Constants::new())? })
     }
 
-    /// Needs `pixel_features`. Leaves `pixel_display`.
+    /// Needs `pixel_aovs`. Leaves `pixel_display`.
     pub fn record(&self, commands: &Commands, resources: &Resources, push: &layout::FalseColor) {
         commands.dispatch(&self.kernel, None, push, resources.pixel_dispatch());
     }

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::{
-    Demodulate, Denoise, EdgeFilter, FalseColor, Features, Guides, Inputs, Passes, PathAccumulate, PathBegin,
-    PathCompact, PathLayers, PathResolve, PathScatter, PathTrace, Tonemap, record::record_steps,
+    Demodulate, Denoise, EdgeFilter, FalseColor, Guides, Inputs, Passes, PathAccumulate, PathBegin, PathCompact,
+    PathLayers, PathResolve, PathScatter, PathTrace, PixelAovs, Tonemap, record::record_steps,
 };
 use crate::{
     buffers::Resources,
@@ -92,7 +92,7 @@ pub struct PathPasses {
     pub path_layers: Option<Arc<PathLayers>>,
     pub path_resolve: Arc<PathResolve>,
     pub path_accumulate: Arc<PathAccumulate>,
-    pub features: Arc<Features>,
+    pub pixel_aovs: Arc<PixelAovs>,
     pub denoise: Arc<Denoise>,
     pub edge: Arc<EdgePasses>,
     pub tonemap: Arc<Tonemap>,
@@ -117,7 +117,7 @@ impl PathPasses {
             path_layers: path_layers(context, bindings, options)?,
             path_resolve: PathResolve::new(context, bindings)?.into(),
             path_accumulate: PathAccumulate::new(context, bindings)?.into(),
-            features: Features::new(context, bindings)?.into(),
+            pixel_aovs: PixelAovs::new(context, bindings)?.into(),
             denoise: Denoise::new(context, bindings)?.into(),
             edge: EdgePasses::new(context, bindings)?.into(),
             tonemap: Tonemap::new(context, bindings, options.tonemap)?.into(),
@@ -133,7 +133,7 @@ impl PathPasses {
         to: &RenderOptions,
     ) -> Result<Self, GpuError> {
         let mut next = self.clone();
-        let of_trace = |options: &RenderOptions| (options.traversal, options.profile, options.features);
+        let of_trace = |options: &RenderOptions| (options.traversal, options.profile, options.pixel_aovs);
         if of_trace(from) != of_trace(to) {
             next.path_trace = PathTrace::new(context, bindings, to)?.into();
         }
@@ -154,7 +154,7 @@ impl PathPasses {
     /// Records one pass. `nth`: how often the section has run the pass before. The resources must be bound.
     ///
     /// # Panics
-    /// Frames of paths do not have `pass`, or `inputs` lacks the feature that it displays.
+    /// Frames of paths do not have `pass`, or `inputs` lacks the AOVs that it displays.
     fn record(&self, commands: &Commands, resources: &Resources, (pass, nth): (Pass, u32), inputs: &Inputs) {
         let batch = &inputs.batch;
         match pass {
@@ -168,12 +168,12 @@ impl PathPasses {
             }
             Pass::PathResolve => self.path_resolve.record(commands, batch),
             Pass::PathAccumulate => self.path_accumulate.record(commands, resources),
-            Pass::Features => self.features.record(commands, batch),
+            Pass::PixelAovs => self.pixel_aovs.record(commands, batch),
             Pass::Denoise => self.denoise.record(commands, resources),
             Pass::Guides => self.edge.guides.record(commands, batch),
             Pass::Demodulate => self.edge.demodulate.record(commands, resources),
             Pass::EdgeFilter => self.edge.edge_filter.record(commands, resources, nth),
-            Pass::FalseColor => self.false_color.record(commands, resources, inputs.displayed_feature()),
+            Pass::FalseColor => self.false_color.record(commands, resources, inputs.displayed_aovs()),
             Pass::Tonemap => self.tonemap.record(commands, resources),
             _ => panic!("a frame of paths has no `{}`", pass.name()),
         }

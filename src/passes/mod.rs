@@ -35,7 +35,6 @@ mod demodulate;
 mod denoise;
 mod edge_filter;
 mod false_color;
-mod features;
 mod frame_passes;
 pub mod grid;
 mod guides;
@@ -46,6 +45,7 @@ mod path_layers;
 mod path_resolve;
 mod path_scatter;
 mod path_trace;
+mod pixel_aovs;
 #[cfg(feature = "view")]
 mod present;
 mod primary_hit;
@@ -67,7 +67,6 @@ pub use self::{
     denoise::Denoise,
     edge_filter::EdgeFilter,
     false_color::FalseColor,
-    features::Features,
     frame_passes::{EdgePasses, FramePasses, PathPasses},
     guides::Guides,
     path_accumulate::PathAccumulate,
@@ -77,6 +76,7 @@ pub use self::{
     path_resolve::PathResolve,
     path_scatter::PathScatter,
     path_trace::PathTrace,
+    pixel_aovs::PixelAovs,
     primary_hit::PrimaryHit,
     rasterize::Rasterize,
     record::Inputs,
@@ -108,7 +108,7 @@ pub struct Passes {
     pub rasterize: Option<Arc<Rasterize>>,
     pub primary_hit: Arc<PrimaryHit>,
     pub trace: Arc<Trace>,
-    pub features: Arc<Features>,
+    pub pixel_aovs: Arc<PixelAovs>,
     pub shadow: Arc<Shadow>,
     pub shade: Arc<Shade>,
     pub compact: Arc<Compact>,
@@ -134,7 +134,7 @@ impl Passes {
             rasterize: Self::new_rasterize(context, bindings, options)?,
             primary_hit: PrimaryHit::new(context, bindings, options)?.into(),
             trace: Trace::new(context, bindings, options)?.into(),
-            features: Features::new(context, bindings)?.into(),
+            pixel_aovs: PixelAovs::new(context, bindings)?.into(),
             shadow: Shadow::new(context, bindings, options)?.into(),
             shade: Shade::new(context, bindings, options)?.into(),
             compact: Compact::new(context, bindings)?.into(),
@@ -193,7 +193,7 @@ impl Passes {
         to: &RenderOptions,
     ) -> Result<Self, GpuError> {
         let mut next = self.clone();
-        let counts = |options: &RenderOptions| (options.profile, options.features);
+        let counts = |options: &RenderOptions| (options.profile, options.pixel_aovs);
         if (from.traversal, counts(from)) != (to.traversal, counts(to)) {
             next.shadow = Shadow::new(context, bindings, to)?.into();
         }

@@ -24,13 +24,13 @@ impl PathTrace {
         let shader = searching("path_trace", bindings, options.traversal, Some(constants::SHADOW_ALPHA_TEST));
         let constants = search_constants(context)?
             .set(constants::COUNTS, options.profile)
-            .set(constants::COUNT_COSTS, options.features);
+            .set(constants::COUNT_COSTS, options.pixel_aovs);
         Ok(Self { kernel: kernel(context, bindings, "path_trace", shader, &constants)? })
     }
 
     /// Needs `rays` of the paths that are alive, `shadow_rays`, and in `live_paths` the lists of this bounce and of the
     /// shadow rays. Leaves `hits`. Updates `shadow_rays` and `path_states`, the counters if the options ask for a
-    /// profile, and `pixel_features` if they ask for features. A ray that was suspended leaves a mark in place of its
+    /// profile, and `pixel_aovs` if they ask for AOVs. A ray that was suspended leaves a mark in place of its
     /// hit, a shadow ray in place of its state. `batch.resume_pass`: which of them are traced, all or those that have
     /// suspended.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {

@@ -24,13 +24,13 @@ impl PrimaryHit {
         let constants = Constants::new()
             .set(constants::FUSED_FMA, context.fuses_fma()?)
             .set(constants::COUNTS, options.profile)
-            .set(constants::COUNT_COSTS, options.features)
+            .set(constants::COUNT_COSTS, options.pixel_aovs)
             .set(constants::SOFTWARE_RASTER, options.primary == Primary::SoftwareRaster);
         Ok(Self { kernel: kernel(context, bindings, "primary_hit", spirv!("primary_hit.comp"), &constants)? })
     }
 
     /// Needs `triangle_ids`, or `pixel_nearest` if kernels rasterize. Leaves `hits` of the camera rays. Updates the
-    /// counters if the options ask for a profile, and `pixel_features` if they ask for features.
+    /// counters if the options ask for a profile, and `pixel_aovs` if they ask for AOVs.
     pub fn record(&self, commands: &Commands, batch: &Batch) {
         let dispatch = Dispatch::Threads([batch.n_pixels, 1, 1], [RAY_GROUP_SIZE, 1, 1]);
         commands.dispatch(&self.kernel, Some(batch.depth), batch, dispatch);

@@ -14,17 +14,17 @@ use crate::{
 pub struct Inputs {
     /// The rays that passes of a batch or of a bounce work on.
     pub batch: Batch,
-    /// The feature that [`Pass::FalseColor`] displays.
+    /// The AOVs that [`Pass::FalseColor`] displays.
     pub false_color: Option<FalseColor>,
 }
 
 impl Inputs {
-    /// Returns the feature that [`Pass::FalseColor`] displays.
+    /// Returns the AOVs that [`Pass::FalseColor`] displays.
     ///
     /// # Panics
     /// There is none.
-    pub(super) fn displayed_feature(&self) -> &FalseColor {
-        self.false_color.as_ref().expect("a feature is displayed")
+    pub(super) fn displayed_aovs(&self) -> &FalseColor {
+        self.false_color.as_ref().expect("a aovs is displayed")
     }
 }
 
@@ -37,7 +37,7 @@ impl Passes {
     /// Records one pass. The resources must be bound.
     ///
     /// # Panics
-    /// The passes were created for options that do not have `pass`, or `inputs` lacks the feature that it displays.
+    /// The passes were created for options that do not have `pass`, or `inputs` lacks the AOVs that it displays.
     pub fn record(&self, commands: &Commands, resources: &Resources, pass: Pass, inputs: &Inputs) {
         let batch = &inputs.batch;
         match pass {
@@ -46,7 +46,7 @@ impl Passes {
             Pass::RasterizeBlocks => self.rasterize().blocks(commands, resources),
             Pass::PrimaryHit => self.primary_hit.record(commands, batch),
             Pass::Trace => self.trace.record(commands, resources, batch),
-            Pass::Features => self.features.record(commands, batch),
+            Pass::PixelAovs => self.pixel_aovs.record(commands, batch),
             Pass::CompactReduce => self.compact.reduce(commands, resources, batch),
             Pass::CompactSpine => self.compact.spine.record(commands, batch),
             Pass::CompactScatter => self.compact.scatter(commands, resources, batch),
@@ -55,7 +55,7 @@ impl Passes {
             Pass::Resolve => self.resolve.record(commands, batch),
             Pass::Accumulate => self.accumulate.record(commands, resources),
             Pass::Denoise => self.denoise.record(commands, resources),
-            Pass::FalseColor => self.false_color.record(commands, resources, inputs.displayed_feature()),
+            Pass::FalseColor => self.false_color.record(commands, resources, inputs.displayed_aovs()),
             Pass::Tonemap => self.tonemap.record(commands, resources),
             _ => panic!("a frame of ray trees has no `{}`", pass.name()),
         }

@@ -24,12 +24,12 @@ impl Shadow {
     ) -> Result<Self, GpuError> {
         let shader = searching("shadow", bindings, options.traversal, Some(constants::SHADOW_ALPHA_TEST));
         // `COUNTS` is not set, since the pass shade counts the shadow rays.
-        let constants = search_constants(context)?.set(constants::COUNT_COSTS, options.features);
+        let constants = search_constants(context)?.set(constants::COUNT_COSTS, options.pixel_aovs);
         Ok(Self { kernel: kernel(context, bindings, "shadow", shader, &constants)? })
     }
 
     /// Needs `rays` and `hits` of all bounces of the batch. Leaves `light_visibility`; a shadow ray that was suspended
-    /// leaves a mark in place of its visibility. Updates `pixel_features` if the options ask for features.
+    /// leaves a mark in place of its visibility. Updates `pixel_aovs` if the options ask for AOVs.
     /// `batch.resume_pass`: which shadow rays are traced, all or those that were suspended.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         commands.dispatch(&self.kernel, None, batch, resources.shadow_dispatch(batch));

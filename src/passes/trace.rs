@@ -26,7 +26,7 @@ impl Trace {
         let shader = searching("trace", bindings, options.traversal, Some(constants::ALPHA_MASKS));
         let constants = search_constants(context)?
             .set(constants::COUNTS, options.profile)
-            .set(constants::COUNT_COSTS, options.features);
+            .set(constants::COUNT_COSTS, options.pixel_aovs);
         let from = |camera: bool| {
             let constants = constants.clone().set(constants::FROM_CAMERA, camera);
             kernel(context, bindings, "trace", shader, &constants)
@@ -36,8 +36,8 @@ impl Trace {
     }
 
     /// Needs `rays` of the bounce; camera rays are computed, not read. Leaves `hits`; a ray that was suspended leaves a
-    /// mark in place of its hit. Updates the counters if the options ask for a profile, and `pixel_features` if they
-    /// ask for features. `batch.resume_pass`: which rays are traced, all or those that were suspended.
+    /// mark in place of its hit. Updates the counters if the options ask for a profile, and `pixel_aovs` if they
+    /// ask for AOVs. `batch.resume_pass`: which rays are traced, all or those that were suspended.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         let of_camera = self.from_camera.as_ref().filter(|_| batch.depth == 0);
         commands.dispatch(of_camera.unwrap_or(&self.kernel), Some(batch.depth), batch, resources.trace_dispatch(batch));

@@ -1,8 +1,8 @@
-//! False colour: displays one of the features of each pixel. Twin of `false_color.comp`.
+//! False colour: displays one of the AOVs of each pixel. Twin of `false_color.comp`.
 
 use glam::{Vec3, vec3};
 
-use crate::layout::{FalseColor, Feature, NO_TRIANGLE, VIEW_COST, VIEW_ID, VIEW_NORMAL, VIEW_RAYS};
+use crate::layout::{FalseColor, NO_TRIANGLE, PixelAovs, VIEW_COST, VIEW_ID, VIEW_NORMAL, VIEW_RAYS};
 
 /// A colour for an index. Neighbouring indices get different colours: the low bits of a multiplicative hash (Knuth
 /// 6.4).
@@ -19,21 +19,21 @@ pub fn heat_color(x: f32) -> Vec3 {
     rising + vec3(0.0, 0.0, 0.5 * (1.0 - (6.0 * x - 1.5).abs() / 1.5).max(0.0))
 }
 
-fn color(feature: &Feature, push: &FalseColor) -> Vec3 {
+fn color(aovs: &PixelAovs, push: &FalseColor) -> Vec3 {
     match push.view {
-        VIEW_COST => heat_color(feature.n_steps as f32 / push.brightest),
-        VIEW_RAYS => heat_color(feature.n_rays as f32 / push.brightest),
-        _ if feature.triangle_ix == NO_TRIANGLE => Vec3::ZERO,
-        VIEW_NORMAL => 0.5 + 0.5 * feature.normal_world,
-        VIEW_ID => id_color(feature.triangle_ix),
-        _ => Vec3::splat(1.0 / (1.0 + feature.depth / push.brightest)),
+        VIEW_COST => heat_color(aovs.n_steps as f32 / push.brightest),
+        VIEW_RAYS => heat_color(aovs.n_rays as f32 / push.brightest),
+        _ if aovs.triangle_ix == NO_TRIANGLE => Vec3::ZERO,
+        VIEW_NORMAL => 0.5 + 0.5 * aovs.normal_world,
+        VIEW_ID => id_color(aovs.triangle_ix),
+        _ => Vec3::splat(1.0 / (1.0 + aovs.depth / push.brightest)),
     }
 }
 
 /// Writes `pixel_display` (RGBA, opaque): the view `push.view`, one of `VIEW_*`.
-pub fn false_color(push: &FalseColor, pixel_features: &[Feature], pixel_display: &mut [[u8; 4]]) {
-    for (feature, display) in pixel_features.iter().zip(pixel_display) {
-        let [r, g, b] = color(feature, push).clamp(Vec3::ZERO, Vec3::ONE).to_array().map(|x| (x * 255.0 + 0.5) as u8);
+pub fn false_color(push: &FalseColor, pixel_aovs: &[PixelAovs], pixel_display: &mut [[u8; 4]]) {
+    for (aovs, display) in pixel_aovs.iter().zip(pixel_display) {
+        let [r, g, b] = color(aovs, push).clamp(Vec3::ZERO, Vec3::ONE).to_array().map(|x| (x * 255.0 + 0.5) as u8);
         *display = [r, g, b, 255];
     }
 }

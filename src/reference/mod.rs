@@ -8,7 +8,7 @@
 //! not depend on the number of threads.
 //!
 //! ```text
-//! passes      primary_hit, trace, features, compact, shadow, shade, resolve, accumulate, denoise, false_color,
+//! passes      primary_hit, trace, AOVs, compact, shadow, shade, resolve, accumulate, denoise, false_color,
 //!             tonemap, cast; path_* and guides; demodulate and edge_filter; visibility, for which the device
 //!             rasterizes
 //! traversal   traverser: one ray by any algorithm
@@ -41,7 +41,6 @@ pub mod edge;
 pub mod edge_filter;
 pub mod emitters;
 pub mod false_color;
-pub mod features;
 pub mod fresnel;
 pub mod grid;
 pub mod guides;
@@ -72,6 +71,7 @@ pub mod pending_mask_boxes;
 pub mod pending_restart;
 pub mod pending_short_stack;
 pub mod pending_stack;
+pub mod pixel_aovs;
 pub mod primary_hit;
 pub mod resolve;
 pub mod ropes;

@@ -193,13 +193,13 @@ impl BandedRenderer {
         while let Some(log2) = pacer.next(self.renderer.n_samples()) {
             let profile = self.draw_frame(log2, watcher)?;
             drawn.profile.add(&profile);
-            if drawn.n_samples == 0 && self.renderer.options().features {
-                drawn.features = self.renderer.features()?;
+            if drawn.n_samples == 0 && self.renderer.options().pixel_aovs {
+                drawn.pixel_aovs = self.renderer.pixel_aovs()?;
             }
             drawn.n_samples = self.renderer.n_samples();
         }
-        if !drawn.features.is_empty() && integrator == Integrator::Path {
-            self.renderer.note_noise(&mut drawn.features)?;
+        if !drawn.pixel_aovs.is_empty() && integrator == Integrator::Path {
+            self.renderer.note_noise(&mut drawn.pixel_aovs)?;
         }
         drawn.light = self.renderer.light_layers()?;
         Ok(drawn)
@@ -301,10 +301,11 @@ mod tests {
     fn bands_are_the_picture_and_fit_the_device() {
         let filter = Denoise::Paper { threshold: 1.0 };
         let part = Crop { x0: 5, y0: 7, x1: 60, y1: 41 };
-        for (denoise, features, crop) in
+        for (denoise, pixel_aovs, crop) in
             [(Denoise::Off, false, None), (filter, false, None), (filter, true, None), (filter, false, Some(part))]
         {
-            let options = RenderOptions { width: 64, height: 48, denoise, features, crop, ..RenderOptions::default() };
+            let options =
+                RenderOptions { width: 64, height: 48, denoise, pixel_aovs, crop, ..RenderOptions::default() };
             for range in [2 << 10, 16 << 10, 20_000, 24 << 10, 48 << 10, 1 << 30] {
                 assert_fit(&options, range);
             }

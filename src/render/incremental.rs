@@ -13,7 +13,7 @@ use crate::{
     buffers::Needs,
     frame::{Integrator, Pass, Picture, Profile, View},
     gpu::{CommandBuffer, GpuError},
-    layout::{Batch, FalseColor, Feature, Frame, MOST_SAMPLES_LOG2, constants},
+    layout::{Batch, FalseColor, Frame, MOST_SAMPLES_LOG2, PixelAovs, constants},
     passes::FramePasses,
     scene::Camera,
 };
@@ -115,7 +115,7 @@ impl Renderer {
 
     /// Whether a sample consists of the hits of primary rays only, without light.
     pub(super) fn draws_primary_rays_only(&self) -> bool {
-        self.in_use.features && self.needs_primary_rays_only
+        self.in_use.pixel_aovs && self.needs_primary_rays_only
     }
 
     /// Whether a sample is pending.
@@ -282,8 +282,8 @@ impl Renderer {
         Ok(PartialSample { parts: parts.into(), n_done: 0, sample_ix, begun_at: None })
     }
 
-    /// Sets the view that the next sample and [`Renderer::show`] display: the picture, or a feature in its place. A
-    /// feature is displayed only if the options ask for features. `brightest`: in views of costs and of numbers of
+    /// Sets the view that the next sample and [`Renderer::show`] display: the picture, or a AOVs in its place. A
+    /// AOVs is displayed only if the options ask for AOVs. `brightest`: in views of costs and of numbers of
     /// rays, the value that is displayed brightest; in the view of depth, the depth that is half as bright as
     /// depth 0.
     ///
@@ -323,21 +323,21 @@ impl Renderer {
     }
 
     /// Downloads what the primary ray of a pixel hit in the last sample, and what the pixel's rays cost. Returns None
-    /// if the options do not ask for features, or while a sample is drawn in parts.
+    /// if the options do not ask for AOVs, or while a sample is drawn in parts.
     ///
     /// # Panics
     /// The picture does not have the pixel.
     ///
     /// # Errors
     /// The copy fails.
-    pub fn feature_at(&self, pixel: UVec2) -> Result<Option<Feature>, GpuError> {
-        if !self.in_use.features || self.pending.is_some() || self.n_samples == 0 {
+    pub fn aovs_at(&self, pixel: UVec2) -> Result<Option<PixelAovs>, GpuError> {
+        if !self.in_use.pixel_aovs || self.pending.is_some() || self.n_samples == 0 {
             return Ok(None);
         }
         let Frame { width, height, .. } = *self.resources.constants();
         assert!(pixel.x < width && pixel.y < height, "a pixel of the picture");
         let pixel_ix = pixel.y as usize * width as usize + pixel.x as usize;
-        Ok(self.resources.pixels.pixel_features.download_part(pixel_ix, 1)?.first().copied())
+        Ok(self.resources.pixels.pixel_aovs.download_part(pixel_ix, 1)?.first().copied())
     }
 
     /// Notes that `pixel_display` holds a complete picture.

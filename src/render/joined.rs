@@ -7,16 +7,16 @@ use crate::{
     gpu::GpuError,
 };
 
-/// The joined picture, with the features and layers of its pixels. Parts that have not been placed are black.
+/// The joined picture, with the AOVs and layers of its pixels. Parts that have not been placed are black.
 pub struct JoinedPicture {
     whole: Crop,
     pub picture: Picture,
-    /// The features and layers. The caller adds times and counts.
+    /// The AOVs and layers. The caller adds times and counts.
     pub drawn: Drawn,
 }
 
 impl JoinedPicture {
-    /// Makes room for the pixels of `whole`, and for the features and layers that the options ask for.
+    /// Makes room for the pixels of `whole`, and for the AOVs and layers that the options ask for.
     ///
     /// # Errors
     /// There is too little memory.
@@ -29,8 +29,8 @@ impl JoinedPicture {
             display: room("displayed picture", n_pixels)?,
         };
         let mut drawn = Drawn::default();
-        if options.features {
-            drawn.features = room("picture's features", n_pixels)?;
+        if options.pixel_aovs {
+            drawn.pixel_aovs = room("picture's pixel_aovs", n_pixels)?;
         }
         if options.has_light_layers() {
             for layer in &mut drawn.light.0 {
@@ -44,8 +44,8 @@ impl JoinedPicture {
     pub fn place(&mut self, part: &Crop, picture: &Picture, drawn: &Drawn) {
         self.whole.place(&mut self.picture.radiance, part, &picture.radiance);
         self.whole.place(&mut self.picture.display, part, &picture.display);
-        if !drawn.features.is_empty() {
-            self.whole.place(&mut self.drawn.features, part, &drawn.features);
+        if !drawn.pixel_aovs.is_empty() {
+            self.whole.place(&mut self.drawn.pixel_aovs, part, &drawn.pixel_aovs);
         }
         self.drawn.light.place(&self.whole, part, &drawn.light);
     }

@@ -39,7 +39,7 @@ use crate::{
         opaque, plan,
     },
     gpu::{Access, AnyBuffer, CommandBuffer, Commands, Context, GpuError},
-    layout::{Batch, FalseColor, Feature, MATERIAL_REFLECT, MATERIAL_REFRACT},
+    layout::{Batch, FalseColor, MATERIAL_REFLECT, MATERIAL_REFRACT, PixelAovs},
     passes::{FramePasses, Inputs, Rasterize},
     scene::Camera,
     world::World,
@@ -62,9 +62,9 @@ pub struct Renderer {
     n_samples: u32,
     /// Base-2 logarithm of the number of samples that a frame of paths draws.
     samples_log2: u32,
-    /// The feature that is displayed in place of the picture. Used only if the options ask for features.
+    /// The AOVs that is displayed in place of the picture. Used only if the options ask for AOVs.
     false_color: Option<FalseColor>,
-    /// Whether the view needs only the hits of primary rays. Used only if the options ask for features.
+    /// Whether the view needs only the hits of primary rays. Used only if the options ask for AOVs.
     needs_primary_rays_only: bool,
     /// Whether `pixel_accumulated`, to which samples are added, contains the first sample.
     has_sums: bool,
@@ -199,7 +199,7 @@ impl Renderer {
         }
     }
 
-    /// Displays the mean of the samples again, filtered and encoded by the current options, or the feature of the
+    /// Displays the mean of the samples again, filtered and encoded by the current options, or the AOVs of the
     /// view. Draws no sample. The last sample must be complete, as for [`Renderer::picture`].
     ///
     /// # Errors
@@ -278,14 +278,14 @@ impl Renderer {
     /// Downloads what the primary ray of each pixel hits in the last sample, and what all rays of that sample cost.
     ///
     /// # Panics
-    /// The options do not ask for features.
+    /// The options do not ask for AOVs.
     ///
     /// # Errors
     /// A copy fails.
-    pub fn features(&self) -> Result<Vec<Feature>, GpuError> {
-        assert!(self.in_use.features, "the options ask for features");
-        let features = self.resources.pixels.pixel_features.download_first(self.resources.n_pixels())?;
-        Ok(self.in_use.window().part(features, &self.in_use.crop_or_whole()))
+    pub fn pixel_aovs(&self) -> Result<Vec<PixelAovs>, GpuError> {
+        assert!(self.in_use.pixel_aovs, "the options ask for pixel_aovs");
+        let pixel_aovs = self.resources.pixels.pixel_aovs.download_first(self.resources.n_pixels())?;
+        Ok(self.in_use.window().part(pixel_aovs, &self.in_use.crop_or_whole()))
     }
 
     /// Downloads the layers of the picture's light, which are empty if the options do not ask for them. The last sample
@@ -306,13 +306,13 @@ impl Renderer {
         Ok(layers)
     }
 
-    /// Adds to features what the samples of each pixel tell of its noise. The frames must trace paths.
+    /// Adds to AOVs what the samples of each pixel tell of its noise. The frames must trace paths.
     ///
     /// # Errors
     /// A copy fails.
-    fn note_noise(&self, features: &mut [Feature]) -> Result<(), GpuError> {
+    fn note_noise(&self, pixel_aovs: &mut [PixelAovs]) -> Result<(), GpuError> {
         let means = self.in_use.window().part(self.window_mean()?, &self.in_use.crop_or_whole());
-        features.iter_mut().zip(means).for_each(|(feature, mean)| feature.set_noise(mean, self.n_samples));
+        pixel_aovs.iter_mut().zip(means).for_each(|(aovs, mean)| aovs.set_noise(mean, self.n_samples));
         Ok(())
     }
 
@@ -355,7 +355,7 @@ impl Renderer {
             n_bounces: if only_primary_rays { 1 } else { self.in_use.n_bounces() },
             is_lit: !only_primary_rays,
             adds_samples: constants.n_samples > 1,
-            shows_feature: self.in_use.features && self.false_color.is_some(),
+            shows_aovs: self.in_use.pixel_aovs && self.false_color.is_some(),
             ..FrameKind::new(&self.in_use, constants.n_lights)
         }
     }
@@ -423,13 +423,13 @@ impl Renderer {
         self.update_constants(commands);
         copy_all(commands, self.schedule.first_bounces.any(), self.resources.bounces.any());
         self.resources.clear_counters(commands);
-        if self.in_use.features {
-            commands.clear_buffer(self.resources.pixels.pixel_features.any());
+        if self.in_use.pixel_aovs {
+            commands.clear_buffer(self.resources.pixels.pixel_aovs.any());
         }
         if self.in_use.primary == Primary::SoftwareRaster {
             Rasterize::reset(commands, &self.resources);
         }
-        // bounces, counters, pixel_features, raster_groups
+        // bounces, counters, pixel_aovs, raster_groups
         commands.barrier(Access::TransferWrite, Access::AnyUse);
         self.record_section(commands, visibility, &Batch::default());
     }
@@ -466,9 +466,9 @@ fn check_lights(context: &Context, n_lights: u32) -> Result<(), GpuError> {
 }
 
 /// Returns the number of lanes to share among the rays of a dispatch. 0 means that each ray gets one lane, and is
-/// returned if the options ask for features, which contain the costs of rays.
+/// returned if the options ask for AOVs, which contain the costs of rays.
 fn lanes_to_share(context: &Arc<Context>, options: &RenderOptions) -> Result<u32, GpuError> {
-    if options.features { Ok(0) } else { context.n_lanes() }
+    if options.pixel_aovs { Ok(0) } else { context.n_lanes() }
 }
 
 fn copy_all(commands: &Commands, source: &Arc<AnyBuffer>, destination: &Arc<AnyBuffer>) {

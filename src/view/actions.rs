@@ -118,17 +118,17 @@ impl Session {
         self.picked = Some(pick(&self.loaded.world, &options, &displayed.camera, pixel));
     }
 
-    /// Reads the features of the pixel at a point of the window, if the view shows features. While a sample is drawn in
+    /// Reads the AOVs of the pixel at a point of the window, if the view shows AOVs. While a sample is drawn in
     /// parts, those that were read last stay. `window` and `at` are in pixels.
     ///
     /// # Errors
     /// The copy fails.
     pub fn point_at(&mut self, gpu: &GpuSession, window: (u32, u32), at: (f64, f64)) -> Result<(), GpuError> {
-        let RenderOptions { width, height, features, .. } = *gpu.front().options();
-        if !features {
+        let RenderOptions { width, height, pixel_aovs, .. } = *gpu.front().options();
+        if !pixel_aovs {
             self.pointed = None;
-        } else if let Some(feature) = gpu.front().feature_at(pixel_at(at, window, (width, height)))? {
-            self.pointed = Some(feature);
+        } else if let Some(aovs) = gpu.front().aovs_at(pixel_at(at, window, (width, height)))? {
+            self.pointed = Some(aovs);
         }
         Ok(())
     }

@@ -19,7 +19,7 @@ use crate::{
     accel::Statistics,
     frame::{Denoise, Profile, RenderOptions, View},
     gpu::GpuError,
-    layout::Feature,
+    layout::PixelAovs,
     scene::RenderDefaults,
 };
 
@@ -70,8 +70,8 @@ pub struct Session {
     /// Time spent so far on the sample that is being drawn, milliseconds.
     sample_ms: f64,
     pub(super) picked: Option<Picked>,
-    /// The features of the pixel under the pointer, from the last picture with features.
-    pub(super) pointed: Option<Feature>,
+    /// The AOVs of the pixel under the pointer, from the last picture with AOVs.
+    pub(super) pointed: Option<PixelAovs>,
     /// Whether the user has asked to save the picture. It is saved once a picture of the window's size is displayed,
     /// even if further samples are to come.
     pub(super) is_save_due: bool,
@@ -150,9 +150,9 @@ impl Session {
 
     /// Returns the options of a picture of the window's size, of a kind that is drawn at rest or in motion.
     fn whole(&self, kind: PictureKind, (width, height): (u32, u32)) -> RenderOptions {
-        let features = self.settings.view != View::Picture;
+        let pixel_aovs = self.settings.view != View::Picture;
         let at_rest = &self.settings.options;
-        let whole = RenderOptions { width, height, features, ..at_rest.clone() };
+        let whole = RenderOptions { width, height, pixel_aovs, ..at_rest.clone() };
         let integrator = kind.integrator();
         if kind == self.at_rest() {
             return whole;
@@ -318,7 +318,7 @@ impl Session {
         let has_room = whole.width <= room.0 && whole.height <= room.1;
         *room = (room.0.max(whole.width), room.1.max(whole.height));
         let filter = |options: &RenderOptions| std::mem::discriminant(&options.noise_filter());
-        has_room && whole.features == now.features && filter(whole) == filter(now)
+        has_room && whole.pixel_aovs == now.pixel_aovs && filter(whole) == filter(now)
     }
 
     /// Draws the rest of the sample in parts, until the sample is complete or half of [`PART_MS`] is spent. At rest,

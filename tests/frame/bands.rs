@@ -7,7 +7,7 @@ use glam::{Vec3, vec3};
 use kdray::{
     frame::{BounceStats, Crop, Denoise, Goal, Picture, Primary, RenderOptions},
     gpu::{Context, DeviceOverrides, GpuError},
-    layout::Feature,
+    layout::PixelAovs,
     render::{BandedRenderer, Renderer},
     scene::{Camera, Projection},
     world::FlatScene,
@@ -16,7 +16,7 @@ use kdray::{
 use super::studio::{assert_silent, device, identical, options, world_of};
 use crate::support::{meshes, pretended, scenes};
 
-/// Size of a row of 64 pixels without features, in bytes.
+/// Size of a row of 64 pixels without AOVs, in bytes.
 const ROW: u64 = 64 * 16;
 const ELSEWHERE: Camera = Camera {
     eye: vec3(1.5, 0.5, 3.5),
@@ -44,11 +44,11 @@ fn scene() -> FlatScene {
     scene
 }
 
-/// A picture with its features and its counts of rays.
+/// A picture with its AOVs and its counts of rays.
 #[derive(Clone)]
 struct Made {
     picture: Picture,
-    features: Vec<Feature>,
+    pixel_aovs: Vec<PixelAovs>,
     bounces: Vec<BounceStats>,
 }
 
@@ -59,9 +59,9 @@ fn at_once(context: &Arc<Context>, options: &RenderOptions, n_samples: u32) -> V
     let made = [scene.camera, ELSEWHERE].map(|camera| {
         renderer.set_camera(&camera);
         let mut profile = renderer.draw_sample().expect("a sample");
-        let features = if options.features { renderer.features().expect("features") } else { Vec::new() };
+        let pixel_aovs = if options.pixel_aovs { renderer.pixel_aovs().expect("pixel_aovs") } else { Vec::new() };
         (1..n_samples).for_each(|_| profile.add(&renderer.draw_sample().expect("a sample")));
-        Made { picture: renderer.picture().expect("a picture"), features, bounces: profile.bounces }
+        Made { picture: renderer.picture().expect("a picture"), pixel_aovs, bounces: profile.bounces }
     });
     made.to_vec()
 }
@@ -80,15 +80,15 @@ fn in_bands(context: &Arc<Context>, options: &RenderOptions, n_samples: u32) -> 
         let n_batches = drawn.profile.passes.iter().filter_map(|pass| pass.batch).max().map_or(0, |batch| batch + 1);
         assert_eq!(drawn.profile.n_batches, n_batches);
         let picture = renderer.picture().expect("a picture").into_owned();
-        Made { picture, features: drawn.features, bounces: drawn.profile.bounces }
+        Made { picture, pixel_aovs: drawn.pixel_aovs, bounces: drawn.profile.bounces }
     });
     (made.to_vec(), n_bands)
 }
 
-/// Returns whether the picture and the features agree in every bit.
+/// Returns whether the picture and the AOVs agree in every bit.
 fn agree(a: &Made, b: &Made) -> bool {
     identical(&a.picture, &b.picture)
-        && bytemuck::cast_slice::<_, u8>(&a.features) == bytemuck::cast_slice::<_, u8>(&b.features)
+        && bytemuck::cast_slice::<_, u8>(&a.pixel_aovs) == bytemuck::cast_slice::<_, u8>(&b.pixel_aovs)
 }
 
 fn assert_same_bits(options: &RenderOptions, n_samples: u32, least_bands: u32) {
@@ -130,10 +130,10 @@ fn the_noise_filter_sees_beyond_a_band() {
 }
 
 #[test]
-fn several_samples_and_features() {
-    let features = RenderOptions { features: true, ..options(64, 48, 2) };
-    assert_same_bits(&features, 1, 8);
-    assert_same_bits(&RenderOptions { denoise: FILTER, ..features }, 3, 8);
+fn several_samples_and_aovs() {
+    let pixel_aovs = RenderOptions { pixel_aovs: true, ..options(64, 48, 2) };
+    assert_same_bits(&pixel_aovs, 1, 8);
+    assert_same_bits(&RenderOptions { denoise: FILTER, ..pixel_aovs }, 3, 8);
     assert_same_bits(&options(64, 48, 2), 3, 2);
 }
 
@@ -160,10 +160,10 @@ fn the_small_device_refuses_the_picture_at_once() {
 }
 
 #[test]
-fn one_changed_pixel_or_feature_is_noticed() {
-    let options = RenderOptions { features: true, ..options(64, 48, 2) };
+fn one_changed_pixel_or_aovs_is_noticed() {
+    let options = RenderOptions { pixel_aovs: true, ..options(64, 48, 2) };
     let made = at_once(&device(), &options, 1).remove(0);
     let mut changed = made.clone();
-    changed.features[64 * 30 + 7].n_steps += 1;
+    changed.pixel_aovs[64 * 30 + 7].n_steps += 1;
     assert!(agree(&made, &made) && !agree(&made, &changed));
 }

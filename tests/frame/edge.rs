@@ -136,7 +136,7 @@ fn batches_and_bands_change_no_bit() {
 #[test]
 fn bands_of_parts_of_rows_change_no_bit() {
     let (scene, context) = (scenes::mixed_outdoors(), device());
-    let options = RenderOptions { features: true, light_layers: true, max_depth: 2, ..options(300, 150) };
+    let options = RenderOptions { pixel_aovs: true, light_layers: true, max_depth: 2, ..options(300, 150) };
     let world = world_of(&scene);
     // Rows of the border alone take 300 * 130 pixels.
     let range = Some(150 * 140 * 512);
@@ -149,7 +149,7 @@ fn bands_of_parts_of_rows_change_no_bit() {
     let ((n_whole, whole, expected), (n_bands, joined, found)) = (draw(context.clone()), draw(narrow.clone()));
     assert!(n_whole == 1 && n_bands > 3, "{n_whole}, {n_bands}");
     assert!(identical(&whole, &joined) && expected.light == found.light);
-    assert!(bytemuck::cast_slice::<_, u8>(&expected.features) == bytemuck::cast_slice::<_, u8>(&found.features));
+    assert!(bytemuck::cast_slice::<_, u8>(&expected.pixel_aovs) == bytemuck::cast_slice::<_, u8>(&found.pixel_aovs));
     [&context, &narrow].into_iter().for_each(|context| assert_silent(context));
 }
 
@@ -177,18 +177,18 @@ fn the_filter_reduces_the_error() {
 #[test]
 fn pictures_know_their_noise() {
     let scene = scenes::mixed_outdoors();
-    let noisy = RenderOptions { denoise: Denoise::Off, features: true, ..options(80, 60) };
-    let truth = on_cpu(&scene, &RenderOptions { features: false, ..noisy.clone() }, 1024);
+    let noisy = RenderOptions { denoise: Denoise::Off, pixel_aovs: true, ..options(80, 60) };
+    let truth = on_cpu(&scene, &RenderOptions { pixel_aovs: false, ..noisy.clone() }, 1024);
     let context = device();
     for (denoise, n_samples) in [(Denoise::Off, 16), (Denoise::Edge, 20), (Denoise::Paper { threshold: 0.1 }, 1)] {
         let with_filter = RenderOptions { denoise, ..noisy.clone() };
         let mut renderer = BandedRenderer::new(context.clone(), &world_of(&scene), &with_filter).expect("a renderer");
-        let features = renderer.draw(Goal::Samples(n_samples), &mut || ()).expect("a picture").features;
-        assert!(features.iter().all(|feature| feature.n_samples == n_samples));
+        let pixel_aovs = renderer.draw(Goal::Samples(n_samples), &mut || ()).expect("a picture").pixel_aovs;
+        assert!(pixel_aovs.iter().all(|aovs| aovs.n_samples == n_samples));
         assert!(renderer.picture().expect("a picture").radiance.iter().all(|pixel| pixel[3] == 1.0));
-        let variance = features.iter().map(|feature| feature.variance).sum::<f32>() / features.len() as f32;
+        let variance = pixel_aovs.iter().map(|aovs| aovs.variance).sum::<f32>() / pixel_aovs.len() as f32;
         let error =
-            squared_error(&on_cpu(&scene, &RenderOptions { features: false, ..noisy.clone() }, n_samples), &truth);
+            squared_error(&on_cpu(&scene, &RenderOptions { pixel_aovs: false, ..noisy.clone() }, n_samples), &truth);
         if n_samples == 1 {
             assert!(variance.is_infinite());
         } else {

@@ -6,7 +6,7 @@ use kdray::{
     buffers::SceneAccess,
     cpu,
     frame::{Picture, Primary, RenderOptions},
-    layout::Feature,
+    layout::PixelAovs,
     render::Renderer,
     scene::Camera,
     world::World,
@@ -18,15 +18,15 @@ use super::{
 };
 use crate::support::{grid_worlds, scenes, world_of};
 
-/// Renders a frame. Returns it and its features, whose costs are set to 0.
-fn on_device(world: &World, options: &RenderOptions) -> (Picture, Vec<Feature>) {
+/// Renders a frame. Returns it and its AOVs, whose costs are set to 0.
+fn on_device(world: &World, options: &RenderOptions) -> (Picture, Vec<PixelAovs>) {
     let context = device();
-    let options = RenderOptions { features: true, ..options.clone() };
+    let options = RenderOptions { pixel_aovs: true, ..options.clone() };
     let mut renderer = Renderer::new(context.clone(), world, &options).expect("a renderer");
     let picture = renderer.render().expect("a frame").0;
-    let features = renderer.features().expect("features").into_iter();
+    let pixel_aovs = renderer.pixel_aovs().expect("pixel_aovs").into_iter();
     assert_silent(&context);
-    (picture, features.map(|feature| Feature { n_steps: 0, ..feature }).collect())
+    (picture, pixel_aovs.map(|aovs| PixelAovs { n_steps: 0, ..aovs }).collect())
 }
 
 #[test]
@@ -37,7 +37,7 @@ fn frames_on_the_device_are_the_kd_trees() {
         for world in grid_worlds(&scene) {
             let found = on_device(&world, &options);
             assert!(identical(&expected.0, &found.0), "{} {primary}", world.accel().kind());
-            assert!(expected.1 == found.1, "{} {primary}: features", world.accel().kind());
+            assert!(expected.1 == found.1, "{} {primary}: pixel_aovs", world.accel().kind());
         }
     }
 }

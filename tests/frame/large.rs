@@ -71,8 +71,8 @@ fn a_scene_larger_than_what_the_device_binds_gives_the_same_bits() {
     let (world, any, small) = (large_world(), device(), small_device());
     for &traversal in Traversal::ALL {
         for primary in [Primary::Raster, Primary::Trace] {
-            let features = traversal == Traversal::Mask;
-            let options = RenderOptions { traversal, primary, features, ..options(24, 16, 3) };
+            let pixel_aovs = traversal == Traversal::Mask;
+            let options = RenderOptions { traversal, primary, pixel_aovs, ..options(24, 16, 3) };
             let [mut bound, mut by_address] =
                 [&any, &small].map(|context| Renderer::new(context.clone(), &world, &options).expect("a renderer"));
             assert_eq!(bound.resources().accel.access(), usual_reading(&any, world.tree()));
@@ -81,8 +81,11 @@ fn a_scene_larger_than_what_the_device_binds_gives_the_same_bits() {
             assert!(bytes.iter().all(|&bytes| bytes > RANGE), "{traversal}: {bytes:?}");
             let pictures = [&mut bound, &mut by_address].map(|renderer| renderer.render().expect("a frame").0);
             assert!(identical(&pictures[0], &pictures[1]), "{traversal} {primary}");
-            if features {
-                assert!(bound.features().expect("features") == by_address.features().expect("features"), "{primary}");
+            if pixel_aovs {
+                assert!(
+                    bound.pixel_aovs().expect("pixel_aovs") == by_address.pixel_aovs().expect("pixel_aovs"),
+                    "{primary}"
+                );
             }
         }
     }

@@ -149,18 +149,18 @@ fn steps_make_the_same_picture() {
     assert_silent(&context);
 }
 
-/// The views of depth, normals and triangles trace only primary rays, have the same features, and leave the picture
+/// The views of depth, normals and triangles trace only primary rays, have the same AOVs, and leave the picture
 /// as it is.
 #[test]
 fn views_of_first_hits_trace_primary_rays_only() {
     let (scene, context) = (glass_in_glass(), device());
     let world = world_of(&scene);
-    let options = RenderOptions { features: true, ..options_of_parts() };
+    let options = RenderOptions { pixel_aovs: true, ..options_of_parts() };
     let new = || Renderer::new(context.clone(), &world, &options).expect("a renderer");
     let (mut whole, mut renderer) = (new(), new());
     let picture = at_once(&mut whole, 2);
     whole.draw().expect("a frame");
-    let features = whole.features().expect("features");
+    let pixel_aovs = whole.pixel_aovs().expect("pixel_aovs");
     for (view, most_pixels) in [(View::Depth, None), (View::Normal, Some(200)), (View::Id, None)] {
         renderer.limit_batches(most_pixels).expect("batches");
         assert!(renderer.set_view(view, 1.0));
@@ -173,25 +173,25 @@ fn views_of_first_hits_trace_primary_rays_only() {
         }
         assert!(names.contains(&"primary_hit") && names.last() == Some(&"false_color"), "{view}: {names:?}");
         assert!(profile.bounces[0].n_rays == 32 * 24 && profile.bounces[1..].iter().all(|bounce| bounce.n_rays == 0));
-        for (found, expected) in renderer.features().expect("features").iter().zip(&features) {
+        for (found, expected) in renderer.pixel_aovs().expect("pixel_aovs").iter().zip(&pixel_aovs) {
             assert_eq!((found.triangle_ix, found.depth), (expected.triangle_ix, expected.depth));
             assert_eq!((found.normal_world, found.material_ix), (expected.normal_world, expected.material_ix));
         }
         renderer.show().expect("the view again");
-        // Back in the picture's view, the picture and the features with all rays are the same.
+        // Back in the picture's view, the picture and the AOVs with all rays are the same.
         renderer.set_view(View::Picture, 1.0);
         assert_eq!(renderer.n_samples(), 0, "no sample of the picture is there yet");
         assert!(identical(&in_parts(&mut renderer, 2).0, &picture), "after {view}");
         renderer.draw().expect("a frame");
-        assert_eq!(renderer.features().expect("features"), features);
+        assert_eq!(renderer.pixel_aovs().expect("pixel_aovs"), pixel_aovs);
     }
     for view in [View::Cost, View::Rays] {
         renderer.set_view(view, 1.0);
         renderer.draw().expect("a frame");
-        assert_eq!(renderer.features().expect("features"), features, "{view} sums over all rays");
+        assert_eq!(renderer.pixel_aovs().expect("pixel_aovs"), pixel_aovs, "{view} sums over all rays");
         for pixel in [uvec2(0, 0), uvec2(31, 0), uvec2(7, 23)] {
-            let expected = features[(pixel.y * 32 + pixel.x) as usize];
-            assert_eq!(renderer.feature_at(pixel).expect("a feature"), Some(expected), "{pixel}");
+            let expected = pixel_aovs[(pixel.y * 32 + pixel.x) as usize];
+            assert_eq!(renderer.aovs_at(pixel).expect("a aovs"), Some(expected), "{pixel}");
         }
     }
     assert_silent(&context);

@@ -142,7 +142,7 @@ fn only_narrow_lobes_see_the_studio() {
 
 #[test]
 fn a_profile_has_the_passes_of_the_plan() {
-    let (scene, options) = (scenes::mixed(), RenderOptions { features: true, ..options(20, 15, 2) });
+    let (scene, options) = (scenes::mixed(), RenderOptions { pixel_aovs: true, ..options(20, 15, 2) });
     let mut renderer = Renderer::new(device(), &world_of(&scene), &options).expect("a renderer");
     let mut on_cpu = cpu::Renderer::new(&world_of(&scene), &options, Batching::default());
     let plan = Plan::new(&FrameKind::new(&options, scene.lights.len() as u32));

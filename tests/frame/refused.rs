@@ -181,11 +181,11 @@ fn another_size() {
 
 #[test]
 fn other_outputs_and_counts() {
-    let with_features = RenderOptions { features: true, ..small() };
+    let with_aovs = RenderOptions { pixel_aovs: true, ..small() };
     let filtered = RenderOptions { denoise: Denoise::Paper { threshold: 0.3 }, ..small() };
     let deeper = RenderOptions { max_depth: 4, ..small() };
     let unprofiled = RenderOptions { profile: false, ..small() };
-    Trial::new(device(), &small()).walk(&[(with_features, 15), (filtered, 15), (deeper, 10), (unprofiled, 10)]);
+    Trial::new(device(), &small()).walk(&[(with_aovs, 15), (filtered, 15), (deeper, 10), (unprofiled, 10)]);
 }
 
 #[test]

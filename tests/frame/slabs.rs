@@ -8,7 +8,7 @@ use kdray::{
     cpu::{self, Batching},
     frame::{Picture, Primary, RenderOptions},
     gpu::Context,
-    layout::{Feature, Slab},
+    layout::{PixelAovs, Slab},
     render::Renderer,
     world::{FlatScene, World},
 };
@@ -29,25 +29,25 @@ fn scene() -> FlatScene {
 }
 
 fn options_of(traversal: Traversal) -> RenderOptions {
-    RenderOptions { primary: Primary::Trace, features: true, traversal, ..options(40, 30, 3) }
+    RenderOptions { primary: Primary::Trace, pixel_aovs: true, traversal, ..options(40, 30, 3) }
 }
 
-fn steps(features: &[Feature]) -> u64 {
-    features.iter().map(|feature| u64::from(feature.n_steps)).sum()
+fn steps(pixel_aovs: &[PixelAovs]) -> u64 {
+    pixel_aovs.iter().map(|aovs| u64::from(aovs.n_steps)).sum()
 }
 
 /// Returns the picture and the number of steps of all its rays.
 fn render(context: &Arc<Context>, world: &World, traversal: Traversal) -> (Picture, u64) {
     let mut renderer = Renderer::new(context.clone(), world, &options_of(traversal)).expect("a renderer");
     let picture = renderer.render().expect("a frame").0;
-    (picture, steps(&renderer.features().expect("features")))
+    (picture, steps(&renderer.pixel_aovs().expect("pixel_aovs")))
 }
 
 fn steps_on_cpu(world: &World, traversal: Traversal) -> u64 {
     let options = options_of(traversal);
     let mut renderer = cpu::Renderer::new(world, &options, Batching::default());
     renderer.draw_sample();
-    steps(&renderer.features())
+    steps(&renderer.pixel_aovs())
 }
 
 #[test]

@@ -247,7 +247,7 @@ fn options(bytes: &mut Bytes) -> RenderOptions {
         denoise: denoise[bytes.below(4)],
         primary: if bytes.below(4) == 0 { Primary::Raster } else { Primary::Trace },
         traversal: Traversal::Stack,
-        features: bytes.below(8) == 7,
+        pixel_aovs: bytes.below(8) == 7,
         light_layers: bytes.below(8) == 7,
         approximates_ambient: bytes.below(4) == 3,
         paths: PathOptions {

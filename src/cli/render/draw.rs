@@ -211,8 +211,8 @@ fn write_view(common: &Common, view: &FrameJob, of_view: DrawnView) -> Result<Wr
     }
     let (sums, light_sums) = sums.untold();
     let light = drawn.light.0.each_ref().map(Vec::as_slice);
-    let (aovs, features) = (&common.args.aov[..], &drawn.features[..]);
-    view.files.write(&picture, &Layers { aovs, features, light, sums, light_sums, record: Some(&record) })?;
+    let (aovs, pixel_aovs) = (&common.args.aov[..], &drawn.pixel_aovs[..]);
+    view.files.write(&picture, &Layers { aovs, pixel_aovs, light, sums, light_sums, record: Some(&record) })?;
     Ok(written)
 }
 

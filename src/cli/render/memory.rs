@@ -2,7 +2,7 @@
 
 use kdray::{
     frame::{Aov, RenderOptions},
-    layout::Feature,
+    layout::PixelAovs,
     util::memory::require,
 };
 
@@ -23,7 +23,7 @@ pub fn check_memory(options: &RenderOptions, n_samples: u32, on_cpu: bool, n_at_
     let n_rendered = if on_cpu { n_pixels(window.width(), window.height()) } else { 0 };
     let needed = n_rendered * rendered_bytes(options, n_samples)
         + n_pixels(crop.width(), crop.height())
-            * (RADIANCE + DISPLAY + ENCODED + feature_bytes(options) + layer_bytes(options));
+            * (RADIANCE + DISPLAY + ENCODED + aovs_bytes(options) + layer_bytes(options));
     let pictures = if n_at_once == 1 { "a picture".to_owned() } else { format!("{n_at_once} pictures") };
     require(&format!("{pictures} of {}x{} pixels", crop.width(), crop.height()), n_at_once * needed)?;
     Ok(())
@@ -34,7 +34,7 @@ pub fn check_memory(options: &RenderOptions, n_samples: u32, on_cpu: bool, n_at_
 fn rendered_bytes(options: &RenderOptions, n_samples: u32) -> u64 {
     let sums = if n_samples > 1 { RADIANCE } else { 0 };
     let layers = layer_bytes(options) * (1 + sums / RADIANCE);
-    size_of::<u32>() as u64 + RADIANCE + sums + RADIANCE + DISPLAY + feature_bytes(options) + layers
+    size_of::<u32>() as u64 + RADIANCE + sums + RADIANCE + DISPLAY + aovs_bytes(options) + layers
 }
 
 /// Returns the bytes of a pixel in the layers of light.
@@ -42,8 +42,8 @@ fn layer_bytes(options: &RenderOptions) -> u64 {
     if options.has_light_layers() { Aov::OF_LIGHT.len() as u64 * RADIANCE } else { 0 }
 }
 
-fn feature_bytes(options: &RenderOptions) -> u64 {
-    if options.features { size_of::<Feature>() as u64 } else { 0 }
+fn aovs_bytes(options: &RenderOptions) -> u64 {
+    if options.pixel_aovs { size_of::<PixelAovs>() as u64 } else { 0 }
 }
 
 #[cfg(test)]
@@ -58,8 +58,8 @@ mod tests {
         check_memory(&usual, 1, true, 1).unwrap();
         assert_eq!(rendered_bytes(&usual, 1), 40);
         assert_eq!(rendered_bytes(&usual, 2), 56);
-        let with_features = RenderOptions { features: true, ..usual };
-        assert_eq!(rendered_bytes(&with_features, 1), 40 + size_of::<Feature>() as u64);
+        let with_aovs = RenderOptions { pixel_aovs: true, ..usual };
+        assert_eq!(rendered_bytes(&with_aovs, 1), 40 + size_of::<PixelAovs>() as u64);
         let integrator = Integrator::Path;
         let with_layers = RenderOptions { light_layers: true, integrator, ..RenderOptions::default() };
         assert_eq!([1, 2].map(|n_samples| rendered_bytes(&with_layers, n_samples)), [40 + 48, 56 + 96]);

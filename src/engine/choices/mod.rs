@@ -104,7 +104,7 @@ pub struct Workload {
     /// Number of rays that the work takes, as far as that is known in advance. If the same work is repeated for
     /// timing, only one repetition counts, so that the choices are those of a single run.
     pub n_rays: u64,
-    /// Whether the output contains the traversal costs of rays (features), which depend on tree and traversal.
+    /// Whether the output contains the traversal costs of rays (AOVs), which depend on tree and traversal.
     pub shows_costs: bool,
     /// The greatest absolute coordinate of the points where cameras' rays begin; infinity where a camera may go
     /// anywhere.
@@ -122,7 +122,7 @@ impl Workload {
         let factors = [u64::from(size.0), u64::from(size.1), rays_per_pixel, n_pictures];
         let n_rays = factors.into_iter().fold(1, u64::saturating_mul);
         let traces_paths = options.integrator == Integrator::Path;
-        Self { size, n_rays, shows_costs: options.features, farthest_eye: f32::INFINITY, traces_paths }
+        Self { size, n_rays, shows_costs: options.pixel_aovs, farthest_eye: f32::INFINITY, traces_paths }
     }
 
     /// Returns the same work with `farthest_eye` set from `cameras`, which are all the cameras of the work.

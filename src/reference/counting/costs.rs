@@ -13,15 +13,15 @@ use crate::reference::{
 };
 use crate::{
     accel::kdtree::Traversal,
-    layout::{Feature, Hit, NO_TRIANGLE, PathRay},
+    layout::{Hit, NO_TRIANGLE, PathRay, PixelAovs},
 };
 
 /// Counts primary rays whose triangles the rasterizer found: one test for each hit.
-pub fn count_rasterized(rays: &[PathRay], hits: &[Hit], pixel_features: &mut [Feature]) {
+pub fn count_rasterized(rays: &[PathRay], hits: &[Hit], pixel_aovs: &mut [PixelAovs]) {
     for (ray, hit) in rays.iter().zip(hits) {
-        let feature = &mut pixel_features[ray.pixel_ix as usize];
-        feature.n_rays = 1;
-        feature.n_steps = (hit.triangle_ix != NO_TRIANGLE).into();
+        let aovs = &mut pixel_aovs[ray.pixel_ix as usize];
+        aovs.n_rays = 1;
+        aovs.n_steps = (hit.triangle_ix != NO_TRIANGLE).into();
     }
 }
 
@@ -30,13 +30,13 @@ pub fn count_rays<const ANY_HIT: bool>(
     inputs: &KernelInputs,
     traversal: Traversal,
     rays: &[PathRay],
-    pixel_features: &mut [Feature],
+    pixel_aovs: &mut [PixelAovs],
 ) {
     let steps: Vec<_> = (rays.par_iter().with_min_len(RAYS_PER_TASK))
         .map_init(|| Traverser::new(inputs, traversal), |traverser, ray| steps_of::<ANY_HIT>(inputs, traverser, ray))
         .collect();
     for (ray, n_steps) in rays.iter().zip(steps) {
-        add(pixel_features, ray, n_steps);
+        add(pixel_aovs, ray, n_steps);
     }
 }
 
@@ -46,7 +46,7 @@ pub fn count_shadow(
     traversal: Traversal,
     rays: &[PathRay],
     hits: &[Hit],
-    pixel_features: &mut [Feature],
+    pixel_aovs: &mut [PixelAovs],
 ) {
     let inputs = &inputs.with_blended_tested();
     for light in inputs.lights {
@@ -62,7 +62,7 @@ pub fn count_shadow(
             .collect();
         for (ray, n_steps) in rays.iter().zip(steps) {
             if let Some(n_steps) = n_steps {
-                add(pixel_features, ray, n_steps);
+                add(pixel_aovs, ray, n_steps);
             }
         }
     }
@@ -79,8 +79,8 @@ fn steps_of<const ANY: bool>(inputs: &KernelInputs, traverser: &mut Traverser, r
 }
 
 /// Adds a ray and its steps to its pixel.
-fn add(pixel_features: &mut [Feature], ray: &PathRay, n_steps: u32) {
-    let feature = &mut pixel_features[ray.pixel_ix as usize];
-    feature.n_rays += 1;
-    feature.n_steps += n_steps;
+fn add(pixel_aovs: &mut [PixelAovs], ray: &PathRay, n_steps: u32) {
+    let aovs = &mut pixel_aovs[ray.pixel_ix as usize];
+    aovs.n_rays += 1;
+    aovs.n_steps += n_steps;
 }

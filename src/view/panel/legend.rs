@@ -6,7 +6,7 @@ use glam::Vec3;
 use super::Facts;
 use crate::{
     frame::View,
-    layout::{Feature, NO_TRIANGLE},
+    layout::{NO_TRIANGLE, PixelAovs},
     reference::false_color::heat_color,
 };
 
@@ -69,19 +69,19 @@ fn number(x: f32) -> String {
 }
 
 /// Returns the value of a pixel in a view.
-fn value(view: View, feature: &Feature) -> String {
-    let is_hit = feature.triangle_ix != NO_TRIANGLE;
+fn value(view: View, aovs: &PixelAovs) -> String {
+    let is_hit = aovs.triangle_ix != NO_TRIANGLE;
     match view {
-        View::Cost => format!("{} steps", feature.n_steps),
-        View::Rays => format!("{} rays", feature.n_rays),
+        View::Cost => format!("{} steps", aovs.n_steps),
+        View::Rays => format!("{} rays", aovs.n_rays),
         _ if !is_hit => "no hit".to_owned(),
-        View::Depth => format!("{:.6}", feature.depth),
+        View::Depth => format!("{:.6}", aovs.depth),
         View::Normal => {
             // Adding 0 turns -0 into 0, whose sign would only confuse.
-            let [x, y, z] = feature.normal_world.to_array().map(|x| (x * 1e3).round() / 1e3 + 0.0);
+            let [x, y, z] = aovs.normal_world.to_array().map(|x| (x * 1e3).round() / 1e3 + 0.0);
             format!("{x:.3}, {y:.3}, {z:.3}")
         }
-        View::Id => format!("triangle {}", feature.triangle_ix),
+        View::Id => format!("triangle {}", aovs.triangle_ix),
         View::Picture => String::new(),
     }
 }
@@ -100,7 +100,7 @@ pub fn show(ui: &Ui, frame: Frame, facts: &Facts) {
             for bar in bars(view, brightest) {
                 draw(ui, &bar);
             }
-            let text = facts.pointed.as_ref().map_or_else(|| "-".to_owned(), |feature| value(view, feature));
+            let text = facts.pointed.as_ref().map_or_else(|| "-".to_owned(), |aovs| value(view, aovs));
             ui.label(format!("under the pointer: {text}"));
         });
     });
@@ -142,11 +142,12 @@ mod tests {
     #[test]
     fn values_are_those_of_the_view() {
         let normal_world = vec3(0.6, -0.8, -1e-5);
-        let hit = Feature { triangle_ix: 7, depth: 2.5, normal_world, n_steps: 40, n_rays: 3, ..Feature::default() };
+        let hit =
+            PixelAovs { triangle_ix: 7, depth: 2.5, normal_world, n_steps: 40, n_rays: 3, ..PixelAovs::default() };
         let views = [View::Depth, View::Normal, View::Id, View::Cost, View::Rays];
         let expected = ["2.500000", "0.600, -0.800, 0.000", "triangle 7", "40 steps", "3 rays"];
         assert_eq!(views.map(|view| value(view, &hit)), expected);
-        let miss = Feature { triangle_ix: NO_TRIANGLE, ..hit };
+        let miss = PixelAovs { triangle_ix: NO_TRIANGLE, ..hit };
         assert_eq!(views.map(|view| value(view, &miss)), ["no hit", "no hit", "no hit", "40 steps", "3 rays"]);
     }
 
@@ -154,10 +155,10 @@ mod tests {
     #[test]
     fn bars_have_the_colours_of_the_pixels() {
         let brightest = 8.0;
-        let at = |view, feature: Feature| {
+        let at = |view, aovs: PixelAovs| {
             let push = FalseColor { view, brightest };
             let mut display = [[0; 4]];
-            false_color(&push, &[feature], &mut display);
+            false_color(&push, &[aovs], &mut display);
             Vec3::from_array([0, 1, 2].map(|channel| f32::from(display[0][channel]) / 255.0))
         };
         let views = [View::Depth, View::Cost, View::Rays];
@@ -165,15 +166,15 @@ mod tests {
         for (view, values) in views.into_iter().zip(values) {
             let bar = &bars(view, brightest)[0];
             for (share, x) in [0.0, 0.5, 1.0].into_iter().zip(values) {
-                let feature = Feature { depth: x, n_steps: x as u32, n_rays: x as u32, ..Feature::default() };
-                let of_pixel = at(view.constant().unwrap(), feature);
+                let aovs = PixelAovs { depth: x, n_steps: x as u32, n_rays: x as u32, ..PixelAovs::default() };
+                let of_pixel = at(view.constant().unwrap(), aovs);
                 assert!((of_pixel - (bar.color)(share)).abs().max_element() < 0.005, "{view} at {share}");
             }
         }
         for (axis, bar) in [Vec3::X, Vec3::Y, Vec3::Z].into_iter().zip(bars(View::Normal, 1.0)) {
             for (share, x) in [(0.0, -1.0), (0.5, 0.0), (1.0, 1.0)] {
-                let feature = Feature { normal_world: axis * x, ..Feature::default() };
-                let of_pixel = at(View::Normal.constant().unwrap(), feature).dot(axis);
+                let aovs = PixelAovs { normal_world: axis * x, ..PixelAovs::default() };
+                let of_pixel = at(View::Normal.constant().unwrap(), aovs).dot(axis);
                 assert!((of_pixel - (bar.color)(share).dot(axis)).abs() < 0.005, "{axis} at {share}");
             }
         }

@@ -20,7 +20,7 @@ use super::{
 use crate::{
     frame::{Profile, RenderOptions, View},
     gpu::MemoryUse,
-    layout::Feature,
+    layout::PixelAovs,
     scene::Projection,
 };
 
@@ -107,8 +107,8 @@ pub struct Facts<'a> {
     pub memory: Vec<MemoryUse>,
     /// The current view, and the value that it shows brightest; for depths, the one that it shows half as bright.
     pub view: (View, f32),
-    /// The features of the pixel under the pointer; none if they are unknown.
-    pub pointed: Option<Feature>,
+    /// The AOVs of the pixel under the pointer; none if they are unknown.
+    pub pointed: Option<PixelAovs>,
     /// The rays of the pixel that was clicked last.
     pub picked: Option<&'a Picked>,
     /// The last message, unless a later success on the same topic has cleared it.

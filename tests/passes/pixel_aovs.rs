@@ -1,11 +1,11 @@
-//! Tests of the kernel features against its twin on the CPU.
+//! Tests of the kernel AOVs against its twin on the CPU.
 
 use std::collections::HashSet;
 
 use glam::vec3;
 use kdray::{
     frame::RenderOptions,
-    layout::{Batch, Feature, NO_TRIANGLE, PathRay},
+    layout::{Batch, NO_TRIANGLE, PathRay, PixelAovs},
     reference,
     scene::{Camera, Projection},
 };
@@ -20,21 +20,21 @@ fn primary_rays(stage: &Stage, n: u32) -> Vec<PathRay> {
     rays
 }
 
-fn noted(stage: &Stage, rays: &[PathRay], before: &[Feature]) -> Vec<Feature> {
+fn noted(stage: &Stage, rays: &[PathRay], before: &[PixelAovs]) -> Vec<PixelAovs> {
     let hits = hits_of(stage, rays);
     let batch = Batch { n_pixels: rays.len() as u32, ..FIRST };
     stage.set_n_rays(&[batch.n_pixels]);
     stage.set_hits(&hits);
-    stage.resources.pixels.pixel_features.upload(before).expect("pixel_features");
-    stage.run(|commands| stage.passes.features.record(commands, &batch));
-    stage.resources.pixels.pixel_features.download().expect("pixel_features")
+    stage.resources.pixels.pixel_aovs.upload(before).expect("pixel_aovs");
+    stage.run(|commands| stage.passes.pixel_aovs.record(commands, &batch));
+    stage.resources.pixels.pixel_aovs.download().expect("pixel_aovs")
 }
 
-/// Returns the first index at which features differ, in indices, counts or albedo at all, or otherwise by more than
+/// Returns the first index at which AOVs differ, in indices, counts or albedo at all, or otherwise by more than
 /// rounding.
-fn difference(a: &[Feature], b: &[Feature]) -> Option<usize> {
-    let exact = |f: &Feature| (f.triangle_ix, f.material_ix, f.n_rays, f.n_steps, f.albedo.to_array());
-    let agree = |a: &Feature, b: &Feature| {
+fn difference(a: &[PixelAovs], b: &[PixelAovs]) -> Option<usize> {
+    let exact = |f: &PixelAovs| (f.triangle_ix, f.material_ix, f.n_rays, f.n_steps, f.albedo.to_array());
+    let agree = |a: &PixelAovs, b: &PixelAovs| {
         let near = |a: glam::Vec3, b: glam::Vec3| (a - b).abs().max_element() <= 1e-4;
         exact(a) == exact(b)
             && near(a.position_world, b.position_world)
@@ -46,7 +46,7 @@ fn difference(a: &[Feature], b: &[Feature]) -> Option<usize> {
 }
 
 fn stage() -> Stage {
-    let options = RenderOptions { features: true, ..options(50, 40) };
+    let options = RenderOptions { pixel_aovs: true, ..options(50, 40) };
     let mut scene = scenes::mixed_outdoors();
     scene.camera = Camera {
         eye: vec3(7.0, 3.0, 7.0),
@@ -61,10 +61,11 @@ fn agrees_with_its_twin() {
     let stage = stage();
     for n in RAY_COUNTS {
         let rays = primary_rays(&stage, n);
-        // Features are cleared except for their counts, which the kernel keeps.
-        let before: Vec<_> = (0..2000).map(|i| Feature { n_rays: i, n_steps: 7 * i, ..Feature::default() }).collect();
+        // PixelAovs are cleared except for their counts, which the kernel keeps.
+        let before: Vec<_> =
+            (0..2000).map(|i| PixelAovs { n_rays: i, n_steps: 7 * i, ..PixelAovs::default() }).collect();
         let mut expected = before.clone();
-        reference::features::features(&stage.inputs(), rays.iter().zip(&hits_of(&stage, &rays)), &mut expected);
+        reference::pixel_aovs::pixel_aovs(&stage.inputs(), rays.iter().zip(&hits_of(&stage, &rays)), &mut expected);
         let found = noted(&stage, &rays, &before);
         assert_eq!(difference(&expected, &found), None);
         let with_ray: HashSet<_> = rays.iter().map(|ray| ray.pixel_ix as usize).collect();
@@ -72,16 +73,16 @@ fn agrees_with_its_twin() {
         assert!(without.into_iter().all(|i| found[i] == before[i]), "pixels without a ray");
     }
     let rays = primary_rays(&stage, 2000);
-    let found = noted(&stage, &rays, &[Feature::default(); 2000]);
-    let n_missed = found.iter().filter(|feature| feature.triangle_ix == NO_TRIANGLE).count();
+    let found = noted(&stage, &rays, &[PixelAovs::default(); 2000]);
+    let n_missed = found.iter().filter(|aovs| aovs.triangle_ix == NO_TRIANGLE).count();
     assert!((100..1900).contains(&n_missed), "{n_missed} of 2000 rays miss");
 }
 
 #[test]
-fn one_changed_feature_is_noticed() {
-    let some = vec![Feature { depth: 1.0, ..Feature::default() }; 5];
+fn one_changed_aovs_is_noticed() {
+    let some = vec![PixelAovs { depth: 1.0, ..PixelAovs::default() }; 5];
     assert_eq!(difference(&some, &some), None);
-    let changes: [fn(&mut Feature); 7] = [
+    let changes: [fn(&mut PixelAovs); 7] = [
         |f| f.triangle_ix ^= 1,
         |f| f.material_ix ^= 1,
         |f| f.n_steps ^= 1,

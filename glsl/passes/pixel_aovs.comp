@@ -1,8 +1,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Features: one invocation per pixel of the batch writes the AOVs of its first camera ray's hit: position, normal,
+// PixelAovs: one invocation per pixel of the batch writes the AOVs of its first camera ray's hit: position, normal,
 // albedo, depth and the indices of the triangle and its material.
-// Reads hits and the scene; writes pixel_features, except n_rays and n_steps.
+// Reads hits and the scene; writes pixel_aovs, except n_rays and n_steps.
 #include "layout.glsl"
 #include "rays.glsl"
 #include "scene.glsl"
@@ -12,7 +12,7 @@
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hits[]; };
-layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock { Feature pixel_features[]; };
+layout(std430, set = 0, binding = BIND_PIXEL_AOVS) buffer PixelAovsBlock { PixelAovs pixel_aovs[]; };
 
 void main() {
     uint place = gl_GlobalInvocationID.x;
@@ -21,19 +21,19 @@ void main() {
     PathRay ray = ray_at(ray_ix);
     Hit hit = hits[ray_ix];
     uint pixel_ix = ray.pixel_ix;
-    pixel_features[pixel_ix].triangle_ix = hit.triangle_ix;
+    pixel_aovs[pixel_ix].triangle_ix = hit.triangle_ix;
     if (hit.triangle_ix == NO_TRIANGLE) {
-        pixel_features[pixel_ix].material_ix = NO_TRIANGLE;
-        pixel_features[pixel_ix].depth = uintBitsToFloat(0x7f800000u);
+        pixel_aovs[pixel_ix].material_ix = NO_TRIANGLE;
+        pixel_aovs[pixel_ix].depth = uintBitsToFloat(0x7f800000u);
         return; // the vectors were cleared at the frame's start
     }
     Surface surface;
     Material material;
     shaded_at(ray, hit, surface, material);
     uint material_ix = load_triangle_materials(hit.triangle_ix);
-    pixel_features[pixel_ix].position_world = surface.point_world;
-    pixel_features[pixel_ix].normal_world = surface.shading;
-    pixel_features[pixel_ix].material_ix = material_ix;
-    pixel_features[pixel_ix].albedo = material.kd;
-    pixel_features[pixel_ix].depth = dot(surface.point_world - frame.eye, frame.forward);
+    pixel_aovs[pixel_ix].position_world = surface.point_world;
+    pixel_aovs[pixel_ix].normal_world = surface.shading;
+    pixel_aovs[pixel_ix].material_ix = material_ix;
+    pixel_aovs[pixel_ix].albedo = material.kd;
+    pixel_aovs[pixel_ix].depth = dot(surface.point_world - frame.eye, frame.forward);
 }

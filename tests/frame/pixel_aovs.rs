@@ -1,11 +1,11 @@
-//! Tests of features, the AOVs of the first hits: position, normal, albedo, depth, ids and costs of each pixel.
+//! Tests of AOVs, the AOVs of the first hits: position, normal, albedo, depth, ids and costs of each pixel.
 
 use glam::{Vec3, vec3};
 use kdray::{
     accel::kdtree::{BuildOptions, Traversal},
     cpu::{self, Batching},
     frame::{Crop, Integrator, Primary, Profile, RenderOptions},
-    layout::{Feature, NO_TRIANGLE},
+    layout::{NO_TRIANGLE, PixelAovs},
     render::Renderer,
     world::{FlatScene, World},
 };
@@ -16,35 +16,35 @@ use super::{
 };
 use crate::support::{meshes, scenes, world_by};
 
-fn on_device(scene: &FlatScene, options: &RenderOptions) -> Vec<Feature> {
+fn on_device(scene: &FlatScene, options: &RenderOptions) -> Vec<PixelAovs> {
     on_device_by(&world_of(scene), options)
 }
 
-fn on_device_by(world: &World, options: &RenderOptions) -> Vec<Feature> {
+fn on_device_by(world: &World, options: &RenderOptions) -> Vec<PixelAovs> {
     let context = device();
     let mut renderer = Renderer::new(context.clone(), world, options).expect("a renderer");
     renderer.draw().expect("a frame");
     assert_silent(&context);
-    renderer.features().expect("features")
+    renderer.pixel_aovs().expect("pixel_aovs")
 }
 
-fn on_cpu(scene: &FlatScene, options: &RenderOptions) -> Vec<Feature> {
+fn on_cpu(scene: &FlatScene, options: &RenderOptions) -> Vec<PixelAovs> {
     on_cpu_by(&world_of(scene), options)
 }
 
-fn on_cpu_by(world: &World, options: &RenderOptions) -> Vec<Feature> {
+fn on_cpu_by(world: &World, options: &RenderOptions) -> Vec<PixelAovs> {
     let mut renderer = cpu::Renderer::new(world, options, Batching::default());
     renderer.draw_sample();
-    renderer.features()
+    renderer.pixel_aovs()
 }
 
 fn noting(options: RenderOptions) -> RenderOptions {
-    RenderOptions { features: true, ..options }
+    RenderOptions { pixel_aovs: true, ..options }
 }
 
 /// The scene is a room of half width 5, seen from its middle along -z.
 #[test]
-fn a_wall_s_features_are_known() {
+fn a_wall_s_aovs_are_known() {
     let mut scene = scenes::empty();
     scenes::add(&mut scene, Vec::new(), scenes::BLACK);
     scenes::add(&mut scene, scenes::room(5.0), scenes::diffuse(vec3(0.25, 0.5, 0.75)));
@@ -52,36 +52,36 @@ fn a_wall_s_features_are_known() {
     scene.camera.target = vec3(0.0, 0.0, -1.0);
     let lamp = scenes::point_light(vec3(0.0, 0.0, 1.0), Vec3::ONE);
     scene.lights = vec![lamp, scenes::point_light(vec3(0.0, 0.0, -9.0), Vec3::ONE)];
-    for features in [on_device, on_cpu].map(|render| render(&scene, &noting(options(32, 24, 3)))) {
-        for (i, feature) in features.iter().enumerate() {
-            assert!((feature.depth - 5.0).abs() < 1e-5 && (feature.position_world.z + 5.0).abs() < 1e-5);
-            assert_eq!((feature.normal_world, feature.albedo), (Vec3::Z, vec3(0.25, 0.5, 0.75)));
-            assert_eq!(feature.material_ix, 1);
+    for pixel_aovs in [on_device, on_cpu].map(|render| render(&scene, &noting(options(32, 24, 3)))) {
+        for (i, aovs) in pixel_aovs.iter().enumerate() {
+            assert!((aovs.depth - 5.0).abs() < 1e-5 && (aovs.position_world.z + 5.0).abs() < 1e-5);
+            assert_eq!((aovs.normal_world, aovs.albedo), (Vec3::Z, vec3(0.25, 0.5, 0.75)));
+            assert_eq!(aovs.material_ix, 1);
             // The second lamp is behind the wall, so it gets no shadow ray.
-            assert_eq!(feature.n_rays, 2);
+            assert_eq!(aovs.n_rays, 2);
             let x = ((i % 32) as f32 + 0.5) / 16.0 - 1.0;
             let half_width = 5.0 * (45.0_f32 / 2.0).to_radians().tan() * 32.0 / 24.0;
-            assert!((feature.position_world.x - x * half_width).abs() < 1e-4);
+            assert!((aovs.position_world.x - x * half_width).abs() < 1e-4);
         }
     }
 }
 
 #[test]
-fn nothing_has_features_too() {
+fn nothing_has_aovs_too() {
     let mut scene = scenes::empty();
     scenes::add(&mut scene, Vec::new(), scenes::BLACK);
-    let nothing = Feature {
+    let nothing = PixelAovs {
         triangle_ix: NO_TRIANGLE,
         material_ix: NO_TRIANGLE,
         depth: f32::INFINITY,
         n_rays: 1,
-        ..Feature::default()
+        ..PixelAovs::default()
     };
     for primary in [Primary::Raster, Primary::Trace] {
         let options = noting(RenderOptions { primary, ..options(9, 7, 2) });
-        for mut features in [on_device, on_cpu].map(|render| render(&scene, &options)) {
-            features.iter_mut().for_each(|feature| feature.n_steps = 0); // a ray that misses may read the root
-            assert!(features == [nothing; 63], "{primary}: {:?}", features[0]);
+        for mut pixel_aovs in [on_device, on_cpu].map(|render| render(&scene, &options)) {
+            pixel_aovs.iter_mut().for_each(|aovs| aovs.n_steps = 0); // a ray that misses may read the root
+            assert!(pixel_aovs == [nothing; 63], "{primary}: {:?}", pixel_aovs[0]);
         }
     }
 }
@@ -92,10 +92,10 @@ fn device_and_cpu_agree() {
     for primary in [Primary::Raster, Primary::Trace] {
         let options = noting(RenderOptions { primary, ..options(80, 60, 4) });
         let [a, b] = [on_device, on_cpu].map(|render| render(&scene, &options));
-        let differs = |(a, b): (&Feature, &Feature)| a.triangle_ix != b.triangle_ix || a.n_rays != b.n_rays;
+        let differs = |(a, b): (&PixelAovs, &PixelAovs)| a.triangle_ix != b.triangle_ix || a.n_rays != b.n_rays;
         let n_differing = a.iter().zip(&b).filter(|pair| differs(*pair)).count();
         assert!(n_differing <= 4800 / 50, "{primary}: {n_differing}");
-        assert!(a.iter().map(|feature| feature.n_rays).max() > Some(20));
+        assert!(a.iter().map(|aovs| aovs.n_rays).max() > Some(20));
     }
 }
 
@@ -112,7 +112,7 @@ fn device_and_cpu_count_the_same_steps() {
         let (a, b) = (on_device_by(&world, &options), on_cpu_by(&on_cpu, &options));
         let n_differing = a.iter().zip(&b).filter(|(a, b)| a.n_steps != b.n_steps).count();
         assert!(n_differing <= a.len() / 20, "{traversal}: {n_differing} of {} pixels", a.len());
-        let sum = |features: &[Feature]| features.iter().map(|feature| f64::from(feature.n_steps)).sum::<f64>();
+        let sum = |pixel_aovs: &[PixelAovs]| pixel_aovs.iter().map(|aovs| f64::from(aovs.n_steps)).sum::<f64>();
         assert!((sum(&a) / sum(&b) - 1.0).abs() < 0.01, "{traversal}: {} steps, {}", sum(&a), sum(&b));
         assert!(sum(&a) > 20.0 * a.len() as f64);
     }
@@ -133,28 +133,28 @@ fn the_rays_of_the_first_sample_of_paths_are_counted() {
             let mut renderer = Renderer::new(context.clone(), &world, &options).expect("a renderer");
             renderer.set_samples_per_frame(samples_log2);
             let profile = renderer.draw_sample().expect("samples");
-            (profile, renderer.features().expect("features"))
+            (profile, renderer.pixel_aovs().expect("pixel_aovs"))
         };
         let on_cpu = |samples_log2| {
             // A batch has several pixels and is not the whole picture.
             let batching = Batching { n_pixels: 500, ..Batching::default() };
             let mut renderer = cpu::Renderer::new(&world_of_cpu, &options, batching);
             renderer.set_samples_per_frame(samples_log2);
-            (renderer.draw_sample(), renderer.features())
+            (renderer.draw_sample(), renderer.pixel_aovs())
         };
-        let [device, cpu] = [&on_device as &dyn Fn(u32) -> (Profile, Vec<Feature>), &on_cpu].map(|draw| {
+        let [device, cpu] = [&on_device as &dyn Fn(u32) -> (Profile, Vec<PixelAovs>), &on_cpu].map(|draw| {
             let (profile, of_one) = draw(0);
             let n_rays: u64 = profile.bounces.iter().map(|bounce| bounce.n_rays + bounce.n_shadow_rays).sum();
-            assert_eq!(of_one.iter().map(|feature| u64::from(feature.n_rays)).sum::<u64>(), n_rays, "{traversal}");
-            assert!(draw(2).1 == of_one, "{traversal}: the number of samples changes the features");
+            assert_eq!(of_one.iter().map(|aovs| u64::from(aovs.n_rays)).sum::<u64>(), n_rays, "{traversal}");
+            assert!(draw(2).1 == of_one, "{traversal}: the number of samples changes the pixel_aovs");
             of_one
         });
         // Sines and cosines are rounded differently, so a few paths take another way.
-        for count in [|feature: &Feature| feature.n_rays, |feature: &Feature| feature.n_steps] {
+        for count in [|aovs: &PixelAovs| aovs.n_rays, |aovs: &PixelAovs| aovs.n_steps] {
             let n_differing = device.iter().zip(&cpu).filter(|(a, b)| count(a) != count(b)).count();
             assert!(n_differing <= device.len() / 20, "{traversal}: {n_differing} of {} pixels", device.len());
         }
-        assert!(cpu.iter().all(|feature| feature.n_rays > 0) && cpu.iter().any(|feature| feature.n_rays > 4));
+        assert!(cpu.iter().all(|aovs| aovs.n_rays > 0) && cpu.iter().any(|aovs| aovs.n_rays > 4));
     }
     assert_silent(&context);
 }
@@ -167,12 +167,12 @@ fn steps_through_one_leaf_are_known() {
     let n_triangles = scene.triangles.len() as u32;
     let world = world_by(&scene, &BuildOptions { slabs: false, ..BuildOptions::default() });
     assert_eq!(world.tree().nodes().len(), 2, "the root and the place beside it");
-    for features in [on_device_by, on_cpu_by]
+    for pixel_aovs in [on_device_by, on_cpu_by]
         .map(|render| render(&world, &noting(RenderOptions { primary: Primary::Trace, ..options(40, 30, 1) })))
     {
-        let steps: std::collections::HashSet<_> = features.iter().map(|feature| feature.n_steps).collect();
+        let steps: std::collections::HashSet<_> = pixel_aovs.iter().map(|aovs| aovs.n_steps).collect();
         assert_eq!(steps, [0, 1 + n_triangles].into());
-        assert!(features.iter().all(|feature| feature.triangle_ix == NO_TRIANGLE || feature.n_steps > 0));
+        assert!(pixel_aovs.iter().all(|aovs| aovs.triangle_ix == NO_TRIANGLE || aovs.n_steps > 0));
     }
 }
 
@@ -184,8 +184,8 @@ fn rays_are_counted_as_in_the_profile() {
     let batching = Batching { n_pixels: 500, queue_capacity: 300 };
     let mut cpu = cpu::Renderer::new(&world, &options, batching);
     let profiles = [device.draw().expect("a frame"), cpu.draw_sample()];
-    for (profile, features) in profiles.iter().zip([device.features().expect("features"), cpu.features()]) {
-        let counted: u64 = features.iter().map(|feature| u64::from(feature.n_rays)).sum();
+    for (profile, pixel_aovs) in profiles.iter().zip([device.pixel_aovs().expect("pixel_aovs"), cpu.pixel_aovs()]) {
+        let counted: u64 = pixel_aovs.iter().map(|aovs| u64::from(aovs.n_rays)).sum();
         let expected: u64 = profile.bounces.iter().map(|bounce| bounce.n_rays + bounce.n_shadow_rays).sum();
         assert_eq!(counted, expected);
     }
@@ -195,17 +195,17 @@ fn rays_are_counted_as_in_the_profile() {
 fn neither_batches_nor_crops_nor_the_picture_are_changed_by_them() {
     let (scene, plain, context) = (glass_in_glass(), options(32, 24, 6), device());
     let (world, options) = (world_of(&scene), noting(plain.clone()));
-    let features = |options: &RenderOptions, capacity| {
+    let pixel_aovs = |options: &RenderOptions, capacity| {
         let renderer = Renderer::with_queue_capacity(context.clone(), &world, options, capacity);
         let mut renderer = renderer.expect("a renderer");
         renderer.draw_sample().expect("a sample");
         renderer.draw_sample().expect("a sample");
-        renderer.features().expect("features")
+        renderer.pixel_aovs().expect("pixel_aovs")
     };
-    let whole = features(&options, 100_000);
-    assert!(whole == features(&options, 300));
+    let whole = pixel_aovs(&options, 100_000);
+    assert!(whole == pixel_aovs(&options, 300));
     let crop = Crop { x0: 3, y0: 5, x1: 20, y1: 9 };
-    let part = features(&RenderOptions { crop: Some(crop), ..options.clone() }, 100_000);
+    let part = pixel_aovs(&RenderOptions { crop: Some(crop), ..options.clone() }, 100_000);
     let pixels = (5..9).flat_map(|y| (3..20).map(move |x| y * 32 + x));
     assert!(part == pixels.map(|i| whole[i]).collect::<Vec<_>>());
     for (with, without) in on_both(&scene, &options).iter().zip(&on_both(&scene, &plain)) {

@@ -1,4 +1,4 @@
-//! Features: writes the first-hit AOVs of each pixel: position, normal, albedo, depth and indices.
+//! PixelAovs: writes the first-hit AOVs of each pixel: position, normal, albedo, depth and indices.
 
 use std::sync::Arc;
 
@@ -9,17 +9,17 @@ use crate::{
 };
 
 /// The pipeline of the pass.
-pub struct Features {
+pub struct PixelAovs {
     kernel: ComputePipeline,
 }
 
-impl Features {
+impl PixelAovs {
     pub(super) fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>) -> Result<Self, GpuError> {
-        Ok(Self { kernel: kernel(context, bindings, "features", spirv!("features.comp"), &Constants::new())? })
+        Ok(Self { kernel: kernel(context, bindings, "pixel_aovs", spirv!("pixel_aovs.comp"), &Constants::new())? })
     }
 
-    /// Needs `hits` of the camera rays, and `pixel_features` whose position, normal and albedo have been cleared: a
-    /// pixel without a hit keeps these. Leaves all of `pixel_features` except the counts of rays and steps.
+    /// Needs `hits` of the camera rays, and `pixel_aovs` whose position, normal and albedo have been cleared: a
+    /// pixel without a hit keeps these. Leaves all of `pixel_aovs` except the counts of rays and steps.
     pub fn record(&self, commands: &Commands, batch: &Batch) {
         let dispatch = Dispatch::Threads([batch.n_pixels, 1, 1], [RAY_GROUP_SIZE, 1, 1]);
         commands.dispatch(&self.kernel, Some(batch.depth), batch, dispatch);
