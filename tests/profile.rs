@@ -74,7 +74,8 @@ fn the_table_has_every_pass_and_tracing_takes_all_that_find_primary_hits() {
         (0..2).for_each(|_sample| names.extend(checked_names(&on_cpu.draw_sample(), "pixel_aovs")));
     }
     let software_raster = |name: &str| name.starts_with("rasterize_") && !context.has_int64_atomics();
-    let of_paths = |name: &str| name.starts_with("path_") || ["guides", "demodulate", "edge_filter"].contains(&name);
+    let of_paths =
+        |name: &str| name.starts_with("path_") || ["auxiliary", "demodulate", "atrous_filter"].contains(&name);
     let known = Pass::all().map(Pass::name).filter(|name| !software_raster(name) && !of_paths(name));
     assert_eq!(names, known.collect::<BTreeSet<_>>());
     assert_eq!(context.validation_messages(), Vec::<String>::new());

@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// PixelAovs: one invocation per pixel of the batch writes the AOVs of its first camera ray's hit: position, normal,
+// Pixel AOVs: one invocation per pixel of the batch writes the AOVs of its first camera ray's hit: position, normal,
 // albedo, depth and the indices of the triangle and its material.
 // Reads hits and the scene; writes pixel_aovs, except n_rays and n_steps.
 #include "layout.glsl"

@@ -18,9 +18,9 @@
 #define NORMAL_VARIANCES 3.0
 
 // The light that surfaces scatter to the camera, divided by their albedo. radiance: of the pixel.
-vec3 light_on(vec3 radiance, Guide guide) {
-    vec3 scattered = max(radiance - guide.seen, 0.0);
-    return mix(vec3(0.0), scattered / max(guide.albedo, LEAST_ALBEDO), greaterThan(guide.albedo, vec3(LEAST_ALBEDO)));
+vec3 light_on(vec3 radiance, Auxiliary aux) {
+    vec3 scattered = max(radiance - aux.seen, 0.0);
+    return mix(vec3(0.0), scattered / max(aux.albedo, LEAST_ALBEDO), greaterThan(aux.albedo, vec3(LEAST_ALBEDO)));
 }
 
 // A vector of unit length, or 0 if the vector has none.
@@ -31,7 +31,7 @@ vec3 direction_of(vec3 vector) {
 
 // How much the light of pixel b tells of that on the surface of pixel a, from what both show. Pixels of low albedo tell
 // less, because the division by the albedo increases their noise.
-float surface_weight(Guide a, Guide b) {
+float surface_weight(Auxiliary a, Auxiliary b) {
     if (a.n_hits == 0u || b.n_hits == 0u) return 0.0;
     vec3 apart = a.normal_world - b.normal_world;
     float own_variance = max(1.0 - dot(a.normal_world, a.normal_world), 0.0);

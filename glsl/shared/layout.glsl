@@ -858,7 +858,7 @@ struct PixelAovs {
 // - `seen`: mean of the light that camera rays meet: emission, lamps and what is beyond the scene.
 // - `seen_squared`: mean of the squared luminance of this light.
 // - `n_samples`: number of samples of these means.
-struct Guide {
+struct Auxiliary {
     vec3 position_world;
     uint n_hits;
     vec3 normal_world;
@@ -1057,7 +1057,7 @@ struct FalseColor {
     float brightest;
 };
 
-// Push constants of `edge_filter.comp`: the number of the filter's step, from 0 to `EDGE_STEPS - 1`.
+// Push constants of `atrous_filter.comp`: the number of the filter's step, from 0 to `EDGE_STEPS - 1`.
 struct EdgeStep {
     uint step_ix;
 };
@@ -1309,8 +1309,8 @@ struct GridSort {
 // paths that are alive: the first one at bounces of even depth, the second one at those of odd depth. The third list
 // has the paths whose shadow rays are to be traced.
 #define BIND_LIVE_PATHS 35u
-// One `Guide` for each pixel.
-#define BIND_PIXEL_GUIDES 36u
+// One `Auxiliary` for each pixel.
+#define BIND_PIXEL_AUX 36u
 // A vec4 for each path: its radiance when the last layer of light was complete. Empty unless the picture has layers of
 // light.
 #define BIND_PATH_SNAPSHOTS 37u

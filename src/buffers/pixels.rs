@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::{
     frame::{Denoise, Integrator, Primary, RenderOptions},
     gpu::{Buffer, BufferUse, Context, GpuError, Target, TargetKind},
-    layout::{Frame, Guide, LIGHT_LAYERS, PixelAovs, SAMPLE_BLOCK_LOG2},
+    layout::{Auxiliary, Frame, LIGHT_LAYERS, PixelAovs, SAMPLE_BLOCK_LOG2},
 };
 
 /// Sums of samples for which each pixel of a frame of paths has room at least. They are enough for 4096 samples.
@@ -33,7 +33,7 @@ pub struct Pixels {
     /// The first-hit AOVs. Empty unless the options request them.
     pub pixel_aovs: Buffer<PixelAovs>,
     /// What the noise filter `edge` knows of the pixels. Empty unless it runs.
-    pub pixel_guides: Buffer<Guide>,
+    pub pixel_aux: Buffer<Auxiliary>,
     /// The index of the nearest triangle at each pixel of the whole picture, of which only the window's part is
     /// drawn. If the options do not use the graphics pipeline, this is one pixel that no kernel reads.
     pub triangle_ids: Arc<Target>,
@@ -53,7 +53,7 @@ impl Pixels {
         let size = (frame.picture_width, frame.picture_height);
         let storage = BufferUse::Storage;
         let (pixel_aovs, software_raster) = (options.pixel_aovs, options.primary == Primary::SoftwareRaster);
-        let n_guides = if options.noise_filter() == Denoise::Edge { n_pixels } else { 0 };
+        let n_auxiliary = if options.noise_filter() == Denoise::Edge { n_pixels } else { 0 };
         let n_filtered = n_filtered(frame, options);
         let (triangle_ids, depth) = if uses_graphics_pipeline(options) {
             let target = |name, kind| Target::new(context, name, kind, size).map(Arc::new);
@@ -70,7 +70,7 @@ impl Pixels {
             pixel_display: Buffer::new(context, "pixel_display", n_pixels, storage)?,
             pixel_nearest: Buffer::new(context, "pixel_nearest", if software_raster { n_pixels } else { 0 }, storage)?,
             pixel_aovs: Buffer::new(context, "pixel_aovs", if pixel_aovs { n_pixels } else { 0 }, storage)?,
-            pixel_guides: Buffer::new(context, "pixel_guides", n_guides, storage)?,
+            pixel_aux: Buffer::new(context, "pixel_aux", n_auxiliary, storage)?,
             triangle_ids,
             depth,
             n_layers: n_layers(options),
@@ -108,7 +108,7 @@ impl Pixels {
             && self.pixel_nearest.is_empty() == (options.primary != Primary::SoftwareRaster)
             && self.pixel_filtered.is_some() == (n_filtered(frame, options) > 0)
             && self.pixel_filtered.as_ref().map_or(0, Buffer::len) >= n_filtered(frame, options)
-            && self.pixel_guides.is_empty() == (options.noise_filter() != Denoise::Edge)
+            && self.pixel_aux.is_empty() == (options.noise_filter() != Denoise::Edge)
     }
 
     /// The radiance after the noise filter, or without it if there is none.

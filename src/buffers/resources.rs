@@ -52,7 +52,7 @@ const BINDINGS_OF_PATHS: [u32; 6] = [
     layout::BIND_PATH_STATES,
     layout::BIND_SHADOW_RAYS,
     layout::BIND_LIVE_PATHS,
-    layout::BIND_PIXEL_GUIDES,
+    layout::BIND_PIXEL_AUX,
     layout::BIND_PATH_SNAPSHOTS,
     layout::BIND_NOISE_TILES,
 ];
@@ -206,7 +206,7 @@ impl Resources {
                 (layout::BIND_PATH_STATES, Binding::Buffer(paths.path_states.any())),
                 (layout::BIND_SHADOW_RAYS, Binding::Buffer(paths.shadow_rays.any())),
                 (layout::BIND_LIVE_PATHS, Binding::Buffer(paths.live_paths.any())),
-                (layout::BIND_PIXEL_GUIDES, Binding::Buffer(pixels.pixel_guides.any())),
+                (layout::BIND_PIXEL_AUX, Binding::Buffer(pixels.pixel_aux.any())),
                 (layout::BIND_PATH_SNAPSHOTS, Binding::Buffer(paths.path_snapshots.any())),
                 (layout::BIND_NOISE_TILES, Binding::Buffer(paths.noise_tiles.any())),
             ],

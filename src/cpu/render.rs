@@ -10,14 +10,14 @@ use crate::{
         RenderOptions, opaque, plan::passes,
     },
     layout::{
-        Batch, Bounce, EdgeStep, Frame, Guide, Hit, LIGHT_LAYERS, MOST_SAMPLES_LOG2, Material, PathRay, PixelAovs,
+        Auxiliary, Batch, Bounce, EdgeStep, Frame, Hit, LIGHT_LAYERS, MOST_SAMPLES_LOG2, Material, PathRay, PixelAovs,
         SCAN_GROUP_SIZE,
     },
     reference::{
-        accumulate,
+        accumulate, atrous_filter, auxiliary,
         compact::{self, Parents},
         counting::costs,
-        demodulate, denoise, edge_filter, guides,
+        demodulate, denoise,
         inputs::KernelInputs,
         path_accumulate, path_resolve, pixel_aovs, primary_hit, resolve,
         shade::{self, LitRays},
@@ -69,7 +69,7 @@ pub struct Renderer {
     /// Empty unless the options request AOVs.
     pixel_aovs: Vec<PixelAovs>,
     /// Empty unless the noise filter `edge` runs.
-    pixel_guides: Vec<Guide>,
+    pixel_aux: Vec<Auxiliary>,
     /// The next step of that filter.
     edge_step: u32,
     queue: Queue,
@@ -115,7 +115,7 @@ impl Renderer {
             pixel_filtered: Vec::new(),
             pixel_display: vec![[0; 4]; n_pixels],
             pixel_aovs: vec![PixelAovs::default(); if options.pixel_aovs { n_pixels } else { 0 }],
-            pixel_guides: vec![Guide::default(); if options.noise_filter() == Denoise::Edge { n_pixels } else { 0 }],
+            pixel_aux: vec![Auxiliary::default(); if options.noise_filter() == Denoise::Edge { n_pixels } else { 0 }],
             edge_step: 0,
             queue: Queue::default(),
             paths: Paths::default(),
@@ -251,7 +251,7 @@ impl Renderer {
     /// # Panics
     /// The options do not request AOVs.
     pub fn pixel_aovs(&self) -> Vec<PixelAovs> {
-        assert!(self.options.pixel_aovs, "the options ask for pixel_aovs");
+        assert!(self.options.pixel_aovs, "the options ask for AOVs");
         self.options.window().part(&self.pixel_aovs, &self.options.crop_or_whole())
     }
 
@@ -345,9 +345,9 @@ impl Renderer {
             Pass::PathLayers => self.path_layers(depth),
             Pass::PathResolve => self.path_resolve(),
             Pass::PathAccumulate => self.path_accumulate(),
-            Pass::Guides => self.guides(),
+            Pass::Auxiliary => self.auxiliary(),
             Pass::Demodulate => self.demodulate(),
-            Pass::EdgeFilter => self.edge_filter(),
+            Pass::AtrousFilter => self.atrous_filter(),
             Pass::RasterizeTriangles | Pass::RasterizeBlocks | Pass::FalseColor => {
                 unreachable!("the CPU's plan has no `{}`", pass.name())
             }
@@ -386,25 +386,25 @@ impl Renderer {
         self.clock.time(Pass::PathScatter, Some(depth), || paths.scatter(&inputs, batch, queue));
     }
 
-    fn guides(&mut self) {
-        let Self { world, frame, batch, paths, queue, path_materials, pixel_guides, .. } = self;
+    fn auxiliary(&mut self) {
+        let Self { world, frame, batch, paths, queue, path_materials, pixel_aux, .. } = self;
         let inputs = KernelInputs::new(world, frame).of_paths(path_materials, world.emitters());
-        let guides = || guides::guides(&inputs, batch, &queue.hits, &paths.states, pixel_guides);
-        self.clock.time(Pass::Guides, Some(0), guides);
+        let aux = || auxiliary::auxiliary(&inputs, batch, &queue.hits, &paths.states, pixel_aux);
+        self.clock.time(Pass::Auxiliary, Some(0), aux);
     }
 
     fn demodulate(&mut self) {
-        let Self { frame, pixel_radiance, pixel_guides, pixel_filtered, .. } = self;
+        let Self { frame, pixel_radiance, pixel_aux, pixel_filtered, .. } = self;
         pixel_filtered.resize(2 * pixel_radiance.len(), [0.0; 4]);
-        let demodulate = || demodulate::demodulate(frame, pixel_radiance, pixel_guides, pixel_filtered);
+        let demodulate = || demodulate::demodulate(frame, pixel_radiance, pixel_aux, pixel_filtered);
         self.clock.time(Pass::Demodulate, None, demodulate);
         self.edge_step = 0;
     }
 
-    fn edge_filter(&mut self) {
-        let (frame, guides, filtered) = (&self.frame, &self.pixel_guides, &mut self.pixel_filtered);
+    fn atrous_filter(&mut self) {
+        let (frame, aux, filtered) = (&self.frame, &self.pixel_aux, &mut self.pixel_filtered);
         let step = EdgeStep { step_ix: self.edge_step };
-        self.clock.time(Pass::EdgeFilter, None, || edge_filter::edge_filter(frame, &step, guides, filtered));
+        self.clock.time(Pass::AtrousFilter, None, || atrous_filter::atrous_filter(frame, &step, aux, filtered));
         self.edge_step += 1;
     }
 

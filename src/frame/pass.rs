@@ -4,8 +4,8 @@ use super::resource::{
     Resource,
     Resource::{
         Bounces, ChildKinds, Counters, FirstChildren, Hits, LightVisibility, LivePaths, PathSnapshots, PathStates,
-        PixelAccumulated, PixelAovs, PixelDisplay, PixelFiltered, PixelGuides, PixelNearest, PixelRadiance,
-        RasterGroups, RayRadiance, Rays, ScanBlocks, ShadowRays, SuspendedRays, TriangleIds,
+        PixelAccumulated, PixelAovs, PixelAux, PixelDisplay, PixelFiltered, PixelNearest, PixelRadiance, RasterGroups,
+        RayRadiance, Rays, ScanBlocks, ShadowRays, SuspendedRays, TriangleIds,
     },
 };
 
@@ -34,8 +34,8 @@ pub enum Scope {
     /// Once for each batch, for the rays of all its bounces together.
     Batch,
     /// Once for a bounce of a batch, in each bounce that has the pass. Not all bounces have it: `primary_hit`,
-    /// `pixel_aovs` and `guides` run for bounce 0 only, and the last bounce has no compaction. `path_layers` runs for
-    /// the bounces 0 and 1, and once for all others together.
+    /// `pixel_aovs` and `auxiliary` run for bounce 0 only, and the last bounce has no compaction. `path_layers` runs
+    /// for the bounces 0 and 1, and once for all others together.
     Bounce,
 }
 
@@ -71,7 +71,7 @@ pub enum Pass {
     Accumulate,
     /// Smooths pixels that differ much from their neighbours.
     Denoise,
-    /// Displays a AOVs in place of the picture.
+    /// Displays an AOV in place of the picture.
     FalseColor,
     /// Encodes radiance for display.
     Tonemap,
@@ -90,11 +90,11 @@ pub enum Pass {
     /// Turns the sum of the frame's samples into the mean of all samples.
     PathAccumulate,
     /// Adds the first hits of paths to what the noise filter `edge` knows of their pixels.
-    Guides,
+    Auxiliary,
     /// Divides the light of each pixel by the albedo of what it shows, and estimates its variance.
     Demodulate,
     /// Blurs the light within surfaces: one step of the noise filter `edge`.
-    EdgeFilter,
+    AtrousFilter,
 }
 
 /// The properties of a pass, the same in every frame.
@@ -343,13 +343,13 @@ const TABLE: [Info; 26] = [
         indirect: None,
     },
     Info {
-        pass: Pass::Guides,
-        name: "guides",
+        pass: Pass::Auxiliary,
+        name: "auxiliary",
         role: Role::Image,
         scope: Scope::Bounce,
         color: [50, 150, 110],
-        reads: &[Hits, PathStates, PixelGuides],
-        writes: &[PixelGuides],
+        reads: &[Hits, PathStates, PixelAux],
+        writes: &[PixelAux],
         indirect: None,
     },
     Info {
@@ -358,17 +358,17 @@ const TABLE: [Info; 26] = [
         role: Role::Image,
         scope: Scope::Frame,
         color: [70, 200, 170],
-        reads: &[PixelRadiance, PixelGuides],
+        reads: &[PixelRadiance, PixelAux],
         writes: &[PixelFiltered],
         indirect: None,
     },
     Info {
-        pass: Pass::EdgeFilter,
-        name: "edge_filter",
+        pass: Pass::AtrousFilter,
+        name: "atrous_filter",
         role: Role::Image,
         scope: Scope::Frame,
         color: [80, 170, 190],
-        reads: &[PixelGuides, PixelFiltered],
+        reads: &[PixelAux, PixelFiltered],
         writes: &[PixelFiltered],
         indirect: None,
     },

@@ -9,7 +9,7 @@ use super::{
         Resource,
         Resource::{
             Bounces, ChildKinds, Counters, FirstChildren, Hits, LightVisibility, LivePaths, PathSnapshots, PathStates,
-            PixelAccumulated, PixelAovs, PixelFiltered, PixelGuides, PixelNearest, PixelRadiance, RasterGroups,
+            PixelAccumulated, PixelAovs, PixelAux, PixelFiltered, PixelNearest, PixelRadiance, RasterGroups,
             RayRadiance, Rays, ScanBlocks, ShadowRays,
         },
     },
@@ -63,7 +63,7 @@ pub struct FrameKind {
     pub pixel_aovs: bool,
     /// Whether the picture has layers of light. Only frames that trace paths have them.
     pub light_layers: bool,
-    /// Whether hits are lit. They are not if the frame displays a AOVs, such as depth, that depends on the hits of
+    /// Whether hits are lit. They are not if the frame displays an AOV, such as depth, that depends on the hits of
     /// primary rays only.
     pub is_lit: bool,
     /// Whether the scene has lights that cast shadows.
@@ -72,13 +72,13 @@ pub struct FrameKind {
     pub adds_samples: bool,
     /// The noise filter.
     pub denoise: Denoise,
-    /// Whether a AOVs is displayed in place of the picture.
+    /// Whether an AOV is displayed in place of the picture.
     pub shows_aovs: bool,
 }
 
 impl FrameKind {
     /// Returns the kind of a frame with the most passes that frames of these options can have: the frame is lit, and
-    /// its sample is added to earlier ones. It displays the picture. To display a AOVs takes no more passes.
+    /// its sample is added to earlier ones. It displays the picture. To display an AOV takes no more passes.
     pub fn new(options: &RenderOptions, n_lights: u32) -> Self {
         Self {
             integrator: options.integrator,
@@ -201,7 +201,7 @@ fn bounce_of_paths(kind: &FrameKind, depth: u32) -> Section {
         ]);
     }
     if depth == 0 && kind.is_lit && kind.denoise == Denoise::Edge {
-        bounce.extend([Step::Run(Pass::Guides), barrier(Touch::Write, Touch::Update, &[PixelGuides])]);
+        bounce.extend([Step::Run(Pass::Auxiliary), barrier(Touch::Write, Touch::Update, &[PixelAux])]);
     }
     // The last layer is complete after the last bounce.
     if depth + 1 < LIGHT_LAYERS && kind.is_lit && kind.light_layers {
@@ -291,7 +291,7 @@ fn samples(kind: &FrameKind) -> Section {
     vec![Step::Run(Pass::Accumulate), barrier(Touch::Write, Touch::Read, &[PixelAccumulated, PixelRadiance])]
 }
 
-/// Returns the steps that turn the mean of all samples into the displayed picture, or display a AOVs in its place.
+/// Returns the steps that turn the mean of all samples into the displayed picture, or display an AOV in its place.
 pub fn display(kind: &FrameKind) -> Section {
     let mut display = Section::new();
     if kind.is_lit {
@@ -307,7 +307,7 @@ fn noise_filter(denoise: Denoise) -> Section {
         Denoise::Off => Section::new(),
         Denoise::Paper { .. } => vec![Step::Run(Pass::Denoise), barrier(Touch::Write, Touch::Read, &[PixelFiltered])],
         Denoise::Edge => {
-            let steps = std::iter::repeat_n(Pass::EdgeFilter, EDGE_STEPS as usize);
+            let steps = std::iter::repeat_n(Pass::AtrousFilter, EDGE_STEPS as usize);
             let passes = std::iter::once(Pass::Demodulate).chain(steps);
             passes.flat_map(|pass| [Step::Run(pass), barrier(Touch::Write, Touch::Update, &[PixelFiltered])]).collect()
         }

@@ -36,7 +36,7 @@ pub enum Resource {
     /// What each pixel shows, and what its rays cost.
     PixelAovs,
     /// What the noise filter `edge` knows of each pixel beside its colour.
-    PixelGuides,
+    PixelAux,
     /// Index of the triangle that the graphics pipeline found in each pixel.
     TriangleIds,
     /// The nearest triangle in each pixel and its distance, as found by the compute kernels that rasterize.
@@ -75,7 +75,7 @@ impl Resource {
         Self::PixelFiltered,
         Self::PixelDisplay,
         Self::PixelAovs,
-        Self::PixelGuides,
+        Self::PixelAux,
         Self::TriangleIds,
         Self::PixelNearest,
         Self::RasterGroups,
@@ -103,7 +103,7 @@ impl Resource {
             Self::PixelFiltered => layout::BIND_PIXEL_FILTERED,
             Self::PixelDisplay => layout::BIND_PIXEL_DISPLAY,
             Self::PixelAovs => layout::BIND_PIXEL_AOVS,
-            Self::PixelGuides => layout::BIND_PIXEL_GUIDES,
+            Self::PixelAux => layout::BIND_PIXEL_AUX,
             Self::TriangleIds => layout::BIND_TRIANGLE_IDS,
             Self::PixelNearest => layout::BIND_PIXEL_NEAREST,
             Self::RasterGroups => layout::BIND_RASTER_GROUPS,

@@ -2,7 +2,7 @@
 
 use crate::layout;
 
-/// A view: the picture, or a AOVs of it in false colours.
+/// A view: the picture, or an AOV of it in false colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum View {
     /// The picture.

@@ -41,7 +41,7 @@ mod tests {
             BIND_HITS | BIND_CAST_HITS => Some("Hit"),
             BIND_CAST_RAYS => Some("Ray"),
             BIND_PIXEL_AOVS => Some("PixelAovs"),
-            BIND_PIXEL_GUIDES => Some("Guide"),
+            BIND_PIXEL_AUX => Some("Auxiliary"),
             BIND_PATH_STATES => Some("PathState"),
             BIND_SHADOW_RAYS => Some("ShadowRay"),
             BIND_COUNTERS => Some("Counters"),
@@ -60,7 +60,7 @@ mod tests {
         match shader {
             cast if cast.starts_with("cast_") => "CastBatch",
             "driver.rgen" => "DriverCast",
-            "edge_filter.comp" => "EdgeStep",
+            "atrous_filter.comp" => "EdgeStep",
             "false_color.comp" => "FalseColor",
             "present.frag" => "Present",
             "grid_sort_count.comp" | "grid_sort_scatter.comp" => "GridSort",

@@ -19,7 +19,7 @@ impl Demodulate {
         Ok(Self { kernel: kernel(context, bindings, "demodulate", spirv!("demodulate.comp"), &Constants::new())? })
     }
 
-    /// Needs `pixel_radiance` and `pixel_guides`. Leaves the second half of `pixel_filtered`.
+    /// Needs `pixel_radiance` and `pixel_aux`. Leaves the second half of `pixel_filtered`.
     pub fn record(&self, commands: &Commands, resources: &Resources) {
         commands.dispatch(&self.kernel, None, &Batch::default(), resources.pixel_dispatch());
     }

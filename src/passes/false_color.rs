@@ -1,4 +1,4 @@
-//! False colour: displays a AOVs of each pixel in place of the picture.
+//! False colour: displays an AOV of each pixel in place of the picture.
 
 use std::sync::Arc;
 

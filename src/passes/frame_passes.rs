@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{
-    Demodulate, Denoise, EdgeFilter, FalseColor, Guides, Inputs, Passes, PathAccumulate, PathBegin, PathCompact,
+    AtrousFilter, Auxiliary, Demodulate, Denoise, FalseColor, Inputs, Passes, PathAccumulate, PathBegin, PathCompact,
     PathLayers, PathResolve, PathScatter, PathTrace, PixelAovs, Tonemap, record::record_steps,
 };
 use crate::{
@@ -66,17 +66,17 @@ impl FramePasses {
 
 /// The passes of the noise filter `edge`.
 pub struct EdgePasses {
-    pub guides: Guides,
+    pub auxiliary: Auxiliary,
     pub demodulate: Demodulate,
-    pub edge_filter: EdgeFilter,
+    pub atrous_filter: AtrousFilter,
 }
 
 impl EdgePasses {
     fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>) -> Result<Self, GpuError> {
         Ok(Self {
-            guides: Guides::new(context, bindings)?,
+            auxiliary: Auxiliary::new(context, bindings)?,
             demodulate: Demodulate::new(context, bindings)?,
-            edge_filter: EdgeFilter::new(context, bindings)?,
+            atrous_filter: AtrousFilter::new(context, bindings)?,
         })
     }
 }
@@ -170,9 +170,9 @@ impl PathPasses {
             Pass::PathAccumulate => self.path_accumulate.record(commands, resources),
             Pass::PixelAovs => self.pixel_aovs.record(commands, batch),
             Pass::Denoise => self.denoise.record(commands, resources),
-            Pass::Guides => self.edge.guides.record(commands, batch),
+            Pass::Auxiliary => self.edge.auxiliary.record(commands, batch),
             Pass::Demodulate => self.edge.demodulate.record(commands, resources),
-            Pass::EdgeFilter => self.edge.edge_filter.record(commands, resources, nth),
+            Pass::AtrousFilter => self.edge.atrous_filter.record(commands, resources, nth),
             Pass::FalseColor => self.false_color.record(commands, resources, inputs.displayed_aovs()),
             Pass::Tonemap => self.tonemap.record(commands, resources),
             _ => panic!("a frame of paths has no `{}`", pass.name()),

@@ -29,15 +29,15 @@ use crate::{
 };
 
 mod accumulate;
+mod atrous_filter;
+mod auxiliary;
 mod cast;
 mod compact;
 mod demodulate;
 mod denoise;
-mod edge_filter;
 mod false_color;
 mod frame_passes;
 pub mod grid;
-mod guides;
 mod path_accumulate;
 mod path_begin;
 mod path_compact;
@@ -61,14 +61,14 @@ mod visibility;
 
 pub use self::{
     accumulate::Accumulate,
+    atrous_filter::AtrousFilter,
+    auxiliary::Auxiliary,
     cast::Cast,
     compact::Compact,
     demodulate::Demodulate,
     denoise::Denoise,
-    edge_filter::EdgeFilter,
     false_color::FalseColor,
     frame_passes::{EdgePasses, FramePasses, PathPasses},
-    guides::Guides,
     path_accumulate::PathAccumulate,
     path_begin::PathBegin,
     path_compact::PathCompact,

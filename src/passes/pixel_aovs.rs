@@ -1,4 +1,4 @@
-//! PixelAovs: writes the first-hit AOVs of each pixel: position, normal, albedo, depth and indices.
+//! Pixel AOVs: writes the first-hit AOVs of each pixel: position, normal, albedo, depth and indices.
 
 use std::sync::Arc;
 

@@ -24,7 +24,7 @@ impl Inputs {
     /// # Panics
     /// There is none.
     pub(super) fn displayed_aovs(&self) -> &FalseColor {
-        self.false_color.as_ref().expect("a aovs is displayed")
+        self.false_color.as_ref().expect("an AOV is displayed")
     }
 }
 

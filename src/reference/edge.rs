@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::noise::luminance_of;
-use crate::layout::Guide;
+use crate::layout::Auxiliary;
 
 /// The albedo below which a colour of a surface counts as black.
 pub const LEAST_ALBEDO: f32 = 1e-4;
@@ -16,15 +16,15 @@ const NORMAL_DISTANCE: f32 = 0.0625;
 const NORMAL_VARIANCES: f32 = 3.0;
 
 /// The light that surfaces scatter to the camera, divided by their albedo. `radiance`: of the pixel.
-pub fn light_on(radiance: Vec3, guide: &Guide) -> Vec3 {
-    let scattered = (radiance - guide.seen).max(Vec3::ZERO);
-    let light = scattered / guide.albedo.max(Vec3::splat(LEAST_ALBEDO));
-    Vec3::select(guide.albedo.cmpgt(Vec3::splat(LEAST_ALBEDO)), light, Vec3::ZERO)
+pub fn light_on(radiance: Vec3, aux: &Auxiliary) -> Vec3 {
+    let scattered = (radiance - aux.seen).max(Vec3::ZERO);
+    let light = scattered / aux.albedo.max(Vec3::splat(LEAST_ALBEDO));
+    Vec3::select(aux.albedo.cmpgt(Vec3::splat(LEAST_ALBEDO)), light, Vec3::ZERO)
 }
 
 /// How much the light of pixel `b` tells of that on the surface of pixel `a`, from what both show. Pixels of low albedo
 /// tell less, because the division by the albedo increases their noise.
-pub fn surface_weight(a: &Guide, b: &Guide) -> f32 {
+pub fn surface_weight(a: &Auxiliary, b: &Auxiliary) -> f32 {
     if a.n_hits == 0 || b.n_hits == 0 {
         return 0.0;
     }

@@ -8,8 +8,8 @@
 //! not depend on the number of threads.
 //!
 //! ```text
-//! passes      primary_hit, trace, AOVs, compact, shadow, shade, resolve, accumulate, denoise, false_color,
-//!             tonemap, cast; path_* and guides; demodulate and edge_filter; visibility, for which the device
+//! passes      primary_hit, trace, pixel_aovs, compact, shadow, shade, resolve, accumulate, denoise, false_color,
+//!             tonemap, cast; path_* and auxiliary; demodulate and atrous_filter; visibility, for which the device
 //!             rasterizes
 //! traversal   traverser: one ray by any algorithm
 //!               kdtree, leaf, slab, kd_boxes, ropes, brute and the pending_* of each algorithm; grid; candidate
@@ -24,6 +24,8 @@
 
 pub mod accumulate;
 pub mod alpha_test;
+pub mod atrous_filter;
+pub mod auxiliary;
 pub mod brute;
 pub mod bsdf;
 pub mod camera;
@@ -38,12 +40,10 @@ pub mod demodulate;
 pub mod denoise;
 pub mod display;
 pub mod edge;
-pub mod edge_filter;
 pub mod emitters;
 pub mod false_color;
 pub mod fresnel;
 pub mod grid;
-pub mod guides;
 pub mod inputs;
 pub mod kd_boxes;
 pub mod kdtree;

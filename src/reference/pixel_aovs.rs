@@ -1,4 +1,4 @@
-//! PixelAovs: the first-hit AOVs of each pixel (position, normal, albedo, depth and the indices of the triangle and
+//! Pixel AOVs: the first-hit AOVs of each pixel (position, normal, albedo, depth and the indices of the triangle and
 //! its material). Twin of `pixel_aovs.comp`.
 
 use super::{inputs::KernelInputs, maps::shaded_at};

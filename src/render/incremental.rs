@@ -282,7 +282,7 @@ impl Renderer {
         Ok(PartialSample { parts: parts.into(), n_done: 0, sample_ix, begun_at: None })
     }
 
-    /// Sets the view that the next sample and [`Renderer::show`] display: the picture, or a AOVs in its place. A
+    /// Sets the view that the next sample and [`Renderer::show`] display: the picture, or an AOV in its place. A
     /// AOVs is displayed only if the options ask for AOVs. `brightest`: in views of costs and of numbers of
     /// rays, the value that is displayed brightest; in the view of depth, the depth that is half as bright as
     /// depth 0.

@@ -283,7 +283,7 @@ impl Renderer {
     /// # Errors
     /// A copy fails.
     pub fn pixel_aovs(&self) -> Result<Vec<PixelAovs>, GpuError> {
-        assert!(self.in_use.pixel_aovs, "the options ask for pixel_aovs");
+        assert!(self.in_use.pixel_aovs, "the options ask for AOVs");
         let pixel_aovs = self.resources.pixels.pixel_aovs.download_first(self.resources.n_pixels())?;
         Ok(self.in_use.window().part(pixel_aovs, &self.in_use.crop_or_whole()))
     }

@@ -191,7 +191,7 @@ fn views_of_first_hits_trace_primary_rays_only() {
         assert_eq!(renderer.pixel_aovs().expect("pixel_aovs"), pixel_aovs, "{view} sums over all rays");
         for pixel in [uvec2(0, 0), uvec2(31, 0), uvec2(7, 23)] {
             let expected = pixel_aovs[(pixel.y * 32 + pixel.x) as usize];
-            assert_eq!(renderer.aovs_at(pixel).expect("a aovs"), Some(expected), "{pixel}");
+            assert_eq!(renderer.aovs_at(pixel).expect("an AOV"), Some(expected), "{pixel}");
         }
     }
     assert_silent(&context);

@@ -6,14 +6,14 @@
 mod support;
 
 mod accumulate;
+mod atrous_filter;
+mod auxiliary;
 mod barriers;
 mod compact;
 mod comparers;
 mod demodulate;
 mod denoise;
-mod edge_filter;
 mod false_color;
-mod guides;
 mod path_accumulate;
 mod path_begin;
 mod path_compact;

@@ -1,11 +1,11 @@
 //! Edge filter: one step of the noise filter `edge`, an edge-avoiding à-trous wavelet transform that is guided by
-//! variance. Twin of `edge_filter.comp`, which names the papers.
+//! variance. Twin of `atrous_filter.comp`, which names the papers.
 
 use glam::{Vec4, Vec4Swizzles};
 use rayon::prelude::*;
 
 use super::{edge::surface_weight, noise::luminance_of};
-use crate::layout::{EDGE_STEPS, EdgeStep, Frame, Guide};
+use crate::layout::{Auxiliary, EDGE_STEPS, EdgeStep, Frame};
 
 /// How many standard deviations of noise the luminances of two pixels of one sample may differ until the weight has
 /// fallen to 1 / e.
@@ -28,20 +28,20 @@ struct Source<'a> {
     /// Standard deviations of noise that the luminances of two pixels may differ.
     deviations: f32,
     step_ix: u32,
-    guides: &'a [Guide],
+    aux: &'a [Auxiliary],
     light: &'a [[f32; 4]],
 }
 
 /// Takes a step. `pixel_filtered`: two halves, each as long as the window has pixels. Even steps read the second half
 /// and write the first one.
-pub fn edge_filter(frame: &Frame, step: &EdgeStep, pixel_guides: &[Guide], pixel_filtered: &mut [[f32; 4]]) {
+pub fn atrous_filter(frame: &Frame, step: &EdgeStep, pixel_aux: &[Auxiliary], pixel_filtered: &mut [[f32; 4]]) {
     let width = frame.width as usize;
     let n_pixels = width * frame.height as usize;
     let (first, second) = pixel_filtered[..2 * n_pixels].split_at_mut(n_pixels);
     let (from, to) = if step.step_ix.is_multiple_of(2) { (second, first) } else { (first, second) };
     let size = [frame.width as i32, frame.height as i32];
     let deviations = DEVIATIONS * (frame.n_samples as f32).powf(DEVIATIONS_POWER);
-    let source = Source { size, deviations, step_ix: step.step_ix, guides: pixel_guides, light: from };
+    let source = Source { size, deviations, step_ix: step.step_ix, aux: pixel_aux, light: from };
     to.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
         for (x, light) in row.iter_mut().enumerate() {
             *light = source.filtered(x as i32, y as i32).to_array();
@@ -60,8 +60,8 @@ impl Source<'_> {
         if self.step_ix + 1 < EDGE_STEPS {
             return light;
         }
-        let guide = &self.guides[self.index_of(x, y).expect("a pixel of the window")];
-        (light.xyz() * guide.albedo + guide.seen).extend(1.0)
+        let aux = &self.aux[self.index_of(x, y).expect("a pixel of the window")];
+        (light.xyz() * aux.albedo + aux.seen).extend(1.0)
     }
 
     /// Returns the pixel's index, or none outside of the window.
@@ -74,7 +74,7 @@ impl Source<'_> {
     fn variance_at(&self, x: i32, y: i32) -> f32 {
         let (mut weights, mut variance) = (0.0, 0.0);
         for (dx, dy) in (-1..=1_i32).flat_map(|dy| (-1..=1_i32).map(move |dx| (dx, dy))) {
-            let Some(other_ix) = self.index_of(x + dx, y + dy).filter(|&ix| self.guides[ix].n_hits > 0) else {
+            let Some(other_ix) = self.index_of(x + dx, y + dy).filter(|&ix| self.aux[ix].n_hits > 0) else {
                 continue;
             };
             let weight = ((2 - dx.abs()) * (2 - dy.abs())) as f32;
@@ -87,17 +87,17 @@ impl Source<'_> {
     /// Returns the mean of the light, and the variance of its luminance.
     fn mean_around(&self, x: i32, y: i32) -> Vec4 {
         let pixel_ix = self.index_of(x, y).expect("a pixel of the window");
-        let (guide, light) = (&self.guides[pixel_ix], Vec4::from(self.light[pixel_ix]));
-        let deviations = self.deviations * mix(1.0, GLOSSY_DEVIATIONS, guide.gloss);
+        let (aux, light) = (&self.aux[pixel_ix], Vec4::from(self.light[pixel_ix]));
+        let deviations = self.deviations * mix(1.0, GLOSSY_DEVIATIONS, aux.gloss);
         let variance = self.variance_at(x, y);
-        let most = mix(MOST_OF_OTHER, 1.0, guide.gloss) * variance;
+        let most = mix(MOST_OF_OTHER, 1.0, aux.gloss) * variance;
         let luminance = luminance_of(light.xyz());
         let (mut weights, mut sum) = (0.0, Vec4::ZERO);
         for (dx, dy) in (-2..=2_i32).flat_map(|dy| (-2..=2_i32).map(move |dx| (dx, dy))) {
             let Some(other_ix) = self.index_of(x + (dx << self.step_ix), y + (dy << self.step_ix)) else { continue };
             let found = Vec4::from(self.light[other_ix]);
             let spline = SPLINE[dx.unsigned_abs() as usize] * SPLINE[dy.unsigned_abs() as usize];
-            let mut weight = spline * surface_weight(guide, &self.guides[other_ix]);
+            let mut weight = spline * surface_weight(aux, &self.aux[other_ix]);
             let tolerance = deviations * (variance + most.min(found.w) + LEAST_VARIANCE).sqrt();
             weight *= (-(luminance_of(found.xyz()) - luminance).abs() / tolerance).exp();
             weights += weight;

@@ -6,14 +6,14 @@
 // 2017). It replaces the light of the pixel by a mean of 5 x 5 pixels, which are 2^step_ix pixels apart. A pixel counts
 // the more, the more alike its surface is, and the less its light differs beyond the noise. The last step multiplies
 // the light by the albedo again and adds what the camera sees directly.
-// Reads pixel_guides; updates pixel_filtered: even steps read its second half and write the first one.
+// Reads pixel_aux; updates pixel_filtered: even steps read its second half and write the first one.
 #include "layout.glsl"
 #include "noise.glsl"
 #include "edge.glsl"
 
 layout(local_size_x = TILE_SIZE, local_size_y = TILE_SIZE) in;
 layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
-layout(std430, set = 0, binding = BIND_PIXEL_GUIDES) readonly buffer PixelGuidesBlock { Guide pixel_guides[]; };
+layout(std430, set = 0, binding = BIND_PIXEL_AUX) readonly buffer PixelAuxBlock { Auxiliary pixel_aux[]; };
 layout(std430, set = 0, binding = BIND_PIXEL_FILTERED) buffer PixelFilteredBlock { vec4 pixel_filtered[]; };
 layout(push_constant) uniform EdgeStepBlock { EdgeStep edge_step; };
 
@@ -53,7 +53,7 @@ float variance_at(ivec2 pixel) {
     for (int y = -1; y <= 1; ++y) {
         for (int x = -1; x <= 1; ++x) {
             ivec2 other = pixel + ivec2(x, y);
-            if (!is_in_window(other) || pixel_guides[index_of(other)].n_hits == 0u) continue;
+            if (!is_in_window(other) || pixel_aux[index_of(other)].n_hits == 0u) continue;
             float weight = float((2 - abs(x)) * (2 - abs(y)));
             weights += weight;
             variance += weight * pixel_filtered[source_begin() + index_of(other)].w;
@@ -63,10 +63,10 @@ float variance_at(ivec2 pixel) {
 }
 
 // The mean of the light, and the variance of its luminance. light: of the pixel itself.
-vec4 mean_around(ivec2 pixel, Guide guide, vec4 light) {
+vec4 mean_around(ivec2 pixel, Auxiliary aux, vec4 light) {
     float deviations = DEVIATIONS * pow(float(frame.n_samples), DEVIATIONS_POWER);
-    deviations *= mix(1.0, GLOSSY_DEVIATIONS, guide.gloss);
-    float variance = variance_at(pixel), most = mix(MOST_OF_OTHER, 1.0, guide.gloss) * variance;
+    deviations *= mix(1.0, GLOSSY_DEVIATIONS, aux.gloss);
+    float variance = variance_at(pixel), most = mix(MOST_OF_OTHER, 1.0, aux.gloss) * variance;
     float luminance = luminance_of(light.xyz), weights = 0.0;
     vec4 sum = vec4(0.0);
     for (int y = -2; y <= 2; ++y) {
@@ -74,7 +74,7 @@ vec4 mean_around(ivec2 pixel, Guide guide, vec4 light) {
             ivec2 other = pixel + (ivec2(x, y) << edge_step.step_ix);
             if (!is_in_window(other)) continue;
             vec4 found = pixel_filtered[source_begin() + index_of(other)];
-            float weight = SPLINE[abs(x)] * SPLINE[abs(y)] * surface_weight(guide, pixel_guides[index_of(other)]);
+            float weight = SPLINE[abs(x)] * SPLINE[abs(y)] * surface_weight(aux, pixel_aux[index_of(other)]);
             float tolerance = deviations * sqrt(variance + min(most, found.w) + LEAST_VARIANCE);
             weight *= exp(-abs(luminance_of(found.xyz) - luminance) / tolerance);
             weights += weight;
@@ -89,8 +89,8 @@ void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (!is_in_window(pixel)) return;
     int pixel_ix = index_of(pixel);
-    Guide guide = pixel_guides[pixel_ix];
-    vec4 light = mean_around(pixel, guide, pixel_filtered[source_begin() + pixel_ix]);
-    if (edge_step.step_ix + 1u == EDGE_STEPS) light = vec4(light.xyz * guide.albedo + guide.seen, 1.0);
+    Auxiliary aux = pixel_aux[pixel_ix];
+    vec4 light = mean_around(pixel, aux, pixel_filtered[source_begin() + pixel_ix]);
+    if (edge_step.step_ix + 1u == EDGE_STEPS) light = vec4(light.xyz * aux.albedo + aux.seen, 1.0);
     pixel_filtered[frame.width * frame.height - source_begin() + pixel_ix] = light;
 }

@@ -1,40 +1,40 @@
-//! Tests of the kernel edge_filter against its twin, and closed forms of the whole filter.
+//! Tests of the kernel atrous_filter against its twin, and closed forms of the whole filter.
 
 use glam::Vec3;
 use kdray::{
-    layout::{EDGE_STEPS, EdgeStep, Guide},
+    layout::{Auxiliary, EDGE_STEPS, EdgeStep},
     reference,
 };
 
 use super::{
-    demodulate::{N_PIXELS, edge_stage, flat, mixed_guides},
+    demodulate::{N_PIXELS, edge_stage, flat, mixed_aux},
     path_stage::PathStage,
 };
 use crate::support::{compare, random::Random};
 
 /// Takes the steps of the filter that are in the range.
-fn filtered(stage: &PathStage, steps: std::ops::Range<u32>, guides: &[Guide], light: &[[f32; 4]]) -> Vec<[f32; 4]> {
+fn filtered(stage: &PathStage, steps: std::ops::Range<u32>, aux: &[Auxiliary], light: &[[f32; 4]]) -> Vec<[f32; 4]> {
     let pixels = &stage.resources.pixels;
-    pixels.pixel_guides.upload(guides).expect("pixel_guides");
+    pixels.pixel_aux.upload(aux).expect("pixel_aux");
     pixels.filtered().upload(light).expect("pixel_filtered");
     for step_ix in steps {
-        stage.run(|commands| stage.passes.edge.edge_filter.record(commands, &stage.resources, step_ix));
+        stage.run(|commands| stage.passes.edge.atrous_filter.record(commands, &stage.resources, step_ix));
     }
     pixels.filtered().download().expect("pixel_filtered")
 }
 
 /// Runs the whole filter over light whose luminance has the variance `variance`. Returns the radiance.
-fn whole(guides: &[Guide], light: impl Fn(usize) -> f32, variance: f32) -> Vec<f32> {
+fn whole(aux: &[Auxiliary], light: impl Fn(usize) -> f32, variance: f32) -> Vec<f32> {
     let halves = |pixel_ix: usize| {
         let light = light(pixel_ix % N_PIXELS);
         [light, light, light, variance]
     };
     let light: Vec<_> = (0..2 * N_PIXELS).map(halves).collect();
-    let found = filtered(&edge_stage(1), 0..EDGE_STEPS, guides, &light);
+    let found = filtered(&edge_stage(1), 0..EDGE_STEPS, aux, &light);
     found[..N_PIXELS].iter().map(|pixel| pixel[0]).collect()
 }
 
-fn plane(albedo: f32) -> Vec<Guide> {
+fn plane(albedo: f32) -> Vec<Auxiliary> {
     (0..N_PIXELS).map(|pixel_ix| flat(pixel_ix, albedo)).collect()
 }
 
@@ -42,14 +42,14 @@ fn plane(albedo: f32) -> Vec<Guide> {
 fn agrees_with_its_twin() {
     let stage = edge_stage(1);
     let mut random = Random(3);
-    let guides = mixed_guides(&mut random);
+    let aux = mixed_aux(&mut random);
     let mut pixel = |_| random.in_box(Vec3::ZERO, Vec3::ONE).extend(random.between(0.0, 0.2)).to_array();
     let light: Vec<_> = (0..2 * N_PIXELS).map(&mut pixel).collect();
     for step_ix in 0..EDGE_STEPS {
         let mut expected = light.clone();
-        reference::edge_filter::edge_filter(stage.frame(), &EdgeStep { step_ix }, &guides, &mut expected);
+        reference::atrous_filter::atrous_filter(stage.frame(), &EdgeStep { step_ix }, &aux, &mut expected);
         assert_ne!(expected, light);
-        compare::pixels(1e-4, 0, &expected, &filtered(&stage, step_ix..step_ix + 1, &guides, &light)).unwrap();
+        compare::pixels(1e-4, 0, &expected, &filtered(&stage, step_ix..step_ix + 1, &aux, &light)).unwrap();
     }
 }
 
@@ -65,14 +65,14 @@ fn a_constant_picture_stays_constant() {
 #[test]
 fn an_edge_between_surfaces_stays_sharp() {
     let is_left = |pixel_ix: usize| pixel_ix % 40 < 17;
-    let mut guides = plane(1.0);
-    guides.iter_mut().enumerate().filter(|(pixel_ix, _)| !is_left(*pixel_ix)).for_each(|(_, guide)| {
-        guide.normal_world = Vec3::X;
-        guide.position_world.z = 17.0 - guide.position_world.x;
-        guide.position_world.x = 17.0;
+    let mut aux = plane(1.0);
+    aux.iter_mut().enumerate().filter(|(pixel_ix, _)| !is_left(*pixel_ix)).for_each(|(_, aux)| {
+        aux.normal_world = Vec3::X;
+        aux.position_world.z = 17.0 - aux.position_world.x;
+        aux.position_world.x = 17.0;
     });
     let light = |pixel_ix| if is_left(pixel_ix) { 1.0 } else { 0.1 };
-    for (pixel_ix, radiance) in whole(&guides, light, 100.0).into_iter().enumerate() {
+    for (pixel_ix, radiance) in whole(&aux, light, 100.0).into_iter().enumerate() {
         assert!((radiance - light(pixel_ix)).abs() < 1e-3, "pixel {pixel_ix}: {radiance}");
     }
 }
@@ -112,19 +112,19 @@ fn a_step_reduces_noise_by_the_factor_of_its_weights() {
 /// A pixel on an edge, whose samples are on both sides, is blurred with both sides.
 #[test]
 fn a_pixel_of_two_surfaces_gets_light_from_both() {
-    let mut guides = plane(1.0);
+    let mut aux = plane(1.0);
     let at = |pixel_ix: usize| pixel_ix % 40;
-    for (pixel_ix, guide) in guides.iter_mut().enumerate().filter(|(pixel_ix, _)| at(*pixel_ix) >= 17) {
+    for (pixel_ix, aux) in aux.iter_mut().enumerate().filter(|(pixel_ix, _)| at(*pixel_ix) >= 17) {
         let is_edge = at(pixel_ix) == 17;
-        guide.normal_world = if is_edge { 0.5 * (Vec3::X + Vec3::Z) } else { Vec3::X };
-        guide.position_world.z = 17.0 - guide.position_world.x;
-        guide.position_world.x = 17.0;
+        aux.normal_world = if is_edge { 0.5 * (Vec3::X + Vec3::Z) } else { Vec3::X };
+        aux.position_world.z = 17.0 - aux.position_world.x;
+        aux.position_world.x = 17.0;
     }
     // The samples of one pixel on the edge were dark by chance.
     let dark = 15 * 40 + 17;
     let light = |pixel_ix| if pixel_ix == dark { 0.0 } else { 1.0 };
-    assert!((whole(&guides, light, 1.0)[dark] - 1.0).abs() < 0.2);
-    let mut apart = guides;
+    assert!((whole(&aux, light, 1.0)[dark] - 1.0).abs() < 0.2);
+    let mut apart = aux;
     apart[dark].normal_world = Vec3::Y;
     assert!(whole(&apart, light, 1.0)[dark] < 0.2, "a surface of its own");
 }

@@ -1,4 +1,4 @@
-//! Guides: what the noise filter `edge` knows of each pixel beside its colour. Twin of `guides.comp`.
+//! Auxiliary buffers: what the noise filter `edge` knows of each pixel beside its colour. Twin of `auxiliary.comp`.
 
 use glam::{UVec2, Vec3};
 
@@ -15,24 +15,30 @@ use super::{
     sampler::random_pair,
     surface::Surface,
 };
-use crate::layout::{Batch, Guide, Hit, NO_TRIANGLE, PathState};
+use crate::layout::{Auxiliary, Batch, Hit, NO_TRIANGLE, PathState};
 
-/// Adds the first hits of the batch's paths to the guides of their pixels. `states`: after bounce 0.
-pub fn guides(inputs: &KernelInputs, batch: &Batch, hits: &[Hit], states: &[PathState], pixel_guides: &mut [Guide]) {
+/// Adds the first hits of the batch's paths to the auxiliary buffers of their pixels. `states`: after bounce 0.
+pub fn auxiliary(
+    inputs: &KernelInputs,
+    batch: &Batch,
+    hits: &[Hit],
+    states: &[PathState],
+    pixel_aux: &mut [Auxiliary],
+) {
     let frame = inputs.frame();
     let n_of_frame = 1 << frame.samples_log2;
     let n_earlier = frame.n_samples - n_of_frame;
     for place in 0..batch.n_pixels {
         let pixel = pixel_at(frame, batch, place);
-        let guide = &mut pixel_guides[pixel_ix_of(frame, pixel) as usize];
+        let aux = &mut pixel_aux[pixel_ix_of(frame, pixel) as usize];
         if n_earlier == 0 {
-            *guide = Guide::default();
+            *aux = Auxiliary::default();
         }
-        for sample_ix in guide.n_samples.saturating_sub(n_earlier).min(n_of_frame)..n_of_frame {
+        for sample_ix in aux.n_samples.saturating_sub(n_earlier).min(n_of_frame)..n_of_frame {
             let path_ix = path_of(frame, place, sample_ix);
             let (hit, seen) = (&hits[path_ix as usize], states[path_ix as usize].radiance);
             let surface = first_surface(inputs, pixel, path_ix, hit);
-            add_path(guide, surface, seen);
+            add_path(aux, surface, seen);
         }
     }
 }
@@ -57,18 +63,18 @@ fn first_surface(inputs: &KernelInputs, pixel: UVec2, path_ix: u32, hit: &Hit) -
 }
 
 /// Adds a path.
-fn add_path(guide: &mut Guide, first: Option<FirstSurface>, seen: Vec3) {
+fn add_path(aux: &mut Auxiliary, first: Option<FirstSurface>, seen: Vec3) {
     if let Some(FirstSurface { surface, gloss, .. }) = &first {
-        guide.n_hits += 1;
-        let weight = 1.0 / guide.n_hits as f32;
-        guide.position_world += weight * (surface.point_world - guide.position_world);
-        guide.normal_world += weight * (surface.shading - guide.normal_world);
-        guide.gloss += weight * (gloss - guide.gloss);
+        aux.n_hits += 1;
+        let weight = 1.0 / aux.n_hits as f32;
+        aux.position_world += weight * (surface.point_world - aux.position_world);
+        aux.normal_world += weight * (surface.shading - aux.normal_world);
+        aux.gloss += weight * (gloss - aux.gloss);
     }
-    guide.n_samples += 1;
-    let weight = 1.0 / guide.n_samples as f32;
+    aux.n_samples += 1;
+    let weight = 1.0 / aux.n_samples as f32;
     let albedo = first.map_or(Vec3::ZERO, |first| first.albedo);
-    guide.albedo += weight * (albedo - guide.albedo);
-    guide.seen += weight * (seen - guide.seen);
-    guide.seen_squared += weight * (squared_luminance(seen) - guide.seen_squared);
+    aux.albedo += weight * (albedo - aux.albedo);
+    aux.seen += weight * (seen - aux.seen);
+    aux.seen_squared += weight * (squared_luminance(seen) - aux.seen_squared);
 }

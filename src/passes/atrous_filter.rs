@@ -10,17 +10,19 @@ use crate::{
 };
 
 /// The pipeline of the pass.
-pub struct EdgeFilter {
+pub struct AtrousFilter {
     kernel: ComputePipeline,
 }
 
-impl EdgeFilter {
+impl AtrousFilter {
     pub(super) fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>) -> Result<Self, GpuError> {
-        Ok(Self { kernel: kernel(context, bindings, "edge_filter", spirv!("edge_filter.comp"), &Constants::new())? })
+        Ok(Self {
+            kernel: kernel(context, bindings, "atrous_filter", spirv!("atrous_filter.comp"), &Constants::new())?,
+        })
     }
 
-    /// Needs `pixel_guides`, and the half of `pixel_filtered` that the step before has left: the second half for even
-    /// steps. Leaves the other half.
+    /// Needs `pixel_aux`, and the half of `pixel_filtered` that the step before has left: the second half for
+    /// even steps. Leaves the other half.
     pub fn record(&self, commands: &Commands, resources: &Resources, step_ix: u32) {
         commands.dispatch(&self.kernel, None, &EdgeStep { step_ix }, resources.pixel_dispatch());
     }
