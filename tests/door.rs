@@ -52,22 +52,22 @@ const CHANGES: &[Change] = &[
     ("uvs has # entries for # triangles", |it| it.textures.uvs.push([Vec2::ZERO; 3])),
     ("textures: texture 0 has 0 x 16 texels", |it| it.textures.textures[0].size &= 0xffff_0000),
     ("textures: texture 1 has # x 0 texels", |it| it.textures.textures[1].size &= 0xffff),
-    ("textures: texture 0 has 0 levels, not 1 to 5", |it| it.textures.textures[0].n_levels = 0),
-    ("textures: texture 0 has 6 levels, not 1 to 5", |it| it.textures.textures[0].n_levels = 6),
-    ("textures: texture 0 has texels of level 0 behind the # words of texels", |it| {
+    ("textures: texture 0 has 0 mip levels, not 1 to 5", |it| it.textures.textures[0].n_mips = 0),
+    ("textures: texture 0 has 6 mip levels, not 1 to 5", |it| it.textures.textures[0].n_mips = 6),
+    ("textures: texture 0 has texels of mip level 0 behind the # words of texels", |it| {
         it.textures.textures[0].first_texel = u32::MAX;
     }),
-    ("textures: texture 0 has texels of level 0 behind the # words of texels", |it| {
+    ("textures: texture 0 has texels of mip level 0 behind the # words of texels", |it| {
         it.textures.textures[0].size = 0xffff_ffff;
     }),
-    ("textures: texture 0 has texels of level 2 behind the # words of texels", |it| {
+    ("textures: texture 0 has texels of mip level 2 behind the # words of texels", |it| {
         let level = it.textures.textures[0].first_texel as usize + 2;
         it.textures.texels[level] = it.textures.texels.len() as u32 - 15;
     }),
-    ("textures: texture # has texels of level # behind the # words of texels", |it| {
+    ("textures: texture # has texels of mip level # behind the # words of texels", |it| {
         it.textures.textures.last_mut().unwrap().flags |= TEXTURE_HALVES;
     }),
-    ("textures: texture # has texels of level # behind the # words of texels", |it| _ = it.textures.texels.pop()),
+    ("textures: texture # has texels of mip level # behind the # words of texels", |it| _ = it.textures.texels.pop()),
     ("textures: texture 2 uses the second set of texture coordinates, but uvs has only the first", |it| {
         it.textures.textures[2].flags |= TEXTURE_UV_SET;
     }),
@@ -144,13 +144,13 @@ fn a_scene_with_one_thing_wrong_is_refused() {
     assert!(!agrees("uvs has 3 entries", "uvs has 4 entries") && !agrees("a 1", "a # b"), "the comparison can fail");
 }
 
-/// What kernels may read stays allowed: a scene with fewer levels, a texture that no material has, both sets of texture
-/// coordinates, and colours that are no numbers.
+/// What kernels may read stays allowed: a scene with fewer mip levels, a texture that no material has, both sets of
+/// texture coordinates, and colours that are no numbers.
 #[test]
 fn unusual_scenes_are_drawn() {
     let mut scene = textured::every_kind();
     let textures = &mut scene.textures;
-    textures.textures[0].n_levels = 1;
+    textures.textures[0].n_mips = 1;
     textures.textures.push(Texture { flags: TEXTURE_UV_SET | 7 << 8 | 15, ..textures.textures[1] });
     textures.uvs.extend_from_within(..);
     textures.uvs[3] = [Vec2::splat(f32::NAN), Vec2::splat(f32::MAX), Vec2::splat(f32::NEG_INFINITY)];

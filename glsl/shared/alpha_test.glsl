@@ -24,7 +24,7 @@ float random_at(uint triangle_ix, float u, float v) {
 }
 #endif
 
-// The opacity at a point of a triangle, 0..1, by the largest levels of its textures. opacity: that of the material.
+// The opacity at a point of a triangle, 0..1, by mip 0 of its textures. opacity: that of the material.
 float opacity_at(MaterialMaps maps, float opacity, uint triangle_ix, float u, float v) {
     if ((maps.flags & MAPS_CORNERS_HAVE_OPACITY) != 0u) opacity *= corner_colour_at(triangle_ix, u, v).a;
     for (uint i = 0u; i < 2u; ++i) {

@@ -384,12 +384,12 @@ struct Material {
 // A texture as a material uses it, 48 bytes. A lookup at (u, v) reads the image at (m00 u + m01 v + offset_u, m10 u +
 // m11 v + offset_v), where (0, 0) is the image's upper left corner and (1, 1) its lower right one.
 //
-// - `first_texel`: index in `texels` of a table of `n_levels` words. Each of them is the index in `texels` of a level's
-//   first texel. A level's texels are stored row by row, from the top.
+// - `first_texel`: index in `texels` of a table of `n_mips` words. Each of them is the index in `texels` of a mip
+//   level's first texel. A level's texels are stored row by row, from the top.
 // - `size`: of level 0, texels. The width is in bits 0..15, the height in 16..31. Each further level is half as wide
 //   and half as high, rounded down, but at least 1.
 // - `flags`: `TEXTURE_SRGB` and its like.
-// - `n_levels`: down to the level of one texel.
+// - `n_mips`: down to the mip level of one texel.
 struct Texture {
     float m00;
     float m01;
@@ -400,7 +400,7 @@ struct Texture {
     float offset_v;
     uint size;
     uint flags;
-    uint n_levels;
+    uint n_mips;
     uint reserved0;
     uint reserved1;
 };

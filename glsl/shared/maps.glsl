@@ -1,8 +1,8 @@
 // The surface and the material at a hit, with the material's textures applied. Twin of src/reference/maps.rs.
 //
-// A ray from the camera widens to a cone, whose width at a hit selects the level of a texture (Akenine-Möller et al.:
-// Texture Level of Detail Strategies for Real-Time Ray Tracing, Ray Tracing Gems, 2019). The cone is as wide as a pixel
-// of the image plane, times the length of the path from the eye. Of a path with more than one reflection or
+// A ray from the camera widens to a cone, whose width at a hit selects the mip level of a texture (Akenine-Möller et
+// al.: Texture Level of Detail Strategies for Real-Time Ray Tracing, Ray Tracing Gems, 2019). The cone is as wide as a
+// pixel of the image plane, times the length of the path from the eye. Of a path with more than one reflection or
 // refraction, the straight distance to the last one stands for the length up to there. The rays of an orthographic
 // camera do not widen: they are as wide as a pixel everywhere.
 #ifndef KDRAY_MAPS
@@ -41,8 +41,8 @@ TextureHit texture_hit(PathRay ray, Hit hit, Triangle t, Surface surface) {
     return TextureHit(hit.triangle_ix, hit.u, hit.v, log_width);
 }
 
-// The level of a texture whose texels are as large as the cone on the surface.
-float level_of(Texture map, TextureHit hit) {
+// The mip level of a texture whose texels are as large as the cone on the surface.
+float mip_of(Texture map, TextureHit hit) {
     uint uv_set = uv_set_of(map);
     vec2 a = corner_uv(hit.triangle_ix, uv_set, 0u);
     vec2 e1 = corner_uv(hit.triangle_ix, uv_set, 1u) - a, e2 = corner_uv(hit.triangle_ix, uv_set, 2u) - a;
@@ -55,7 +55,7 @@ float level_of(Texture map, TextureHit hit) {
 vec4 map_at(uint texture_ix, TextureHit hit) {
     Texture map = texture_at(texture_ix);
     if (accel.uvs_begin == NO_WORDS) return sample_texture(map, vec2(0.0), 0.0);
-    return sample_texture(map, uv_at(hit.triangle_ix, uv_set_of(map), hit.u, hit.v), level_of(map, hit));
+    return sample_texture(map, uv_at(hit.triangle_ix, uv_set_of(map), hit.u, hit.v), mip_of(map, hit));
 }
 
 // The places of the material's textures, as bits.

@@ -13,9 +13,9 @@ uint uv_set_of(Texture map) {
     return (map.flags & TEXTURE_UV_SET) != 0u ? 1u : 0u;
 }
 
-// Width and height of a level, texels.
-uvec2 size_of_level(Texture map, uint level) {
-    return max(uvec2(map.size & 0xffffu, map.size >> 16u) >> level, uvec2(1u));
+// Width and height of a mip level, texels.
+uvec2 size_of_mip(Texture map, uint mip) {
+    return max(uvec2(map.size & 0xffffu, map.size >> 16u) >> mip, uvec2(1u));
 }
 
 // The wrap along an axis, `WRAP_REPEAT` and its like. shift: TEXTURE_WRAP_U_SHIFT or TEXTURE_WRAP_V_SHIFT.
@@ -24,9 +24,9 @@ uint wrap_of(Texture map, uint shift) {
 }
 
 // A texel: linear colour, and opacity.
-vec4 texel(Texture map, uint level, uint x, uint y) {
-    uint texel_ix = y * size_of_level(map, level).x + x;
-    uint first = load_texels(map.first_texel + level);
+vec4 texel(Texture map, uint mip, uint x, uint y) {
+    uint texel_ix = y * size_of_mip(map, mip).x + x;
+    uint first = load_texels(map.first_texel + mip);
     if ((map.flags & TEXTURE_HALVES) != 0u) {
         uint word_ix = first + 2u * texel_ix;
         return vec4(unpackHalf2x16(load_texels(word_ix)), unpackHalf2x16(load_texels(word_ix + 1u)));
@@ -64,9 +64,9 @@ uint wrapped(int index, uint n, uint wrap) {
     return min(uint(index), n - 1u);
 }
 
-// The colour of a level at a place. place: coordinates to which the texture's transform has been applied already.
-vec4 sample_level(Texture map, uint level, vec2 place) {
-    uvec2 size = size_of_level(map, level);
+// The colour of a mip level at a place. place: coordinates to which the texture's transform has been applied already.
+vec4 sample_mip(Texture map, uint mip, vec2 place) {
+    uvec2 size = size_of_mip(map, mip);
     uint wrap_u = wrap_of(map, TEXTURE_WRAP_U_SHIFT);
     uint wrap_v = wrap_of(map, TEXTURE_WRAP_V_SHIFT);
     precise vec2 at = vec2(folded(place.x, wrap_u), folded(place.y, wrap_v)) * vec2(size);
@@ -81,38 +81,38 @@ vec4 sample_level(Texture map, uint level, vec2 place) {
         ivec2 high = is_nearest ? ivec2(0) : ivec2(i & 1, i >> 1);
         uint x = wrapped(low.x + high.x, size.x, wrap_u);
         uint y = wrapped(low.y + high.y, size.y, wrap_v);
-        texels[i] = texel(map, level, x, y);
+        texels[i] = texel(map, mip, x, y);
     }
     vec4 upper = texels[0] + (texels[1] - texels[0]) * weight.x;
     vec4 lower = texels[2] + (texels[3] - texels[2]) * weight.x;
     return upper + (lower - upper) * weight.y;
 }
 
-// The texture's value in its largest level.
+// The texture's value in its mip 0.
 vec4 sample_finest(Texture map, vec2 uv) {
     precise float u = map.m00 * uv.x + map.m01 * uv.y + map.offset_u;
     precise float v = map.m10 * uv.x + map.m11 * uv.y + map.offset_v;
-    return sample_level(map, 0u, vec2(u, v));
+    return sample_mip(map, 0u, vec2(u, v));
 }
 
-// The linear colour and the opacity of a texture. lod: the level, of which a fraction blends two levels. It is bounded
-// to the texture's levels, and NaN is 0.
+// The linear colour and the opacity of a texture. lod: the mip level, of which a fraction blends two mip levels. It is
+// bounded to the texture's mip levels, and NaN is 0.
 vec4 sample_texture(Texture map, vec2 uv, float lod) {
     precise float u = map.m00 * uv.x + map.m01 * uv.y + map.offset_u;
     precise float v = map.m10 * uv.x + map.m11 * uv.y + map.offset_v;
-    uint steps = lod > 0.0 ? uint(min(lod, float(map.n_levels - 1u)) * 256.0 + 0.5) : 0u;
-    uint level = steps >> 8u;
+    uint steps = lod > 0.0 ? uint(min(lod, float(map.n_mips - 1u)) * 256.0 + 0.5) : 0u;
+    uint mip = steps >> 8u;
     float share = float(steps & 255u) * (1.0 / 256.0);
-    // Where the share is 0, the second level need not exist. Paths leave its turn of the loop out there. Whitted's
-    // shadow rays are 7 % faster with two turns in any case, which the driver unrolls.
+    // Where the share is 0, the second mip level need not exist. Paths leave its iteration of the loop out there.
+    // Whitted's shadow rays are 7 % faster with two iterations in any case, which the driver unrolls.
     bool needs_one = share == 0.0;
     uint n_turns = PATHS && needs_one ? 1u : 2u;
-    vec4 levels[2];
+    vec4 mips[2];
     for (uint i = 0u; i < n_turns; ++i) {
-        levels[i] = i == 0u || !needs_one ? sample_level(map, level + i, vec2(u, v)) : levels[0];
+        mips[i] = i == 0u || !needs_one ? sample_mip(map, mip + i, vec2(u, v)) : mips[0];
     }
-    if (needs_one) return levels[0];
-    return levels[0] + (levels[1] - levels[0]) * share;
+    if (needs_one) return mips[0];
+    return mips[0] + (mips[1] - mips[0]) * share;
 }
 
 // The number that a texture of one number shows. value: from sample_texture.

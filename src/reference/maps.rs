@@ -73,8 +73,8 @@ impl<'a> TextureHit<'a> {
         Self { textures, triangle_ix: hit.triangle_ix, u: hit.u, v: hit.v, log_width }
     }
 
-    /// The level of a texture whose texels are as large as the cone on the surface.
-    fn level_of(&self, map: &Texture) -> f32 {
+    /// The mip level of a texture whose texels are as large as the cone on the surface.
+    fn mip_of(&self, map: &Texture) -> f32 {
         let [a, b, c] = self.textures.uvs_of(self.triangle_ix, uv_set_of(map));
         let (e1, e2) = (b - a, c - a);
         let scale = (map.m00 * map.m11 - map.m01 * map.m10).abs();
@@ -86,8 +86,8 @@ impl<'a> TextureHit<'a> {
     fn map_at(&self, texture_ix: u32) -> Vec4 {
         let map = &self.textures.textures[texture_ix as usize];
         let uv = self.textures.uv_at(self.triangle_ix, uv_set_of(map), self.u, self.v);
-        let level = if self.textures.has_uvs() { self.level_of(map) } else { 0.0 };
-        sample_texture(&self.textures.texels, map, uv, level)
+        let mip = if self.textures.has_uvs() { self.mip_of(map) } else { 0.0 };
+        sample_texture(&self.textures.texels, map, uv, mip)
     }
 
     /// The value of a texture of one number; 1 if there is none.

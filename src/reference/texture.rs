@@ -15,9 +15,9 @@ pub fn uv_set_of(map: &Texture) -> u32 {
     u32::from(map.flags & TEXTURE_UV_SET != 0)
 }
 
-/// Returns the width and the height of a level, texels.
-pub fn size_of_level(map: &Texture, level: u32) -> [u32; 2] {
-    [map.size & 0xffff, map.size >> 16].map(|size| (size >> level).max(1))
+/// Returns the width and the height of a mip level, texels.
+pub fn size_of_mip(map: &Texture, mip: u32) -> [u32; 2] {
+    [map.size & 0xffff, map.size >> 16].map(|size| (size >> mip).max(1))
 }
 
 /// Returns the wrap along an axis, `WRAP_REPEAT` and its like. `shift`: [`TEXTURE_WRAP_U_SHIFT`] or
@@ -27,10 +27,10 @@ fn wrap_of(map: &Texture, shift: u32) -> u32 {
 }
 
 /// Returns a texel: linear colour, and opacity.
-pub fn texel(texels: &[u32], map: &Texture, level: u32, x: u32, y: u32) -> Vec4 {
+pub fn texel(texels: &[u32], map: &Texture, mip: u32, x: u32, y: u32) -> Vec4 {
     let load = |word_ix: u32| texels[word_ix as usize];
-    let texel_ix = y * size_of_level(map, level)[0] + x;
-    let first = load(map.first_texel + level);
+    let texel_ix = y * size_of_mip(map, mip)[0] + x;
+    let first = load(map.first_texel + mip);
     if map.flags & TEXTURE_HALVES != 0 {
         let word_ix = first + 2 * texel_ix;
         let [low, high] = [load(word_ix), load(word_ix + 1)];
@@ -85,15 +85,15 @@ fn wrapped(mut index: i32, n: u32, wrap: u32) -> u32 {
     (index as u32).min(n - 1)
 }
 
-/// Returns the colour of a level at a place, with the texture's transform applied.
-fn sample_level(texels: &[u32], map: &Texture, level: u32, place: Vec2) -> Vec4 {
-    let [width, height] = size_of_level(map, level);
+/// Returns the colour of a mip level at a place, with the texture's transform applied.
+fn sample_mip(texels: &[u32], map: &Texture, mip: u32, place: Vec2) -> Vec4 {
+    let [width, height] = size_of_mip(map, mip);
     let wrap_u = wrap_of(map, TEXTURE_WRAP_U_SHIFT);
     let wrap_v = wrap_of(map, TEXTURE_WRAP_V_SHIFT);
     let at = Vec2::new(folded(place.x, wrap_u), folded(place.y, wrap_v)) * Vec2::new(width as f32, height as f32);
     if map.flags & TEXTURE_NEAREST != 0 {
         let nearest = at.floor().as_ivec2();
-        return texel(texels, map, level, wrapped(nearest.x, width, wrap_u), wrapped(nearest.y, height, wrap_v));
+        return texel(texels, map, mip, wrapped(nearest.x, width, wrap_u), wrapped(nearest.y, height, wrap_v));
     }
     // The centre of the first texel is 0.
     let steps = (at * 256.0 + 0.5).floor().as_ivec2() - 128;
@@ -103,25 +103,25 @@ fn sample_level(texels: &[u32], map: &Texture, level: u32, place: Vec2) -> Vec4 
     let x1 = wrapped(low.x + 1, width, wrap_u);
     let y0 = wrapped(low.y, height, wrap_v);
     let y1 = wrapped(low.y + 1, height, wrap_v);
-    let upper_left = texel(texels, map, level, x0, y0);
-    let lower_left = texel(texels, map, level, x0, y1);
-    let upper = upper_left + (texel(texels, map, level, x1, y0) - upper_left) * weight.x;
-    let lower = lower_left + (texel(texels, map, level, x1, y1) - lower_left) * weight.x;
+    let upper_left = texel(texels, map, mip, x0, y0);
+    let lower_left = texel(texels, map, mip, x0, y1);
+    let upper = upper_left + (texel(texels, map, mip, x1, y0) - upper_left) * weight.x;
+    let lower = lower_left + (texel(texels, map, mip, x1, y1) - lower_left) * weight.x;
     upper + (lower - upper) * weight.y
 }
 
-/// Returns the linear colour and the opacity of a texture. `lod`: the level, of which a fraction blends two levels. It
-/// is bounded to the texture's levels, and NaN is 0.
+/// Returns the linear colour and the opacity of a texture. `lod`: the mip level, of which a fraction blends two mip
+/// levels. It is bounded to the texture's mip levels, and NaN is 0.
 pub fn sample_texture(texels: &[u32], map: &Texture, uv: Vec2, lod: f32) -> Vec4 {
     let u = map.m00 * uv.x + map.m01 * uv.y + map.offset_u;
     let v = map.m10 * uv.x + map.m11 * uv.y + map.offset_v;
-    let steps = if lod > 0.0 { (lod.min((map.n_levels - 1) as f32) * 256.0 + 0.5) as u32 } else { 0 };
-    let level = steps >> 8;
-    let fine = sample_level(texels, map, level, Vec2::new(u, v));
+    let steps = if lod > 0.0 { (lod.min((map.n_mips - 1) as f32) * 256.0 + 0.5) as u32 } else { 0 };
+    let mip = steps >> 8;
+    let fine = sample_mip(texels, map, mip, Vec2::new(u, v));
     if steps & 255 == 0 {
         return fine;
     }
-    let coarse = sample_level(texels, map, level + 1, Vec2::new(u, v));
+    let coarse = sample_mip(texels, map, mip + 1, Vec2::new(u, v));
     fine + (coarse - fine) * ((steps & 255) as f32 * (1.0 / 256.0))
 }
 
@@ -234,11 +234,11 @@ mod tests {
         assert_near(sample(&clamped, f32::INFINITY, 0.25, 0.0).x, 0.6);
     }
 
-    /// The row's next level has the texels 0.1 and 0.5 (25.5 and 127.5 of 255, rounded up), and one half of green.
+    /// The row's next mip level has the texels 0.1 and 0.5 (25.5 and 127.5 of 255, rounded up), and one half of green.
     #[test]
-    fn levels_are_blended() {
+    fn mips_are_blended() {
         let arrays = arrays(row(), data());
-        assert_eq!(arrays.textures[0].n_levels, 3);
+        assert_eq!(arrays.textures[0].n_mips, 3);
         let [fine, coarse, last] = [0.0, 1.0, 2.0].map(|lod| sample(&arrays, 0.25, 0.25, lod).x);
         assert_near(fine, 0.1);
         assert_near(coarse, 26.0 / 255.0);

@@ -5,7 +5,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{FlatScene, Mismatch, Textures, levels};
+use super::{FlatScene, Mismatch, Textures, mips};
 use crate::{
     frame::Integrator,
     layout::{
@@ -101,16 +101,16 @@ fn check_textures(scene: &FlatScene) -> Result<(), Mismatch> {
     Ok(())
 }
 
-/// Returns what is wrong with a texture. Each of its levels has a word that says where its texels begin.
+/// Returns what is wrong with a texture. Each of its mip levels has a word that says where its texels begin.
 fn texture_fault(texture: &Texture, texels: &[u32], has_second_set: bool) -> Option<String> {
     let [width, height] = [texture.size & 0xffff, texture.size >> 16];
     if width == 0 || height == 0 {
         return Some(format!("has {width} x {height} texels"));
     }
-    let sizes = levels::sizes(width, height);
-    let (n_levels, most) = (texture.n_levels, sizes.clone().count());
-    if n_levels == 0 || n_levels as usize > most {
-        return Some(format!("has {n_levels} levels, not 1 to {most}"));
+    let sizes = mips::sizes(width, height);
+    let (n_mips, most) = (texture.n_mips, sizes.clone().count());
+    if n_mips == 0 || n_mips as usize > most {
+        return Some(format!("has {n_mips} mip levels, not 1 to {most}"));
     }
     if texture.flags & TEXTURE_UV_SET != 0 && !has_second_set {
         return Some("uses the second set of texture coordinates, but uvs has only the first".to_owned());
@@ -121,8 +121,8 @@ fn texture_fault(texture: &Texture, texels: &[u32], has_second_set: bool) -> Opt
         let first = texels.get(texture.first_texel as usize + level);
         first.is_none_or(|first| u64::from(*first) + n_words > texels.len() as u64)
     };
-    let outside = sizes.take(n_levels as usize).enumerate().find(is_outside);
-    outside.map(|(level, _)| format!("has texels of level {level} behind the {} words of texels", texels.len()))
+    let outside = sizes.take(n_mips as usize).enumerate().find(is_outside);
+    outside.map(|(level, _)| format!("has texels of mip level {level} behind the {} words of texels", texels.len()))
 }
 
 /// Returns the textures of a material: the first members of the struct.

@@ -11,11 +11,11 @@ mod environment_map;
 mod flat;
 mod frame_constants;
 mod geometry;
-mod levels;
 mod light_bounds;
 mod light_tree;
 #[cfg(test)]
 mod light_tree_tests;
+mod mips;
 mod mismatch;
 mod path_materials;
 mod scene_hash;

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::{
     Mismatch,
-    levels::{self, Coding, Mean},
+    mips::{self, Coding, Mean},
 };
 use crate::{
     layout::{
@@ -27,7 +27,7 @@ const MAX_SIDE: u32 = 65_535;
 /// The arrays that lookups in textures read. Both are empty if no material has a texture.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TextureArrays {
-    /// The linear values of the bytes that sRGB encodes, as bits of floats. The levels of each image follow.
+    /// The linear values of the bytes that sRGB encodes, as bits of floats. The mip levels of each image follow.
     pub texels: Vec<u32>,
     /// The textures. No two of them are equal.
     pub textures: Vec<Texture>,
@@ -64,7 +64,7 @@ pub fn texture_arrays(scene: &Scene, opacities: &Opacities) -> Result<(TextureAr
     Ok((TextureArrays { texels: layout.texels(), textures: textures.list }, maps))
 }
 
-/// How the levels of an image are made.
+/// How the mip levels of an image are made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 struct Making {
     image_ix: u32,
@@ -84,7 +84,7 @@ impl Making {
     }
 }
 
-/// An image's levels, and where they are in the array of texels.
+/// An image's mip levels, and where they are in the array of texels.
 struct Stored<'a> {
     image: &'a Image,
     making: Making,
@@ -105,7 +105,7 @@ struct TexelLayout<'a> {
 impl<'a> TexelLayout<'a> {
     fn new(scene: &'a Scene, opacities: &'a Opacities<'a>) -> Result<Self, Mismatch> {
         let (mut list, mut ix_of) = (Vec::new(), HashMap::new());
-        let mut n_words = levels::SRGB.len() as u64;
+        let mut n_words = mips::SRGB.len() as u64;
         for (material_ix, material) in scene.materials.iter().enumerate() {
             for texture in material.maps.textures() {
                 let image = image_of(scene, material_ix, texture)?;
@@ -113,9 +113,9 @@ impl<'a> TexelLayout<'a> {
                 if ix_of.contains_key(&making) {
                     continue;
                 }
-                let n_levels_words = levels::n_words(image, Coding::of(image, making.encoding));
-                let stored = Stored { image, making, first_word: n_words as u32, n_words: n_levels_words as usize };
-                n_words += n_levels_words;
+                let n_mip_words = mips::n_words(image, Coding::of(image, making.encoding));
+                let stored = Stored { image, making, first_word: n_words as u32, n_words: n_mip_words as usize };
+                n_words += n_mip_words;
                 if n_words > MAX_WORDS {
                     return Err(Mismatch::Textures(format!("they need more than {MAX_WORDS} words")));
                 }
@@ -136,8 +136,8 @@ impl<'a> TexelLayout<'a> {
         if self.list.is_empty() {
             return texels;
         }
-        let (table, mut rest) = texels.split_at_mut(levels::SRGB.len());
-        table.iter_mut().zip(*levels::SRGB).for_each(|(word, value)| *word = value.to_bits());
+        let (table, mut rest) = texels.split_at_mut(mips::SRGB.len());
+        table.iter_mut().zip(*mips::SRGB).for_each(|(word, value)| *word = value.to_bits());
         let mut parts = Vec::with_capacity(self.list.len());
         for stored in &self.list {
             let (part, after) = rest.split_at_mut(stored.n_words);
@@ -146,7 +146,7 @@ impl<'a> TexelLayout<'a> {
         }
         parts.into_par_iter().for_each(|(stored, words)| {
             let Making { encoding, mean, .. } = stored.making;
-            levels::write(stored.image, encoding, mean, words, stored.first_word);
+            mips::write(stored.image, encoding, mean, words, stored.first_word);
         });
         texels
     }
@@ -232,7 +232,7 @@ fn texture_of(texture: &scene::Texture, material: &Material, scene: &Scene, layo
         offset_v: offset.y,
         size: image.width | image.height << 16,
         flags: flags_of(texture, Coding::of(image, making.encoding)),
-        n_levels: levels::sizes(image.width, image.height).count() as u32,
+        n_mips: mips::sizes(image.width, image.height).count() as u32,
         reserved0: 0,
         reserved1: 0,
     }
@@ -318,7 +318,7 @@ pub(crate) mod tests {
         assert_eq!((maps[1].base_colour, maps[1].emission, maps[1].roughness, maps[1].normal_scale), (0, 2, 1, 2.0));
         let [colour, data, mirrored] = arrays.textures[..] else { panic!("{:?}", arrays.textures) };
         assert_eq!((colour.first_texel, data.first_texel, mirrored.first_texel), (256, 270, 256));
-        assert_eq!((colour.size, colour.n_levels, colour.flags), (4 | 2 << 16, 3, TEXTURE_SRGB));
+        assert_eq!((colour.size, colour.n_mips, colour.flags), (4 | 2 << 16, 3, TEXTURE_SRGB));
         assert_eq!(data.flags, CHANNEL_BLUE << TEXTURE_CHANNEL_SHIFT);
         assert_eq!((mirrored.flags >> TEXTURE_WRAP_V_SHIFT) & TEXTURE_WRAP_MASK, WRAP_MIRROR);
         assert_eq!(mirrored.flags & (TEXTURE_UV_SET | TEXTURE_SRGB), TEXTURE_UV_SET | TEXTURE_SRGB);
@@ -335,12 +335,12 @@ pub(crate) mod tests {
         let bark = with(|it| (it.maps.base_colour, it.alpha) = (texture(), Alpha::Opaque));
         let pixels = Pixels::Bytes(vec![[200, 0, 0, 255], [0, 0, 0, 0]]);
         let (arrays, maps) = arrays_of(&scene_of(vec![Image { pixels, ..image(2, 1) }], vec![leaf, bark])).unwrap();
-        let smaller_level = |map: u32| {
+        let smaller_mip = |map: u32| {
             let first = arrays.textures[map as usize].first_texel as usize;
             arrays.texels[arrays.texels[first + 1] as usize].to_le_bytes()
         };
-        assert_eq!(smaller_level(maps[0].base_colour), [200, 0, 0, 128]);
-        assert_eq!(smaller_level(maps[0].emission), [146, 0, 0, 128]);
+        assert_eq!(smaller_mip(maps[0].base_colour), [200, 0, 0, 128]);
+        assert_eq!(smaller_mip(maps[0].emission), [146, 0, 0, 128]);
         assert_eq!(maps[1].base_colour, maps[0].emission);
     }
 

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::{
     Mismatch,
     corners::{corner_surfaces, uvs},
-    levels,
+    mips,
     texture_arrays::{Opacities, TextureArrays, texture_arrays},
 };
 use crate::{
@@ -22,7 +22,7 @@ use crate::{
 /// Everything that textures need. All of it is empty if the scene has neither textures nor colours at corners.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Textures {
-    /// The linear values of the 256 bytes of sRGB, as bits, and the levels of the images.
+    /// The linear values of the 256 bytes of sRGB, as bits, and the mip levels of the images.
     pub texels: Vec<u32>,
     /// The textures, to which the maps refer by index.
     pub textures: Vec<Texture>,
@@ -57,7 +57,7 @@ impl Textures {
             return Ok(Self::default());
         }
         if texels.is_empty() {
-            texels = levels::SRGB.map(f32::to_bits).to_vec();
+            texels = mips::SRGB.map(f32::to_bits).to_vec();
         }
         let all_textures = || scene.materials.iter().flat_map(|material| material.maps.textures());
         let n_sets = all_textures().map(|texture| texture.uv_set as usize + 1).max().unwrap_or(0).min(2);

@@ -1,8 +1,8 @@
-//! Levels of a texture: an image as kernels read it, and ever smaller copies of it for surfaces that are far away.
+//! Mip levels of a texture: an image as kernels read it, and ever smaller copies of it for surfaces that are far away.
 //!
-//! Each level is half as wide and half as high as the level before it, rounded down. A texel is the mean of the texels
-//! that lie under it, each weighted by its area. Where a side is odd, a texel covers between two and three others along
-//! it. The mean is one of light, so colours are decoded before and encoded after.
+//! Each mip level is half as wide and half as high as the mip level before it, rounded down. A texel is the mean of the
+//! texels that lie under it, each weighted by its area. Where a side is odd, a texel covers between two and three
+//! others along it. The mean is one of light, so colours are decoded before and encoded after.
 
 use std::sync::LazyLock;
 
@@ -85,7 +85,7 @@ impl Coding {
     }
 }
 
-/// Which texels the mean colour of a smaller level is of.
+/// Which texels the mean colour of a smaller mip level is of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Mean {
     /// All texels alike.
@@ -102,40 +102,40 @@ fn packed(texel: [f32; 4]) -> [u32; 2] {
     [r | g << 16, b | a << 16]
 }
 
-/// Returns the sizes of an image's levels, from that of the image down to one texel.
+/// Returns the sizes of an image's mip levels, from that of the image down to one texel.
 pub(super) fn sizes(width: u32, height: u32) -> impl Iterator<Item = [u32; 2]> + Clone {
-    (0..=width.max(height).ilog2()).map(move |level| [(width >> level).max(1), (height >> level).max(1)])
+    (0..=width.max(height).ilog2()).map(move |mip| [(width >> mip).max(1), (height >> mip).max(1)])
 }
 
-/// Returns the number of words of an image's levels, with the table before them.
+/// Returns the number of words of an image's mip levels, with the table before them.
 pub(super) fn n_words(image: &Image, coding: Coding) -> u64 {
-    let levels = sizes(image.width, image.height);
-    let n_texels: u64 = levels.clone().map(|[width, height]| u64::from(width) * u64::from(height)).sum();
-    levels.count() as u64 + n_texels * coding.n_words() as u64
+    let mips = sizes(image.width, image.height);
+    let n_texels: u64 = mips.clone().map(|[width, height]| u64::from(width) * u64::from(height)).sum();
+    mips.count() as u64 + n_texels * coding.n_words() as u64
 }
 
-/// Writes an image's levels to `words`, which [`n_words`] counts, after the table of where each begins. `first_word`:
-/// index of the first one of these words in the array.
+/// Writes an image's mip levels to `words`, which [`n_words`] counts, after the table of where each begins.
+/// `first_word`: index of the first one of these words in the array.
 pub(super) fn write(image: &Image, encoding: Encoding, mean: Mean, words: &mut [u32], first_word: u32) {
     let coding = Coding::of(image, encoding);
     let sizes: Vec<_> = sizes(image.width, image.height).collect();
     let (table, mut rest) = words.split_at_mut(sizes.len());
     let mut begin = first_word + sizes.len() as u32;
-    let mut before: Option<Level> = None;
+    let mut before: Option<Mip> = None;
     for (size, entry) in sizes.into_iter().zip(table) {
-        let (level, after) = rest.split_at_mut(size[0] as usize * size[1] as usize * coding.n_words());
+        let (mip, after) = rest.split_at_mut(size[0] as usize * size[1] as usize * coding.n_words());
         match &before {
-            None => write_pixels(image, encoding, level),
-            Some(before) => before.write_smaller(size, level),
+            None => write_pixels(image, encoding, mip),
+            Some(before) => before.write_smaller(size, mip),
         }
         *entry = begin;
-        begin += level.len() as u32;
-        before = Some(Level { words: level, size, coding, mean });
+        begin += mip.len() as u32;
+        before = Some(Mip { words: mip, size, coding, mean });
         rest = after;
     }
 }
 
-/// Writes level 0.
+/// Writes mip 0.
 fn write_pixels(image: &Image, encoding: Encoding, words: &mut [u32]) {
     match &image.pixels {
         Pixels::Bytes(pixels) => {
@@ -152,16 +152,16 @@ fn write_pixels(image: &Image, encoding: Encoding, words: &mut [u32]) {
     }
 }
 
-/// A level that has been written.
-struct Level<'a> {
+/// A mip level that has been written.
+struct Mip<'a> {
     words: &'a [u32],
     size: [u32; 2],
     coding: Coding,
     mean: Mean,
 }
 
-impl Level<'_> {
-    /// Writes the next level, of the given size.
+impl Mip<'_> {
+    /// Writes the next mip level, of the given size.
     fn write_smaller(&self, size: [u32; 2], words: &mut [u32]) {
         let row_words = size[0] as usize * self.coding.n_words();
         let columns: Vec<_> = (0..size[0]).map(|x| Taps::new(x, self.size[0], size[0])).collect();
@@ -173,7 +173,7 @@ impl Level<'_> {
         });
     }
 
-    /// Returns the mean of the texels under a texel of the next level.
+    /// Returns the mean of the texels under a texel of the next mip level.
     fn mean(&self, columns: &Taps, rows: &Taps) -> [f32; 4] {
         let (mut seen, mut all, mut opacity) = ([0.0; 3], [0.0; 3], 0.0);
         for (y, row_weight) in rows.iter() {
@@ -199,16 +199,16 @@ impl Level<'_> {
     }
 }
 
-/// The texels under a texel of the next level along an axis, at most three, and how much of the latter each covers.
+/// The texels under a texel of the next mip level along an axis, at most three, and how much of the latter each covers.
 struct Taps {
     first: u32,
     weights: [f32; 3],
 }
 
 impl Taps {
-    /// `ix`: index of the texel of the next level, which has `n_smaller` in place of `n`.
+    /// `ix`: index of the texel of the next mip level, which has `n_smaller` in place of `n`.
     fn new(ix: u32, n: u32, n_smaller: u32) -> Self {
-        // Both levels have n * n_smaller units.
+        // Both mip levels have n * n_smaller units.
         let [n, n_smaller, ix] = [n, n_smaller, ix].map(u64::from);
         let (begin, end) = (ix * n, (ix + 1) * n);
         let first = begin / n_smaller;
@@ -234,22 +234,22 @@ mod tests {
         Image { name: "image".to_owned(), width, height, pixels: Pixels::Bytes(pixels), is_linear: false }
     }
 
-    /// Returns the levels of an image as bytes.
-    fn levels(image: &Image, encoding: Encoding) -> Vec<Vec<[u8; 4]>> {
-        levels_by(image, encoding, Mean::OfSeen)
+    /// Returns the mip levels of an image as bytes.
+    fn mips(image: &Image, encoding: Encoding) -> Vec<Vec<[u8; 4]>> {
+        mips_by(image, encoding, Mean::OfSeen)
     }
 
-    fn levels_by(image: &Image, encoding: Encoding, mean: Mean) -> Vec<Vec<[u8; 4]>> {
+    fn mips_by(image: &Image, encoding: Encoding, mean: Mean) -> Vec<Vec<[u8; 4]>> {
         let mut words = vec![0; n_words(image, Coding::of(image, encoding)) as usize];
         write(image, encoding, mean, &mut words, 1000);
         let sizes: Vec<_> = sizes(image.width, image.height).map(|[w, h]| (w * h) as usize).collect();
         let mut begin = sizes.len();
-        let of_level = |(level, n): (usize, &usize)| {
-            assert_eq!(words[level], 1000 + begin as u32);
+        let of_mip = |(mip, n): (usize, &usize)| {
+            assert_eq!(words[mip], 1000 + begin as u32);
             begin += n;
             words[begin - n..begin].iter().map(|word| word.to_le_bytes()).collect()
         };
-        sizes.iter().enumerate().map(of_level).collect()
+        sizes.iter().enumerate().map(of_mip).collect()
     }
 
     /// The values are those of the standard: a byte of 10 is on the straight part, and 188 is nearest to one half.
@@ -278,8 +278,8 @@ mod tests {
     fn the_mean_is_one_of_light() {
         let checkers = (0..16).map(|i| [[0, 0, 0, 255], [255, 255, 255, 255]][(i + i / 4) % 2]).collect();
         let checkers = image(4, 4, checkers);
-        assert_eq!(levels(&checkers, Encoding::Srgb)[1..], [vec![[188, 188, 188, 255]; 4], vec![[188, 188, 188, 255]]]);
-        assert_eq!(levels(&checkers, Encoding::Linear)[1][0], [128, 128, 128, 255]);
+        assert_eq!(mips(&checkers, Encoding::Srgb)[1..], [vec![[188, 188, 188, 255]; 4], vec![[188, 188, 188, 255]]]);
+        assert_eq!(mips(&checkers, Encoding::Linear)[1][0], [128, 128, 128, 255]);
     }
 
     /// Three texels become one, and five become two: 0.4, 0.4 and 0.2 of the first three, and the mirror image of it.
@@ -287,24 +287,24 @@ mod tests {
     fn odd_sides_are_weighted_by_area() {
         let greys = |values: &[u8]| values.iter().map(|v| [*v, *v, *v, 255]).collect::<Vec<_>>();
         let row = image(5, 1, greys(&[10, 20, 30, 40, 50]));
-        assert_eq!(levels(&row, Encoding::Linear)[1..], [greys(&[18, 42]), greys(&[30])]);
+        assert_eq!(mips(&row, Encoding::Linear)[1..], [greys(&[18, 42]), greys(&[30])]);
         let column = image(1, 3, greys(&[10, 20, 60]));
-        assert_eq!(levels(&column, Encoding::Linear)[1..], [greys(&[30])]);
+        assert_eq!(mips(&column, Encoding::Linear)[1..], [greys(&[30])]);
     }
 
     #[test]
     fn what_cannot_be_seen_does_not_bleed() {
         let leaf = image(2, 1, vec![[10, 200, 30, 255], [255, 0, 255, 0]]);
-        assert_eq!(levels(&leaf, Encoding::Srgb)[1], [[10, 200, 30, 128]]);
+        assert_eq!(mips(&leaf, Encoding::Srgb)[1], [[10, 200, 30, 128]]);
         let weighted = image(2, 1, vec![[100, 0, 0, 51], [200, 0, 0, 153]]);
-        assert_eq!(levels(&weighted, Encoding::Linear)[1], [[175, 0, 0, 102]]);
+        assert_eq!(mips(&weighted, Encoding::Linear)[1], [[175, 0, 0, 102]]);
         let unseen = image(2, 1, vec![[100, 0, 0, 0], [200, 0, 0, 0]]);
-        assert_eq!(levels(&unseen, Encoding::Linear)[1], [[150, 0, 0, 0]]);
+        assert_eq!(mips(&unseen, Encoding::Linear)[1], [[150, 0, 0, 0]]);
     }
 
     #[test]
     fn data_beside_opacity_is_averaged_plainly() {
         let roughness = image(2, 1, vec![[100, 0, 0, 0], [200, 0, 0, 255]]);
-        assert_eq!(levels_by(&roughness, Encoding::Linear, Mean::OfAll)[1], [[150, 0, 0, 128]]);
+        assert_eq!(mips_by(&roughness, Encoding::Linear, Mean::OfAll)[1], [[150, 0, 0, 128]]);
     }
 }
