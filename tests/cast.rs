@@ -8,7 +8,7 @@ use fearless_simd::Level;
 use glam::{Vec3, vec3};
 use kdray::{
     accel::{Accel, AccelOptions, Query, grid::GridOptions, kdtree::Traversal, wide_bvh::WideBvh},
-    cast::{Caster, Hit, NO_TRIANGLE, Ray, cast_on_cpu},
+    cast::{GpuCaster, Hit, NO_TRIANGLE, Ray, cast_on_cpu},
     cpu::wide_traverser::WideTraverser,
     gpu::Context,
     layout::{KD_MAX_DEPTH, KD_WORD_DEPTH, PathRay},
@@ -40,8 +40,8 @@ impl Device {
         Self(with_lanes(n_lanes))
     }
 
-    fn caster(&self, world: &MeshWithTree, traversal: Traversal) -> Caster {
-        Caster::new(&self.0, world.geometry(), traversal).expect("a caster")
+    fn caster(&self, world: &MeshWithTree, traversal: Traversal) -> GpuCaster {
+        GpuCaster::new(&self.0, world.geometry(), traversal).expect("a caster")
     }
 
     /// Returns the number of rays that may differ from the CPU's. It is 0 where the arithmetic is exactly the CPU's.
@@ -278,7 +278,7 @@ fn ways_to_cast<'a>(
     let mut ways: Vec<Way> = Vec::new();
     for (way_ix, (traversal, geometry)) in trees.chain(grids.iter().map(of_grid)).enumerate() {
         let name = format!("{way_ix}: {} by {traversal}", geometry.accel().kind());
-        let mut caster = Caster::new(&device.0, geometry, traversal).expect("a caster");
+        let mut caster = GpuCaster::new(&device.0, geometry, traversal).expect("a caster");
         let on_device = move |rays: &[Ray], query| caster.cast(rays, query, 1).expect("a cast").hits;
         ways.push((format!("{name} on the device"), Box::new(on_device)));
         let on_cpu = move |rays: &[Ray], query| cast_on_cpu(geometry, traversal, rays, query);

@@ -10,14 +10,14 @@ use kdray::{
         AccelOptions, Query,
         kdtree::{BuildOptions, Traversal},
     },
-    cast::{Caster, Ray},
+    cast::{GpuCaster, Ray},
     engine::choices::{
         Cache, Candidates, Chosen, Key, Reason, Request, Timings, TreeKind, Workload, measure_traversals,
     },
     frame::{Primary, RenderOptions},
     gpu::DeviceInfo,
     layout::Triangle,
-    render::Renderer,
+    render::GpuRenderer,
     scene::{Camera, Projection},
     world::{FlatScene, World},
 };
@@ -206,7 +206,7 @@ fn hits(context: &std::sync::Arc<kdray::gpu::Context>, world: &World, by: Traver
         Ray { origin, t_min: 0.0, direction: target - origin, t_max: f32::INFINITY }
     };
     let rays: Vec<_> = (0..3000).map(ray).collect();
-    let mut caster = Caster::new(context, world.geometry(), by).expect("a caster");
+    let mut caster = GpuCaster::new(context, world.geometry(), by).expect("a caster");
     bytemuck::cast_slice(&caster.cast(&rays, Query::Closest, 1).expect("a cast").hits).to_vec()
 }
 
@@ -272,7 +272,7 @@ fn primary_rays_are_measured_where_that_changes_no_bit() {
     assert_eq!(primary_of(other_size).by, Reason::Rule);
     let pictures = [Primary::SoftwareRaster, Primary::Trace].map(|primary| {
         let options = RenderOptions { primary, ..options.clone() };
-        let mut renderer = Renderer::new(context.clone(), &world, &options).expect("a renderer");
+        let mut renderer = GpuRenderer::new(context.clone(), &world, &options).expect("a renderer");
         renderer.render().expect("a frame").0
     });
     assert!(pictures[0] == pictures[1]);

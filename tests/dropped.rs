@@ -14,7 +14,7 @@ use ash::vk;
 use glam::Vec3;
 use kdray::{
     accel::{Query, kdtree::Traversal},
-    cast::{Caster, Hit, NO_TRIANGLE, Ray},
+    cast::{GpuCaster, Hit, NO_TRIANGLE, Ray},
     engine::{Built, Engine, choices::Workload},
     frame::{Goal, RenderOptions},
     gpu::{Context, Device, DeviceOverrides, ExternalBuffer, ExternalCommands, ExternalImage, TimelinePoint},
@@ -134,7 +134,7 @@ fn casts_that_are_recorded() {
             let device = device(&program);
             let engine = Engine::on_device(&device);
             let Built { world, .. } = engine.build_flat(scene.clone(), &Workload::of_rays(64)).expect("a world");
-            let mut caster = Caster::new(&device, world.geometry(), Traversal::Mask).expect("a caster");
+            let mut caster = GpuCaster::new(&device, world.geometry(), Traversal::Mask).expect("a caster");
             let external = |raw, bytes: usize| ExternalBuffer::new(raw, 0, 64 * bytes as u64);
             let (from, to) = (external(ray_buffer, size_of::<Ray>()), external(hit_buffer, size_of::<Hit>()));
             let cast = caster.recorded(from, to, Query::Closest).expect("a recorded cast");

@@ -7,7 +7,7 @@ use fearless_simd::Level;
 use glam::Vec3;
 use kdray::{
     accel::{Query, kdtree::Traversal, wide_bvh::WideBvh},
-    cast::{Caster, CpuCaster, Hit, NO_TRIANGLE, Ray},
+    cast::{CpuCaster, GpuCaster, Hit, NO_TRIANGLE, Ray},
     layout::{TRIANGLE_HIDDEN, Triangle},
     reference::{
         brute,
@@ -77,7 +77,7 @@ fn the_device_finds_what_is_not_hidden() {
         let rays = case.rays();
         let expected = case.by_brute_force(&rays);
         for &traversal in Traversal::ALL {
-            let caster = Caster::new(&context, case.mesh.geometry(), traversal).expect("a caster");
+            let caster = GpuCaster::new(&context, case.mesh.geometry(), traversal).expect("a caster");
             let mut caster = caster.hiding(&case.hidden).expect("hidden triangles");
             let closest = caster.cast(&rays, Query::Closest, 1).expect("a cast").hits;
             compare::hits(n_outliers(rays.len()), &expected, &closest).unwrap_or_else(|e| panic!("{traversal}: {e}"));

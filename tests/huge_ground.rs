@@ -10,7 +10,7 @@ use kdray::{
         Query,
         kdtree::{BuildOptions, KdTree, Traversal},
     },
-    cast::{Caster, Ray, cast_on_cpu},
+    cast::{GpuCaster, Ray, cast_on_cpu},
     cpu::tracer::FastTracer,
     layout::{Hit, PathRay, Triangle},
     reference::{
@@ -201,7 +201,7 @@ fn the_device_finds_the_same() {
         let rays: Vec<Ray> = (0..).zip(rays).map(|(i, ray)| cast(ray, if i % 4 == 0 { -1.0 } else { 0.0 })).collect();
         for traversal in tree_traversals() {
             let expected = cast_on_cpu(world.geometry(), traversal, &rays, Query::Closest);
-            let mut caster = Caster::new(&context, world.geometry(), traversal).expect("a caster");
+            let mut caster = GpuCaster::new(&context, world.geometry(), traversal).expect("a caster");
             let found = caster.cast(&rays, Query::Closest, 1).expect("a cast").hits;
             if context.is_software() {
                 support::compare::exact(&expected, &found).unwrap();

@@ -6,7 +6,7 @@ mod support;
 use glam::{Vec3, vec3};
 use kdray::{
     accel::{Accel, AccelOptions, Query, grid::GridOptions, kdtree::Traversal},
-    cast::{Caster, Ray, cast_on_cpu},
+    cast::{GpuCaster, Ray, cast_on_cpu},
     layout::{Hit, NO_TRIANGLE, Triangle},
     world::Geometry,
 };
@@ -92,7 +92,7 @@ fn check(triangles: Vec<Triangle>) {
     let on_cpu = assert_alike(&world, |geometry, traversal, query| cast_on_cpu(geometry, traversal, &rays, query));
     let context = device();
     let on_device = assert_alike(&world, |geometry, traversal, query| {
-        let mut caster = Caster::new(&context, geometry, traversal).expect("a caster");
+        let mut caster = GpuCaster::new(&context, geometry, traversal).expect("a caster");
         caster.cast(&rays, query, 1).expect("a cast").hits
     });
     if context.is_software() {

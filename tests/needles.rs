@@ -6,7 +6,7 @@ mod support;
 use glam::{DVec3, Vec3};
 use kdray::{
     accel::{Query, kdtree::Traversal},
-    cast::{Caster, Ray, cast_on_cpu},
+    cast::{GpuCaster, Ray, cast_on_cpu},
     layout::{Hit, NO_TRIANGLE, PathRay, Triangle},
     reference::triangle::Shear,
 };
@@ -257,7 +257,7 @@ fn needles_in_a_tree_are_hit_where_they_are() {
             compare::exact(&expected, &traced::<false>(&world, level, &rays)).unwrap();
         }
         for (context, traversal) in ways {
-            let mut caster = Caster::new(context, world.geometry(), traversal).expect("a caster");
+            let mut caster = GpuCaster::new(context, world.geometry(), traversal).expect("a caster");
             let found = caster.cast(&casts, Query::Closest, 1).expect("a cast").hits;
             check(&world, &rays, &found);
             // On other devices, divisions are 2.5 units in the last place off.

@@ -10,7 +10,7 @@ use kdray::{
     frame::{BounceStats, Pass, PassTime, Primary, Profile, RenderOptions, Scope, View},
     gpu::Context,
     layout::Counters,
-    render::Renderer,
+    render::GpuRenderer,
     world::FlatScene,
 };
 use serde_json::Value;
@@ -26,9 +26,9 @@ fn options() -> RenderOptions {
     RenderOptions { width: 40, height: 30, max_depth: 4, ..RenderOptions::default() }
 }
 
-fn renderer(context: &Arc<Context>, scene: &FlatScene, options: &RenderOptions, capacity: u32) -> Renderer {
+fn renderer(context: &Arc<Context>, scene: &FlatScene, options: &RenderOptions, capacity: u32) -> GpuRenderer {
     let world = world_of(scene);
-    Renderer::with_queue_capacity(context.clone(), &world, options, capacity).expect("a renderer")
+    GpuRenderer::with_queue_capacity(context.clone(), &world, options, capacity).expect("a renderer")
 }
 
 fn n_rays_in(passes: &[PassTime], name: &str, bounce: Option<u32>) -> u64 {
@@ -70,7 +70,7 @@ fn the_table_has_every_pass_and_tracing_takes_all_that_find_primary_hits() {
                 names.extend(checked_names(&renderer.draw_sample().expect("a sample"), "pixel_aovs"));
             }
         }
-        let mut on_cpu = cpu::Renderer::new(&world, &options, Batching::default());
+        let mut on_cpu = cpu::CpuRenderer::new(&world, &options, Batching::default());
         (0..2).for_each(|_sample| names.extend(checked_names(&on_cpu.draw_sample(), "pixel_aovs")));
     }
     let software_raster = |name: &str| name.starts_with("rasterize_") && !context.has_int64_atomics();
@@ -140,7 +140,7 @@ fn without_a_profile_nothing_is_measured() {
         let (same_picture, nothing) = bare.render().expect("a frame");
         assert!(picture == same_picture && !profile.passes.is_empty());
         assert_eq!((nothing.passes.len(), nothing.bounces.len(), nothing.frame_ms), (0, 0, None));
-        let counters = |renderer: &Renderer| renderer.resources().counters().expect("counters");
+        let counters = |renderer: &GpuRenderer| renderer.resources().counters().expect("counters");
         assert!(counters(&measured).iter().any(|counters| counters.n_hits > 0 && counters.n_shadow_rays > 0));
         assert!(counters(&bare).iter().all(|counters| *counters == Counters::default()));
     }

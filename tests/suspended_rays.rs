@@ -8,11 +8,11 @@ use std::sync::Arc;
 use glam::{Vec3, vec3};
 use kdray::{
     accel::{Accel, AccelOptions, Query, grid::GridOptions, kdtree::Traversal},
-    cast::{Caster, Hit, NO_TRIANGLE, Ray, cast_on_cpu},
+    cast::{GpuCaster, Hit, NO_TRIANGLE, Ray, cast_on_cpu},
     frame::{Picture, Primary, Profile, RenderOptions},
     gpu::{Context, DeviceOverrides},
     layout::{PixelAovs, Triangle},
-    render::Renderer,
+    render::GpuRenderer,
     world::Geometry,
 };
 use support::{
@@ -31,7 +31,7 @@ fn limited_device(loop_limit: u32, n_lanes: Option<u32>, n_suspension_slots: Opt
 }
 
 fn cast(context: &Arc<Context>, world: &MeshWithTree, traversal: Traversal, query: Query, rays: &[Ray]) -> Vec<Hit> {
-    let mut caster = Caster::new(context, world.geometry(), traversal).expect("a caster");
+    let mut caster = GpuCaster::new(context, world.geometry(), traversal).expect("a caster");
     caster.cast(rays, query, 1).expect("a cast").hits
 }
 
@@ -87,7 +87,7 @@ fn a_leaf_of_more_triangles_than_a_driver_takes_turns_is_searched_to_its_end() {
     for accel in grids(&world.triangles) {
         let geometry = Geometry::new(&world.triangles, &accel).expect("a grid of these triangles");
         for query in [Query::Closest, Query::Any] {
-            let mut caster = Caster::new(&context, geometry, Traversal::OF_GPUS).expect("a caster");
+            let mut caster = GpuCaster::new(&context, geometry, Traversal::OF_GPUS).expect("a caster");
             let hits = caster.cast(&rays, query, 1).expect("a cast").hits;
             assert_eq!(n_right(N, &hits, query), rays.len(), "{} {query:?}", accel.kind());
         }
@@ -148,7 +148,7 @@ fn interrupted_casts_through_grids_find_the_same() {
     for accel in grids(&world.triangles) {
         let geometry = Geometry::new(&world.triangles, &accel).expect("a grid of these triangles");
         let cast = |context: &Arc<Context>, query| {
-            let mut caster = Caster::new(context, geometry, Traversal::OF_GPUS).expect("a caster");
+            let mut caster = GpuCaster::new(context, geometry, Traversal::OF_GPUS).expect("a caster");
             caster.cast(&rays, query, 1).expect("a cast").hits
         };
         for n_lanes in [None, Some(1000)] {
@@ -181,7 +181,7 @@ fn options(traversal: Traversal, primary: Primary) -> RenderOptions {
 fn draw(context: &Arc<Context>, options: &RenderOptions) -> (Picture, Vec<PixelAovs>, Profile) {
     let scene = scenes::mixed();
     let world = world_of(&scene);
-    let mut renderer = Renderer::new(context.clone(), &world, options).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), &world, options).expect("a renderer");
     let (picture, profile) = renderer.render().expect("a frame");
     let pixel_aovs = renderer.pixel_aovs().expect("pixel_aovs");
     (picture, pixel_aovs, profile)

@@ -12,7 +12,7 @@ use std::{
 use glam::Vec3;
 use kdray::{
     accel::Query,
-    cast::{Caster, Hit, Ray, RecordedCast},
+    cast::{GpuCaster, Hit, Ray, RecordedCast},
     engine::{self, Built, Engine, choices::Workload},
     frame::{Goal, Integrator, Picture, RenderOptions},
     gpu::{Access, Buffer, BufferUse, CommandBuffer, Commands, Device},
@@ -175,10 +175,10 @@ fn threads_may_have_everything() {
     sync::<Device>();
     sync::<Engine>();
     sync::<World>();
-    sync::<Caster>();
+    sync::<GpuCaster>();
     sync::<RecordedCast>();
     sync::<engine::Caster>();
     sync::<engine::Renderer>();
-    sync::<render::Renderer>();
+    sync::<render::GpuRenderer>();
     send::<engine::FilmRenderer>();
 }

@@ -12,7 +12,7 @@ use kdray::{
         kdtree::{BuildOptions, Traversal},
     },
     buffers::{Needs, Resources},
-    cast::{Caster, Ray},
+    cast::{GpuCaster, Ray},
     frame::RenderOptions,
     gpu::{Access, Context, GpuError},
     layout::{
@@ -20,7 +20,7 @@ use kdray::{
         LIGHT_UNTESTED, Light, NO_TRIANGLE, PathRay, Triangle,
     },
     passes::Passes,
-    render::Renderer,
+    render::GpuRenderer,
     scene::{Camera, Projection, RenderDefaults},
     world::{FlatScene, World},
 };
@@ -169,13 +169,13 @@ fn rays_from_inside_never_leak() {
         let scene = scene(&triangles);
         let [grid, grid2] = support::grid_worlds(&scene);
         for world in [world_by(&scene, &BuildOptions::default()), grid, grid2] {
-            let mut caster = Caster::new(&context, world.geometry(), Traversal::Mask).expect("a caster");
+            let mut caster = GpuCaster::new(&context, world.geometry(), Traversal::Mask).expect("a caster");
             let hits = caster.cast(&rays, Query::Closest, 1).expect("a cast").hits;
             let n_leaks = hits.iter().filter(|hit| hit.triangle_ix == NO_TRIANGLE).count();
             assert_eq!(n_leaks, 0, "{name}, {}", world.accel().kind());
         }
         let with_a_hole = world_by(&self::scene(&triangles[1..]), &BuildOptions::default());
-        let mut caster = Caster::new(&context, with_a_hole.geometry(), Traversal::Mask).expect("a caster");
+        let mut caster = GpuCaster::new(&context, with_a_hole.geometry(), Traversal::Mask).expect("a caster");
         let hits = caster.cast(&rays, Query::Closest, 1).expect("a cast").hits;
         assert!(hits.iter().any(|hit| hit.triangle_ix == NO_TRIANGLE), "{name}: a hole is noticed");
     }
@@ -211,6 +211,6 @@ fn brute_force_refuses_large_meshes() {
     let triangles = vec![meshes::triangle(Vec3::X, Vec3::Y, Vec3::Z); BRUTE_MAX_TRIANGLES as usize + 1];
     let world = world_by(&scene(&triangles), &BuildOptions::fast());
     let options = RenderOptions { width: 8, height: 8, traversal: Traversal::Brute, ..RenderOptions::default() };
-    let refused = Renderer::new(device(), &world, &options).err();
+    let refused = GpuRenderer::new(device(), &world, &options).err();
     assert!(matches!(refused, Some(GpuError::Limit { value: 65_001, limit: 65_000, .. })), "{refused:?}");
 }

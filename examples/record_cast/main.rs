@@ -14,7 +14,7 @@ use ash::vk;
 use glam::Vec3;
 use kdray::{
     accel::{Query, kdtree::Traversal},
-    cast::{Caster, Hit, NO_TRIANGLE, Ray},
+    cast::{GpuCaster, Hit, NO_TRIANGLE, Ray},
     engine::{Built, Engine, choices::Workload},
     gpu::{Device, ExternalBuffer, ExternalCommands},
     scene::Scene,
@@ -65,7 +65,7 @@ unsafe fn cast(program: &Program, buffers: &Buffers, scene: Scene) -> Result<(),
     };
     let engine = Engine::on_device(&device);
     let Built { world, .. } = engine.build(scene, &Workload::of_rays(N_RAYS as u64))?;
-    let mut caster = Caster::new(&device, world.geometry(), Traversal::Mask)?;
+    let mut caster = GpuCaster::new(&device, world.geometry(), Traversal::Mask)?;
     let cast = caster.recorded(rays, hits, Query::Closest)?;
     let record = |commands: vk::CommandBuffer| {
         // The cast needs no barrier before it: the submission makes the rays, which the host has written, visible.

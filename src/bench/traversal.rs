@@ -19,7 +19,7 @@ use crate::{
         Query,
         kdtree::{Statistics, Traversal},
     },
-    cast::{Caster, Ray, cast_ray},
+    cast::{GpuCaster, Ray, cast_ray},
     cpu,
     gpu::{Device, GpuError, Statistic, StatisticValue},
     layout::{Hit, NO_TRIANGLE},
@@ -34,17 +34,17 @@ pub struct Tracers<'a> {
     stage: &'a Stage,
     variants: &'a [Variant],
     /// One caster per variant; `None` if the CPU casts with all threads of the current rayon pool.
-    casters: Option<Vec<Caster>>,
+    casters: Option<Vec<GpuCaster>>,
 }
 
 impl<'a> Tracers<'a> {
     /// Prepares the variants on a device, or on the current rayon pool if there is none.
     ///
     /// # Errors
-    /// Fails as [`Caster::new`] does.
+    /// Fails as [`GpuCaster::new`] does.
     pub fn new(device: Option<&Device>, stage: &'a Stage, variants: &'a [Variant]) -> Result<Self, GpuError> {
         let caster =
-            |device: &Device, variant: Variant| Caster::new(device, stage.geometry(variant), variant.traversal());
+            |device: &Device, variant: Variant| GpuCaster::new(device, stage.geometry(variant), variant.traversal());
         let casters = device.map(|device| variants.iter().map(|&variant| caster(device, variant)).collect());
         Ok(Self { stage, variants, casters: casters.transpose()? })
     }
@@ -52,7 +52,7 @@ impl<'a> Tracers<'a> {
     /// Casts the rays `n_times` with each variant, in turns, and compares the hits with those that the CPU finds.
     ///
     /// # Errors
-    /// Fails as [`Caster::cast`] does.
+    /// Fails as [`GpuCaster::cast`] does.
     pub fn measure(&mut self, set: &RaySet, n_times: u16) -> Result<SetResult, GpuError> {
         let rays: Vec<_> = set.rays.iter().map(cast_ray).collect();
         let query = query_of(set);
@@ -95,13 +95,13 @@ impl<'a> Tracers<'a> {
     /// thousand, so each has a number of its own.
     ///
     /// # Errors
-    /// Fails as [`Caster::cast`] does.
+    /// Fails as [`GpuCaster::cast`] does.
     #[doc(hidden)]
     pub fn n_warm_up(&mut self, set: &RaySet) -> Result<Vec<u16>, GpuError> {
         let Some(casters) = &mut self.casters else { return Ok(vec![1; self.variants.len()]) };
         let rays: Vec<_> = set.rays.iter().map(cast_ray).collect();
         let query = query_of(set);
-        let n_casts = |caster: &mut Caster| {
+        let n_casts = |caster: &mut GpuCaster| {
             let once_ms = caster.cast(&rays, query, 1)?.gpu_ms.map_or(f64::INFINITY, |ms| ms.iter().sum());
             Ok((WARM_UP.as_secs_f64() * 1e3 / once_ms.max(1e-2)).clamp(1.0, 1000.0) as u16)
         };

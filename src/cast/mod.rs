@@ -1,7 +1,7 @@
 //! Casts the caller's rays on a device or on the CPU, and returns their hits. No frame is involved.
 //!
 //! ```text
-//! RayReader ─> batches ─> Caster (runs the kernel once for each repetition) ─> HitWriter
+//! RayReader ─> batches ─> GpuCaster (runs the kernel once for each repetition) ─> HitWriter
 //!   .npy                                                                         .npz
 //! ```
 
@@ -60,7 +60,7 @@ pub const RAYS_PER_BATCH: usize = 1 << 21;
 pub const MOST_REPETITIONS: u32 = 10_000;
 
 /// Casts rays on a device, which holds the triangles and their acceleration structure.
-pub struct Caster {
+pub struct GpuCaster {
     context: Arc<Context>,
     /// The triangles and their acceleration structure, which may also be a grid.
     tree: AccelBuffers,
@@ -74,7 +74,7 @@ pub struct Caster {
     rays_per_batch: usize,
 }
 
-impl Caster {
+impl GpuCaster {
     /// Uploads the triangles and their acceleration structure.
     ///
     /// # Errors
@@ -230,7 +230,7 @@ pub fn count_invalid(rays: &[Ray]) -> u64 {
     rays.par_iter().filter(|ray| !reference::cast::is_ray(ray)).count() as u64
 }
 
-/// Casts rays on the current rayon pool, as [`Caster`] does on a device.
+/// Casts rays on the current rayon pool, as [`GpuCaster`] does on a device.
 pub struct CpuCaster<'a> {
     geometry: Geometry<'a>,
     traversal: Traversal,
@@ -269,7 +269,7 @@ impl<'a> CpuCaster<'a> {
     }
 }
 
-/// Casts rays by a [`CpuCaster`], and returns one hit for each. The hits are those that a [`Caster`] finds.
+/// Casts rays by a [`CpuCaster`], and returns one hit for each. The hits are those that a [`GpuCaster`] finds.
 pub fn cast_on_cpu(geometry: Geometry, traversal: Traversal, rays: &[Ray], query: Query) -> Vec<Hit> {
     CpuCaster::new(geometry, traversal).cast(rays, query)
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Caster, Hit, Ray, most_rays};
+use super::{GpuCaster, Hit, Ray, most_rays};
 use crate::{
     accel::Query,
     buffers::{CastResources, ResumePass, SuspendedRays},
@@ -20,7 +20,7 @@ pub struct RecordedCast {
     n_rays: u32,
 }
 
-impl Caster {
+impl GpuCaster {
     /// Prepares a cast of rays in a device buffer of the caller. `rays` is filled with elements of [`Ray`]. The cast
     /// writes one [`Hit`] for each ray to `hits`.
     ///
@@ -55,7 +55,7 @@ impl RecordedCast {
     /// storage. Rays that the host has written before the submission need no barrier. The cast replaces the pipeline,
     /// descriptor set and push constants that are bound for compute, and the descriptor set for graphics.
     ///
-    /// A cast may not run twice at the same time. Several casts of a [`Caster`] may.
+    /// A cast may not run twice at the same time. Several casts of a [`GpuCaster`] may.
     pub fn record(&self, commands: &ExternalCommands) {
         let commands = commands.commands(&self.context);
         self.suspended_rays.reset(&commands);

@@ -1,6 +1,6 @@
 //! The exposure of a picture whose light has physical units, measured as a camera does.
 
-use super::{Batching, Renderer};
+use super::{Batching, CpuRenderer};
 use crate::{
     accel::kdtree::Traversal,
     frame::{Denoise, Integrator, Primary, RenderOptions},
@@ -39,7 +39,7 @@ pub fn metered_exposure(world: &World) -> f32 {
         pixel_aovs: true,
         ..RenderOptions::default()
     };
-    let mut renderer = Renderer::new(world, &options, Batching::default());
+    let mut renderer = CpuRenderer::new(world, &options, Batching::default());
     for _ in 0..n_samples {
         renderer.draw_sample();
     }

@@ -47,7 +47,7 @@ pub mod wide_traverser;
 
 pub use self::{
     meter::metered_exposure,
-    render::{Batching, Renderer},
+    render::{Batching, CpuRenderer},
     trace::{cast, shadow, trace, visibility},
 };
 use crate::{
@@ -72,7 +72,7 @@ pub fn render(world: &World, options: &RenderOptions) -> (Picture, Profile) {
 
 /// Renders as [`render()`] does, in batches of a given size. The picture does not depend on the size.
 pub fn render_in_batches(world: &World, options: &RenderOptions, batching: Batching) -> (Picture, Profile) {
-    let mut renderer = Renderer::new(world, options, batching);
+    let mut renderer = CpuRenderer::new(world, options, batching);
     let profile = renderer.draw_sample();
     (renderer.picture(), profile)
 }

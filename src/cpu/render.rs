@@ -45,7 +45,7 @@ impl Default for Batching {
 }
 
 /// A renderer of one world on the CPU, which accumulates a picture sample by sample.
-pub struct Renderer {
+pub struct CpuRenderer {
     world: World,
     camera: Camera,
     options: RenderOptions,
@@ -90,7 +90,7 @@ pub struct Renderer {
     n_batches: u32,
 }
 
-impl Renderer {
+impl CpuRenderer {
     /// Creates a renderer with buffers for a picture of a world.
     pub fn new(world: &World, options: &RenderOptions, batching: Batching) -> Self {
         let frame = world.frame_constants(options);
@@ -135,13 +135,13 @@ impl Renderer {
     }
 
     /// Draws one more sample of each pixel on the current rayon pool. The first sample is at the pixel's centre. Of
-    /// paths, as many samples are drawn as [`Renderer::set_samples_per_frame`] says. The picture is the mean of all
+    /// paths, as many samples are drawn as [`CpuRenderer::set_samples_per_frame`] says. The picture is the mean of all
     /// samples.
     pub fn draw_sample(&mut self) -> Profile {
         self.draw_sample_with(|_| ())
     }
 
-    /// Draws as [`Renderer::draw_sample`] does. After each batch it calls `progress` with the share of the sample's
+    /// Draws as [`CpuRenderer::draw_sample`] does. After each batch it calls `progress` with the share of the sample's
     /// pixels that are drawn, 0 to 1.
     pub fn draw_sample_with(&mut self, mut progress: impl FnMut(f32)) -> Profile {
         self.clock = Clock::start();

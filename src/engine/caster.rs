@@ -13,7 +13,7 @@ use crate::{
 pub struct Caster<'a>(Backend<'a>);
 
 enum Backend<'a> {
-    Device(Box<cast::Caster>),
+    Device(Box<cast::GpuCaster>),
     Cpu(Box<CpuCaster<'a>>),
 }
 
@@ -25,7 +25,7 @@ impl<'a> Caster<'a> {
         traversal: Traversal,
     ) -> Result<Self, GpuError> {
         Ok(Self(match context {
-            Some(context) => Backend::Device(Box::new(cast::Caster::new(context, geometry, traversal)?)),
+            Some(context) => Backend::Device(Box::new(cast::GpuCaster::new(context, geometry, traversal)?)),
             None => Backend::Cpu(Box::new(CpuCaster::new(geometry, traversal))),
         }))
     }

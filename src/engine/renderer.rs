@@ -39,7 +39,7 @@ pub struct Renderer {
 enum Backend {
     Device(Box<BandedRenderer>),
     Group(Box<RendererGroup>),
-    Cpu(Box<cpu::Renderer>),
+    Cpu(Box<cpu::CpuRenderer>),
 }
 
 impl Renderer {
@@ -47,7 +47,7 @@ impl Renderer {
     pub(super) fn new(contexts: &[Arc<Context>], world: &World, options: &RenderOptions) -> Result<Self, GpuError> {
         options.check()?;
         let backend = match contexts {
-            [] => Backend::Cpu(Box::new(cpu::Renderer::new(world, options, Batching::default()))),
+            [] => Backend::Cpu(Box::new(cpu::CpuRenderer::new(world, options, Batching::default()))),
             [context] => Backend::Device(Box::new(BandedRenderer::new(Arc::clone(context), world, options)?)),
             contexts => Backend::Group(Box::new(RendererGroup::new(contexts, world, options)?)),
         };
@@ -241,7 +241,7 @@ impl<W: Watcher> BandProgress<'_, W> {
     }
 }
 
-fn draw_on_cpu(renderer: &mut cpu::Renderer, goal: Goal, watcher: &mut impl Watcher) -> Drawn {
+fn draw_on_cpu(renderer: &mut cpu::CpuRenderer, goal: Goal, watcher: &mut impl Watcher) -> Drawn {
     let integrator = renderer.options().integrator;
     let (mut pacer, mut drawn) = (Pacer::new(goal, integrator, SAMPLE_BLOCK_LOG2), Drawn::default());
     while let Some(log2) = pacer.next(renderer.n_samples()) {
@@ -263,7 +263,7 @@ fn draw_on_cpu(renderer: &mut cpu::Renderer, goal: Goal, watcher: &mut impl Watc
     drawn
 }
 
-fn draw_tiles_on_cpu(renderer: &mut cpu::Renderer, tiles: &[TileSamples]) -> Result<DrawnTiles, GpuError> {
+fn draw_tiles_on_cpu(renderer: &mut cpu::CpuRenderer, tiles: &[TileSamples]) -> Result<DrawnTiles, GpuError> {
     let mut all = DrawnTiles::default();
     for together in tiles.chunks(NoiseTiles::MOST) {
         let tiles = NoiseTiles::new(together)?;

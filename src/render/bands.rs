@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::{JoinedPicture, Renderer};
+use super::{GpuRenderer, JoinedPicture};
 use crate::{
     buffers::Pixels,
     frame::{Crop, Drawn, Goal, Integrator, Pacer, PathOptions, Picture, Profile, RenderOptions, Watcher},
@@ -17,10 +17,10 @@ use crate::{
     world::World,
 };
 
-/// Renderer of whole pictures of any size. If the widest buffer of pixels exceeds what the device can bind as one
+/// GpuRenderer of whole pictures of any size. If the widest buffer of pixels exceeds what the device can bind as one
 /// storage buffer, bands are drawn. The joined picture has the same bits as one that is drawn at once.
 pub struct BandedRenderer {
-    pub(super) renderer: Renderer,
+    pub(super) renderer: GpuRenderer,
     /// The bands from top to bottom, and from left to right. Together they are the picture, or its crop.
     pub(super) bands: Vec<Crop>,
     /// The picture that was drawn last, joined from its bands. None before the first picture is complete. Always None
@@ -47,8 +47,8 @@ impl BandedRenderer {
         let bands = bands(context.limits(), options);
         let is_slow = context.predicates_branches();
         let renderer = match largest(&bands, options) {
-            None => Renderer::new(context, world, options)?,
-            Some(crop) => Renderer::new(context, world, &RenderOptions { crop: Some(crop), ..options.clone() })?,
+            None => GpuRenderer::new(context, world, options)?,
+            Some(crop) => GpuRenderer::new(context, world, &RenderOptions { crop: Some(crop), ..options.clone() })?,
         };
         tracing::debug!(n_bands = bands.len(), "the picture's bands");
         Ok(Self { renderer, bands, joined: None, is_slow })
@@ -69,8 +69,8 @@ impl BandedRenderer {
         self.renderer.set_camera(camera);
     }
 
-    /// Sets the part of the picture that is drawn next, a rectangle. Buffers are kept as [`Renderer::set_crop`] keeps
-    /// them.
+    /// Sets the part of the picture that is drawn next, a rectangle. Buffers are kept as [`GpuRenderer::set_crop`]
+    /// keeps them.
     ///
     /// # Errors
     /// The crop is empty or exceeds the picture, or the part exceeds the device's limits or memory.
@@ -167,11 +167,11 @@ impl BandedRenderer {
         }
     }
 
-    /// Copies the displayed picture into an image that the caller owns, as [`Renderer::copy_picture_to`] does.
+    /// Copies the displayed picture into an image that the caller owns, as [`GpuRenderer::copy_picture_to`] does.
     ///
     /// # Errors
     /// The picture was drawn in several bands, so that it is not on the device. Also fails as
-    /// [`Renderer::copy_picture_to`] does.
+    /// [`GpuRenderer::copy_picture_to`] does.
     pub fn copy_picture_to(
         &self,
         image: &ExternalImage,

@@ -1,11 +1,11 @@
 //! Copies the picture into an image that the caller owns.
 
-use super::Renderer;
+use super::GpuRenderer;
 use crate::gpu::{Access, CommandBuffer, ExternalImage, GpuError, PixelRows, TimelinePoint};
 
-impl Renderer {
-    /// Copies the displayed picture, as [`Renderer::picture`] returns it, into the upper left corner of an image. The
-    /// device waits for `after`, copies, and signals `then`. The host does not wait.
+impl GpuRenderer {
+    /// Copies the displayed picture, as [`GpuRenderer::picture`] returns it, into the upper left corner of an image.
+    /// The device waits for `after`, copies, and signals `then`. The host does not wait.
     ///
     /// # Errors
     /// The image is smaller than the picture; out of memory; a call fails. Then nothing is signalled.

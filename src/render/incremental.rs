@@ -8,7 +8,7 @@ use std::{collections::VecDeque, mem, time::Instant};
 use glam::UVec2;
 use tracing::info_span;
 
-use super::{Renderer, schedule::Schedule};
+use super::{GpuRenderer, schedule::Schedule};
 use crate::{
     buffers::Needs,
     frame::{Integrator, Pass, Picture, Profile, View},
@@ -92,13 +92,13 @@ pub struct Displayed {
     pub camera: Camera,
 }
 
-impl Renderer {
+impl GpuRenderer {
     /// Draws one batch of the pending sample, or of the next sample if none is pending. Returns the whole sample's
     /// profile after its last batch, and None before that. Only the last batch changes the displayed picture. The
     /// pending sample is dropped when a new picture begins.
     ///
     /// # Errors
-    /// Fails as [`Renderer::draw_sample`] does.
+    /// Fails as [`GpuRenderer::draw_sample`] does.
     pub fn draw_batch(&mut self) -> Result<Option<Profile>, GpuError> {
         self.go_on(Until::Batch)
     }
@@ -108,7 +108,7 @@ impl Renderer {
     /// changes the displayed picture.
     ///
     /// # Errors
-    /// Fails as [`Renderer::draw_sample`] does.
+    /// Fails as [`GpuRenderer::draw_sample`] does.
     pub fn draw_part(&mut self) -> Result<Option<Profile>, GpuError> {
         self.go_on(Until::Part)
     }
@@ -144,7 +144,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// Returns the limit that [`Renderer::limit_batches`] has set.
+    /// Returns the limit that [`GpuRenderer::limit_batches`] has set.
     pub fn most_pixels(&self) -> Option<u32> {
         self.most_pixels
     }
@@ -282,7 +282,7 @@ impl Renderer {
         Ok(PartialSample { parts: parts.into(), n_done: 0, sample_ix, begun_at: None })
     }
 
-    /// Sets the view that the next sample and [`Renderer::show`] display: the picture, or an AOV in its place. A
+    /// Sets the view that the next sample and [`GpuRenderer::show`] display: the picture, or an AOV in its place. A
     /// AOVs is displayed only if the options ask for AOVs. `brightest`: in views of costs and of numbers of
     /// rays, the value that is displayed brightest; in the view of depth, the depth that is half as bright as
     /// depth 0.
@@ -310,7 +310,7 @@ impl Renderer {
         self.displayed
     }
 
-    /// Downloads the picture that [`Renderer::displayed`] describes, or returns None before there is one. Its
+    /// Downloads the picture that [`GpuRenderer::displayed`] describes, or returns None before there is one. Its
     /// radiance is empty, since a pending sample may have overwritten it. The picture must have no crop.
     ///
     /// # Errors

@@ -46,7 +46,7 @@ use crate::{
 };
 
 /// A scene on a device, which can be drawn any number of times: sample by sample, from any camera, with any options.
-pub struct Renderer {
+pub struct GpuRenderer {
     context: Arc<Context>,
     world: World,
     camera: Camera,
@@ -76,7 +76,7 @@ pub struct Renderer {
     displayed: Option<Displayed>,
 }
 
-impl Renderer {
+impl GpuRenderer {
     /// Uploads the scene and creates the pipelines.
     ///
     /// # Errors
@@ -90,7 +90,7 @@ impl Renderer {
     /// device.
     ///
     /// # Errors
-    /// Fails as [`Renderer::new`] does.
+    /// Fails as [`GpuRenderer::new`] does.
     pub fn sharing(&self, options: &RenderOptions) -> Result<Self, GpuError> {
         let scene = (self.context.clone(), &self.world);
         let mut next = Self::with_capacity(scene, options, self.budget.fixed_capacity, Some(self))?;
@@ -98,11 +98,11 @@ impl Renderer {
         Ok(next)
     }
 
-    /// Does what [`Renderer::new`] does, with a ray queue of `capacity` rays. A frame that makes more rays is split
+    /// Does what [`GpuRenderer::new`] does, with a ray queue of `capacity` rays. A frame that makes more rays is split
     /// into batches.
     ///
     /// # Errors
-    /// Fails as [`Renderer::new`] does.
+    /// Fails as [`GpuRenderer::new`] does.
     pub fn with_queue_capacity(
         context: Arc<Context>,
         world: &World,
@@ -177,19 +177,19 @@ impl Renderer {
     /// Draws a new picture with one sample a pixel, at the pixel's centre. The picture stays on the device.
     ///
     /// # Errors
-    /// Fails as [`Renderer::render`] does.
+    /// Fails as [`GpuRenderer::render`] does.
     pub fn draw(&mut self) -> Result<Profile, GpuError> {
         self.reset_samples();
         self.draw_sample()
     }
 
     /// Draws one more sample a pixel; the first is at the pixel's centre. Of paths, as many samples are drawn as
-    /// [`Renderer::set_samples_per_frame`] says, at random places. The picture, which stays on the device, is the mean
-    /// of all samples. If the ray queue overflows in a batch, the batch is halved and the sample is drawn
-    /// again. Later samples keep the smaller batches.
+    /// [`GpuRenderer::set_samples_per_frame`] says, at random places. The picture, which stays on the device, is the
+    /// mean of all samples. If the ray queue overflows in a batch, the batch is halved and the sample is drawn again.
+    /// Later samples keep the smaller batches.
     ///
     /// # Errors
-    /// Fails as [`Renderer::render`] does. If the error occurs before the commands of the sample are completely
+    /// Fails as [`GpuRenderer::render`] does. If the error occurs before the commands of the sample are completely
     /// recorded, the earlier samples are kept. Otherwise the next sample is the first of a new picture.
     pub fn draw_sample(&mut self) -> Result<Profile, GpuError> {
         loop {
@@ -200,7 +200,7 @@ impl Renderer {
     }
 
     /// Displays the mean of the samples again, filtered and encoded by the current options, or the AOVs of the
-    /// view. Draws no sample. The last sample must be complete, as for [`Renderer::picture`].
+    /// view. Draws no sample. The last sample must be complete, as for [`GpuRenderer::picture`].
     ///
     /// # Errors
     /// A Vulkan call fails.
@@ -289,7 +289,7 @@ impl Renderer {
     }
 
     /// Downloads the layers of the picture's light, which are empty if the options do not ask for them. The last sample
-    /// must be complete, as for [`Renderer::picture`].
+    /// must be complete, as for [`GpuRenderer::picture`].
     ///
     /// # Errors
     /// A copy fails.

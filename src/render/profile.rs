@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use super::Renderer;
+use super::GpuRenderer;
 use crate::{
     frame::{
         PassTime, Profile,
@@ -12,7 +12,7 @@ use crate::{
     layout::Bounce,
 };
 
-impl Renderer {
+impl GpuRenderer {
     /// Returns the profile of the last frame, which began at `begun_at`. The profile is empty if the options do not
     /// ask for one. `bounces`: the rows that the frame has left in the buffer.
     ///

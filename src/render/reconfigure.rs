@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::{Renderer, in_use, lanes_to_share, schedule::Schedule};
+use super::{GpuRenderer, in_use, lanes_to_share, schedule::Schedule};
 use crate::{
     buffers::{Needs, Resources},
     frame::{Crop, RenderOptions},
@@ -12,7 +12,7 @@ use crate::{
     scene::Camera,
 };
 
-impl Renderer {
+impl GpuRenderer {
     /// Sets the camera. The next sample is the first of a new picture.
     pub fn set_camera(&mut self, camera: &Camera) {
         self.camera = *camera;
@@ -52,7 +52,7 @@ impl Renderer {
     }
 
     /// Sets the part of the picture to render. If it changes, the next sample is the first of a new picture. Buffers
-    /// are kept as [`Renderer::resize`] keeps them.
+    /// are kept as [`GpuRenderer::resize`] keeps them.
     ///
     /// # Errors
     /// The crop is empty or exceeds the picture, or the part exceeds the device's limits or memory. Then nothing has
@@ -63,7 +63,7 @@ impl Renderer {
 
     /// Sets the options of the next samples. Only kernels that depend on a changed option are created again. Samples
     /// are kept if only their display changes: the exposure, the tone curve or the filter's threshold.
-    /// [`Renderer::show`] then displays them by the new options, unless a pending sample has overwritten some of
+    /// [`GpuRenderer::show`] then displays them by the new options, unless a pending sample has overwritten some of
     /// their radiance. A pending sample is dropped.
     ///
     /// # Errors

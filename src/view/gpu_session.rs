@@ -14,19 +14,19 @@ use crate::{
     frame::RenderOptions,
     gpu::{Context, ContextOptions, GpuError, Presenter, WindowHandles},
     passes::Present,
-    render::Renderer,
+    render::GpuRenderer,
 };
 
 /// A device that renders a scene and shows its pictures in a window.
 pub struct GpuSession {
     /// The renderer that draws now.
-    pub renderer: Renderer,
+    pub renderer: GpuRenderer,
     /// Choices made for the scene with which the device was opened.
     pub choices: Choices,
     present: Present,
     /// The renderer of the other kind of pictures, with its pass. It keeps its pipelines and buffers while it is not
     /// used.
-    other: Option<(Renderer, Present)>,
+    other: Option<(GpuRenderer, Present)>,
     /// Whether the picture of the other renderer is shown, since `renderer` has not drawn any since it was changed to.
     shows_other: bool,
     overlay: Overlay,
@@ -53,7 +53,7 @@ impl GpuSession {
         let options = methods.apply(options);
         let presenter = Presenter::new(&context, surface, vsync)?;
         let overlay = Overlay::new(&context, &presenter)?;
-        let renderer = Renderer::new(context.clone(), &loaded.world, &options)?;
+        let renderer = GpuRenderer::new(context.clone(), &loaded.world, &options)?;
         let present = Present::new(&context, renderer.resources(), &presenter)?;
         let choices = Choices::of_pictures(loaded.accel, methods);
         let (other, shows_other) = (None, false);
@@ -67,7 +67,7 @@ impl GpuSession {
     /// # Errors
     /// The buffers exceed the device's memory. Then nothing has changed.
     pub fn change_to(&mut self, options: &RenderOptions) -> Result<(), GpuError> {
-        let is_of = |renderer: &Renderer| PictureKind::of(renderer.options()) == PictureKind::of(options);
+        let is_of = |renderer: &GpuRenderer| PictureKind::of(renderer.options()) == PictureKind::of(options);
         let (renderer, present) = match self.other.take_if(|(renderer, _)| is_of(renderer)) {
             Some(other) => other,
             None => {
@@ -95,7 +95,7 @@ impl GpuSession {
     }
 
     /// Returns the renderer whose picture is shown.
-    pub fn front(&self) -> &Renderer {
+    pub fn front(&self) -> &GpuRenderer {
         match &self.other {
             Some((other, _)) if self.shows_other => other,
             _ => &self.renderer,
@@ -103,7 +103,7 @@ impl GpuSession {
     }
 
     /// Replaces the renderer that draws, and with it the other one.
-    fn install(&mut self, renderer: Renderer) -> Result<(), GpuError> {
+    fn install(&mut self, renderer: GpuRenderer) -> Result<(), GpuError> {
         let present = Present::new(&self.context, renderer.resources(), &self.presenter)?;
         self.context.wait_for_all()?;
         (self.renderer, self.present) = (renderer, present);
@@ -117,7 +117,7 @@ impl GpuSession {
     /// The scene exceeds the device's limits or memory.
     pub fn set_scene(&mut self, loaded: &LoadedScene) -> Result<(), GpuError> {
         let camera = *self.renderer.camera();
-        let mut renderer = Renderer::new(self.context.clone(), &loaded.world, self.renderer.options())?;
+        let mut renderer = GpuRenderer::new(self.context.clone(), &loaded.world, self.renderer.options())?;
         renderer.set_camera(&camera);
         self.install(renderer)
     }
@@ -132,7 +132,7 @@ impl GpuSession {
         let RenderOptions { width, height, .. } = *self.renderer.options();
         let methods = methods_for(&self.context, loaded, loaded.load_options.request, (width, height))?;
         let options = methods.apply(&RenderOptions { width, height, ..options.clone() });
-        self.install(Renderer::new(self.context.clone(), &loaded.world, &options)?)?;
+        self.install(GpuRenderer::new(self.context.clone(), &loaded.world, &options)?)?;
         Ok(options)
     }
 

@@ -8,7 +8,7 @@ use kdray::{
     frame::{BounceStats, Crop, Denoise, Goal, Picture, Primary, RenderOptions},
     gpu::{Context, DeviceOverrides, GpuError},
     layout::PixelAovs,
-    render::{BandedRenderer, Renderer},
+    render::{BandedRenderer, GpuRenderer},
     scene::{Camera, Projection},
     world::FlatScene,
 };
@@ -55,7 +55,7 @@ struct Made {
 /// Renders the pictures of two cameras, each at once.
 fn at_once(context: &Arc<Context>, options: &RenderOptions, n_samples: u32) -> Vec<Made> {
     let scene = scene();
-    let mut renderer = Renderer::new(context.clone(), &world_of(&scene), options).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), &world_of(&scene), options).expect("a renderer");
     let made = [scene.camera, ELSEWHERE].map(|camera| {
         renderer.set_camera(&camera);
         let mut profile = renderer.draw_sample().expect("a sample");
@@ -123,7 +123,7 @@ fn the_noise_filter_sees_beyond_a_band() {
     // Without the filter, the picture differs.
     let scene = scene();
     let draw = |options: &RenderOptions| {
-        let mut renderer = Renderer::new(device(), &world_of(&scene), options).expect("a renderer");
+        let mut renderer = GpuRenderer::new(device(), &world_of(&scene), options).expect("a renderer");
         renderer.render().expect("a frame").0
     };
     assert!(!identical(&draw(&filtered), &draw(&options(64, 48, 2))));
@@ -155,7 +155,7 @@ fn a_device_that_holds_all_pixels_draws_one_band() {
 #[test]
 fn the_small_device_refuses_the_picture_at_once() {
     let scene = scene();
-    let refused = Renderer::new(small_device(), &world_of(&scene), &options(64, 48, 2)).err();
+    let refused = GpuRenderer::new(small_device(), &world_of(&scene), &options(64, 48, 2)).err();
     assert!(matches!(refused, Some(GpuError::TooLarge { .. })), "{refused:?}");
 }
 

@@ -4,7 +4,7 @@ use glam::Vec3;
 use kdray::{
     cpu::{self, Batching},
     gpu::GpuError,
-    render::Renderer,
+    render::GpuRenderer,
     world::FlatScene,
 };
 
@@ -28,7 +28,7 @@ fn small_queues_give_the_same_bits_on_the_device() {
     let (scene, options, context) = (glass_in_glass(), options(32, 24, 8), device());
     let world = world_of(&scene);
     let render = |capacity| {
-        let renderer = Renderer::with_queue_capacity(context.clone(), &world, &options, capacity);
+        let renderer = GpuRenderer::with_queue_capacity(context.clone(), &world, &options, capacity);
         renderer.expect("a renderer").render().expect("a frame")
     };
     let (whole, profile) = render(100_000);
@@ -63,7 +63,7 @@ fn small_queues_give_the_same_bits_on_the_cpu() {
 fn a_pixel_that_overflows_alone_is_an_error() {
     let (scene, context) = (glass_in_glass(), device());
     let mut renderer =
-        Renderer::with_queue_capacity(context, &world_of(&scene), &options(8, 8, 8), 2).expect("a renderer");
+        GpuRenderer::with_queue_capacity(context, &world_of(&scene), &options(8, 8, 8), 2).expect("a renderer");
     match renderer.render() {
         Err(GpuError::Limit { limit: 2, value, .. }) => assert!(value > 2),
         other => panic!("{:?}", other.map(|(_, profile)| profile)),
@@ -75,8 +75,8 @@ fn every_run_gives_the_same_bits() {
     let (scene, options) = (scenes::mixed_outdoors(), options(64, 48, 5));
     let world = world_of(&scene);
     let context = device();
-    let mut first = Renderer::new(context.clone(), &world, &options).expect("a renderer");
-    let mut second = Renderer::new(device(), &world, &options).expect("a renderer");
+    let mut first = GpuRenderer::new(context.clone(), &world, &options).expect("a renderer");
+    let mut second = GpuRenderer::new(device(), &world, &options).expect("a renderer");
     let picture = first.render().expect("a frame").0;
     for again in [first.render(), second.render(), first.render()] {
         assert!(identical(&picture, &again.expect("a frame").0));
@@ -101,7 +101,8 @@ fn device_and_cpu_count_alike() {
     let (scene, options) = (scenes::mixed(), options(40, 30, 4));
     let world = world_of(&scene);
     let context = device();
-    let (_, device) = Renderer::new(context.clone(), &world, &options).expect("a renderer").render().expect("a frame");
+    let (_, device) =
+        GpuRenderer::new(context.clone(), &world, &options).expect("a renderer").render().expect("a frame");
     let (_, cpu) = cpu::render(&world, &options);
     assert_eq!(device.bounces.len(), cpu.bounces.len());
     for (a, b) in device.bounces.iter().zip(&cpu.bounces) {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use kdray::{
     frame::{Picture, Primary, RenderOptions},
-    render::Renderer,
+    render::GpuRenderer,
     world::FlatScene,
 };
 
@@ -37,7 +37,7 @@ fn pictures_are_the_same_whichever_compiler_made_the_kernels() {
         .each_ref()
         .map(|scene| RenderOptions { primary: Primary::Trace, ..options(96, 72, scene.defaults.max_depth) });
     let pictures: [Picture; 2] = std::array::from_fn(|i| {
-        let renderer = Renderer::new(context.clone(), &world_of(&scenes[i]), &options[i]);
+        let renderer = GpuRenderer::new(context.clone(), &world_of(&scenes[i]), &options[i]);
         renderer.expect("a renderer").render().expect("a frame").0
     });
     assert_silent(&context);

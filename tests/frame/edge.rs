@@ -7,7 +7,7 @@ use kdray::{
     frame::{Crop, Denoise, Goal, Integrator, Picture, RenderOptions, sampling::samples_log2},
     gpu::DeviceOverrides,
     layout::MOST_SAMPLES_LOG2,
-    render::{BandedRenderer, Renderer},
+    render::{BandedRenderer, GpuRenderer},
     world::FlatScene,
 };
 
@@ -21,7 +21,7 @@ fn options(width: u32, height: u32) -> RenderOptions {
 
 fn on_device(scene: &FlatScene, options: &RenderOptions, n_samples: u32) -> Picture {
     let context = device();
-    let mut renderer = Renderer::new(context.clone(), &world_of(scene), options).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), &world_of(scene), options).expect("a renderer");
     while renderer.n_samples() < n_samples {
         renderer.set_samples_per_frame(samples_log2(renderer.n_samples(), n_samples, MOST_SAMPLES_LOG2));
         renderer.draw_sample().expect("samples");
@@ -31,7 +31,7 @@ fn on_device(scene: &FlatScene, options: &RenderOptions, n_samples: u32) -> Pict
 }
 
 fn on_cpu(scene: &FlatScene, options: &RenderOptions, n_samples: u32) -> Picture {
-    let mut renderer = cpu::Renderer::new(&world_of(scene), options, Batching::default());
+    let mut renderer = cpu::CpuRenderer::new(&world_of(scene), options, Batching::default());
     while renderer.n_samples() < n_samples {
         renderer.set_samples_per_frame(samples_log2(renderer.n_samples(), n_samples, MOST_SAMPLES_LOG2));
         renderer.draw_sample();
@@ -67,7 +67,7 @@ fn the_number_of_samples_in_a_frame_changes_no_bit() {
     let (scene, context) = (scenes::mixed_outdoors(), device());
     let world = world_of(&scene);
     let render = |frames: &[u32]| {
-        let mut renderer = Renderer::new(context.clone(), &world, &options(17, 13)).expect("a renderer");
+        let mut renderer = GpuRenderer::new(context.clone(), &world, &options(17, 13)).expect("a renderer");
         for log2 in frames {
             renderer.set_samples_per_frame(*log2);
             renderer.draw_sample().expect("samples");
@@ -87,7 +87,7 @@ fn a_dropped_sample_changes_no_bit() {
     let (scene, context) = (scenes::mixed_outdoors(), device());
     let world = world_of(&scene);
     let make = || {
-        let mut renderer = Renderer::new(context.clone(), &world, &options(40, 30)).expect("a renderer");
+        let mut renderer = GpuRenderer::new(context.clone(), &world, &options(40, 30)).expect("a renderer");
         renderer.limit_batches(Some(400)).expect("batches");
         renderer.draw_sample().expect("a sample");
         renderer
@@ -121,7 +121,7 @@ fn batches_and_bands_change_no_bit() {
     let (scene, options, context) = (scenes::mixed(), options(31, 200), device());
     let world = world_of(&scene);
     let whole = on_device(&scene, &options, 3);
-    let mut batched = Renderer::with_queue_capacity(context.clone(), &world, &options, 1000).expect("a renderer");
+    let mut batched = GpuRenderer::with_queue_capacity(context.clone(), &world, &options, 1000).expect("a renderer");
     (0..3).for_each(|_| drop(batched.draw_sample().expect("a sample")));
     assert!(identical(&whole, &batched.picture().expect("a picture")));
     let narrow = pretended(DeviceOverrides { storage_range: Some(31 * 180 * 128), ..DeviceOverrides::default() });

@@ -7,7 +7,7 @@ use kdray::{
     cpu,
     frame::{Picture, Primary, RenderOptions},
     layout::PixelAovs,
-    render::Renderer,
+    render::GpuRenderer,
     scene::Camera,
     world::World,
 };
@@ -22,7 +22,7 @@ use crate::support::{grid_worlds, scenes, world_of};
 fn on_device(world: &World, options: &RenderOptions) -> (Picture, Vec<PixelAovs>) {
     let context = device();
     let options = RenderOptions { pixel_aovs: true, ..options.clone() };
-    let mut renderer = Renderer::new(context.clone(), world, &options).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), world, &options).expect("a renderer");
     let picture = renderer.render().expect("a frame").0;
     let pixel_aovs = renderer.pixel_aovs().expect("pixel_aovs").into_iter();
     assert_silent(&context);
@@ -50,7 +50,7 @@ fn all_ways_to_read_a_grid_give_the_same_bits() {
     for world in grid_worlds(large_world().scene()) {
         let expected = on_device(&world, &options).0;
         for (context, access) in contexts.iter().zip([SceneAccess::Bound, SceneAccess::Address]) {
-            let mut renderer = Renderer::new(context.clone(), &world, &options).expect("a renderer");
+            let mut renderer = GpuRenderer::new(context.clone(), &world, &options).expect("a renderer");
             assert_eq!(renderer.resources().accel.access(), access);
             let found = renderer.render().expect("a frame").0;
             assert!(identical(&expected, &found), "{} {access:?}", world.accel().kind());

@@ -7,7 +7,7 @@ use kdray::{
     cpu::{self, Batching},
     frame::{Denoise, Integrator, Picture, PixelFilter, RenderOptions, sampling::samples_log2},
     layout::{AREA_DISK, AREA_RECTANGLE, AREA_SPHERE, AreaLight, MOST_SAMPLES_LOG2},
-    render::Renderer,
+    render::GpuRenderer,
     scene::{Camera, Projection},
     world::FlatScene,
 };
@@ -69,7 +69,7 @@ fn columns(picture: &Picture) -> Vec<f32> {
 
 pub fn on_device(scene: &FlatScene, n_columns: u32, n_samples: u32) -> Vec<f32> {
     let context = device();
-    let mut renderer = Renderer::new(context.clone(), &world_of(scene), &options(n_columns)).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), &world_of(scene), &options(n_columns)).expect("a renderer");
     while renderer.n_samples() < n_samples {
         renderer.set_samples_per_frame(samples_log2(renderer.n_samples(), n_samples, MOST_SAMPLES_LOG2));
         renderer.draw_sample().expect("samples");
@@ -79,7 +79,7 @@ pub fn on_device(scene: &FlatScene, n_columns: u32, n_samples: u32) -> Vec<f32> 
 }
 
 pub fn on_cpu(scene: &FlatScene, n_columns: u32, n_samples: u32) -> Vec<f32> {
-    let mut renderer = cpu::Renderer::new(&world_of(scene), &options(n_columns), Batching::default());
+    let mut renderer = cpu::CpuRenderer::new(&world_of(scene), &options(n_columns), Batching::default());
     while renderer.n_samples() < n_samples {
         renderer.set_samples_per_frame(samples_log2(renderer.n_samples(), n_samples, MOST_SAMPLES_LOG2));
         renderer.draw_sample();

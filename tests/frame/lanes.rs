@@ -3,7 +3,7 @@
 use kdray::{
     frame::{Primary, RenderOptions},
     gpu::Context,
-    render::Renderer,
+    render::GpuRenderer,
 };
 
 use super::studio::{assert_silent, device, identical, options, world_of};
@@ -15,7 +15,7 @@ fn a_device_with_lanes_to_spare_gives_the_same_bits() {
     let (world, plain) = (world_of(&scene), device());
     let options = RenderOptions { primary: Primary::Trace, ..options(40, 30, 4) };
     let picture = |context: &std::sync::Arc<Context>| {
-        let mut renderer = Renderer::new(context.clone(), &world, &options).expect("a renderer");
+        let mut renderer = GpuRenderer::new(context.clone(), &world, &options).expect("a renderer");
         let picture = renderer.render().expect("a frame").0;
         let lanes_log2: Vec<_> =
             renderer.resources().bounces.download().expect("bounces").iter().map(|row| row.trace_lanes_log2).collect();

@@ -10,11 +10,11 @@ use kdray::{
         kdtree::{KdTree, Traversal},
     },
     buffers::{AccelBuffers, SceneAccess, SceneArrays},
-    cast::{Caster, Ray},
+    cast::{GpuCaster, Ray},
     frame::{Primary, RenderOptions},
     gpu::{Buffer, BufferUse, Context, DeviceOverrides, GpuError},
     layout::{KdRope, LargeTriangle, LeafTriangle},
-    render::Renderer,
+    render::GpuRenderer,
     world::World,
 };
 
@@ -74,7 +74,7 @@ fn a_scene_larger_than_what_the_device_binds_gives_the_same_bits() {
             let pixel_aovs = traversal == Traversal::Mask;
             let options = RenderOptions { traversal, primary, pixel_aovs, ..options(24, 16, 3) };
             let [mut bound, mut by_address] =
-                [&any, &small].map(|context| Renderer::new(context.clone(), &world, &options).expect("a renderer"));
+                [&any, &small].map(|context| GpuRenderer::new(context.clone(), &world, &options).expect("a renderer"));
             assert_eq!(bound.resources().accel.access(), usual_reading(&any, world.tree()));
             assert_eq!(by_address.resources().accel.access(), SceneAccess::Address);
             let bytes = scene_bytes(&by_address.resources().accel.arrays, traversal);
@@ -102,7 +102,7 @@ fn texels_and_what_is_bound_give_the_same_bits() {
         let options = RenderOptions { traversal, primary: Primary::Trace, ..options(24, 16, 3) };
         let pictures =
             [(&any, usual_reading(&any, world.tree())), (&bound, SceneAccess::Bound)].map(|(context, reading)| {
-                let mut renderer = Renderer::new(context.clone(), &world, &options).expect("a renderer");
+                let mut renderer = GpuRenderer::new(context.clone(), &world, &options).expect("a renderer");
                 assert_eq!(renderer.resources().accel.access(), reading);
                 renderer.render().expect("a frame").0
             });
@@ -122,10 +122,10 @@ fn triangles_that_are_not_bound_are_rasterized() {
     let options = RenderOptions { primary: Primary::SoftwareRaster, ..options(24, 16, 2) };
     // The state of the queue takes 32 bytes.
     let n_bytes = (world.scene().triangles.len() * size_of::<LargeTriangle>()) as u64 + 32;
-    let with_range = |bytes| Renderer::new(device_with(bytes, 1), &world, &options);
+    let with_range = |bytes| GpuRenderer::new(device_with(bytes, 1), &world, &options);
     let mut by_address = with_range(n_bytes).expect("a renderer");
     assert_eq!(by_address.resources().accel.access(), SceneAccess::Address);
-    let mut bound = Renderer::new(any.clone(), &world, &options).expect("a renderer");
+    let mut bound = GpuRenderer::new(any.clone(), &world, &options).expect("a renderer");
     let pictures = [&mut bound, &mut by_address].map(|renderer| renderer.render().expect("a frame").0);
     assert!(identical(&pictures[0], &pictures[1]));
     let too_small = with_range(n_bytes - 1).err().expect("no room").to_string();
@@ -137,7 +137,7 @@ fn triangles_that_are_not_bound_are_rasterized() {
 fn another_traversal_of_a_renderer_that_is_there_reads_by_address_too() {
     let (world, small) = (large_world(), small_device());
     let start = options(24, 16, 3);
-    let mut renderer = Renderer::new(small.clone(), &world, &start).expect("a renderer");
+    let mut renderer = GpuRenderer::new(small.clone(), &world, &start).expect("a renderer");
     let picture = renderer.render().expect("a frame").0;
     for traversal in [Traversal::Ropes, Traversal::MaskBoxes] {
         renderer.set_options(&RenderOptions { traversal, ..start.clone() }).expect("options");
@@ -159,7 +159,7 @@ fn rays_through_a_scene_larger_than_what_the_device_binds_find_the_same_hits() {
         (Traversal::Stack, Query::Any),
     ] {
         let hits = [&any, &small].map(|context| {
-            let mut caster = Caster::new(context, world.geometry(), traversal).expect("a caster");
+            let mut caster = GpuCaster::new(context, world.geometry(), traversal).expect("a caster");
             caster.cast(&rays, query, 1).expect("a cast").hits
         });
         assert!(hits[0].iter().any(|hit| hit.t.is_finite()));
@@ -202,7 +202,7 @@ fn a_scene_is_read_by_address_only_where_something_of_it_cannot_be_bound() {
 fn what_is_bound_is_held_against_the_range() {
     let (world, small) = (large_world(), small_device());
     let capacity = RANGE as u32;
-    let queues = Renderer::with_queue_capacity(small.clone(), &world, &options(8, 8, 2), capacity);
+    let queues = GpuRenderer::with_queue_capacity(small.clone(), &world, &options(8, 8, 2), capacity);
     assert!(matches!(queues.err(), Some(GpuError::TooLarge { limit: RANGE, .. })));
     let buffer = |len, usage| Buffer::<u32>::new(&small, "words", len, usage).err().map(|error| error.to_string());
     let n_words = RANGE as usize / 4;

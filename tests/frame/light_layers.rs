@@ -9,7 +9,7 @@ use kdray::{
     },
     gpu::DeviceOverrides,
     layout::{MOST_SAMPLES_LOG2, Material},
-    render::{BandedRenderer, Renderer},
+    render::{BandedRenderer, GpuRenderer},
     world::FlatScene,
 };
 
@@ -23,7 +23,7 @@ fn options(width: u32, height: u32, max_depth: u32) -> RenderOptions {
 
 type Layered = (Picture, LightLayers);
 
-fn finish(renderer: &mut Renderer, n_samples: u32) -> Layered {
+fn finish(renderer: &mut GpuRenderer, n_samples: u32) -> Layered {
     while renderer.n_samples() < n_samples {
         renderer.set_samples_per_frame(samples_log2(renderer.n_samples(), n_samples, MOST_SAMPLES_LOG2));
         renderer.draw_sample().expect("samples");
@@ -33,7 +33,7 @@ fn finish(renderer: &mut Renderer, n_samples: u32) -> Layered {
 
 fn on_device(scene: &FlatScene, options: &RenderOptions, n_samples: u32) -> Layered {
     let context = device();
-    let mut renderer = Renderer::new(context.clone(), &world_of(scene), options).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), &world_of(scene), options).expect("a renderer");
     let layered = finish(&mut renderer, n_samples);
     assert_silent(&context);
     layered
@@ -44,7 +44,7 @@ fn on_cpu(scene: &FlatScene, options: &RenderOptions, n_samples: u32) -> Layered
 }
 
 fn on_cpu_in_batches(scene: &FlatScene, options: &RenderOptions, n_samples: u32, batching: Batching) -> Layered {
-    let mut renderer = cpu::Renderer::new(&world_of(scene), options, batching);
+    let mut renderer = cpu::CpuRenderer::new(&world_of(scene), options, batching);
     while renderer.n_samples() < n_samples {
         renderer.set_samples_per_frame(samples_log2(renderer.n_samples(), n_samples, MOST_SAMPLES_LOG2));
         renderer.draw_sample();
@@ -157,10 +157,10 @@ fn frames_batches_and_bands_change_no_bit() {
     let world = world_of(&scene);
     let whole = on_device(&scene, &options, 20);
     for capacity in [100, 1000] {
-        let renderer = Renderer::with_queue_capacity(context.clone(), &world, &options, capacity);
+        let renderer = GpuRenderer::with_queue_capacity(context.clone(), &world, &options, capacity);
         assert!(same(&whole, &finish(&mut renderer.expect("a renderer"), 20)), "a queue for {capacity} paths");
     }
-    let mut renderer = Renderer::new(context.clone(), &world, &options).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), &world, &options).expect("a renderer");
     for log2 in [0, 0, 1, 2, 3, 2] {
         renderer.set_samples_per_frame(log2);
         renderer.draw_sample().expect("samples");
@@ -198,7 +198,7 @@ fn a_crop_is_a_part_of_the_whole() {
 fn layers_can_be_switched() {
     let (scene, with, context) = (lit(), options(24, 18, 4), device());
     let without = RenderOptions { light_layers: false, ..with.clone() };
-    let mut renderer = Renderer::new(context.clone(), &world_of(&scene), &without).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), &world_of(&scene), &without).expect("a renderer");
     let plain = finish(&mut renderer, 5);
     let expected = on_device(&scene, &with, 5);
     for _ in 0..2 {

@@ -5,7 +5,7 @@ use kdray::{
     accel::kdtree::Traversal,
     frame::{Denoise, Integrator, Picture, Primary, RenderOptions, Tonemap},
     gpu::GpuError,
-    render::Renderer,
+    render::GpuRenderer,
     scene::{Camera, Environment, Projection},
     world::FlatScene,
 };
@@ -21,7 +21,7 @@ const ELSEWHERE: Camera = Camera {
 };
 
 /// Draws `n_samples` samples from the start and returns their mean.
-fn sampled(renderer: &mut Renderer, n_samples: u32) -> Picture {
+fn sampled(renderer: &mut GpuRenderer, n_samples: u32) -> Picture {
     renderer.reset_samples();
     for _ in 0..n_samples {
         renderer.draw_sample().expect("a sample");
@@ -31,7 +31,7 @@ fn sampled(renderer: &mut Renderer, n_samples: u32) -> Picture {
 }
 
 fn sampled_anew(scene: &FlatScene, options: &RenderOptions, n_samples: u32) -> Picture {
-    sampled(&mut Renderer::new(device(), &world_of(scene), options).expect("a renderer"), n_samples)
+    sampled(&mut GpuRenderer::new(device(), &world_of(scene), options).expect("a renderer"), n_samples)
 }
 
 /// The renderers of both integrators share the scene's arrays, in whichever order they are made.
@@ -45,7 +45,7 @@ fn renderers_that_share_a_scene_draw_what_new_ones_draw() {
     for integrators in [[Integrator::Whitted, Integrator::Path], [Integrator::Path, Integrator::Whitted]] {
         for traversals in [[Traversal::Ropes; 2], [Traversal::Ropes, Traversal::MaskBoxes]] {
             let [first, second] = [0, 1].map(|ix| of(integrators[ix], traversals[ix]));
-            let mut one = Renderer::new(context.clone(), &world, &first).expect("a renderer");
+            let mut one = GpuRenderer::new(context.clone(), &world, &first).expect("a renderer");
             let mut other = one.sharing(&second).expect("a renderer");
             for is_other in [true, false, true] {
                 let (renderer, options) = if is_other { (&mut other, &second) } else { (&mut one, &first) };
@@ -75,7 +75,7 @@ fn other_options_draw_what_a_new_renderer_draws() {
         RenderOptions { width: 17, height: 9, ..start.clone() },
         start.clone(),
     ];
-    let mut renderer = Renderer::new(context.clone(), &world, &start).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), &world, &start).expect("a renderer");
     let before = sampled(&mut renderer, 2);
     for to in &steps {
         renderer.set_options(to).expect("options");
@@ -90,7 +90,7 @@ fn other_options_draw_what_a_new_renderer_draws() {
 fn other_cameras_and_sizes_draw_what_a_new_renderer_draws() {
     let scene = scenes::mixed_outdoors();
     let (world, context) = (world_of(&scene), device());
-    let mut renderer = Renderer::new(context.clone(), &world, &options(40, 30, 3)).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), &world, &options(40, 30, 3)).expect("a renderer");
     renderer.draw_sample().expect("a sample");
     renderer.set_camera(&ELSEWHERE);
     assert_eq!((renderer.n_samples(), renderer.camera()), (0, &ELSEWHERE));
@@ -116,7 +116,7 @@ fn exposure_curve_and_threshold_keep_the_samples() {
     let (world, context) = (world_of(&scene), device());
     let denoise = |threshold| Denoise::Paper { threshold };
     let start = RenderOptions { denoise: denoise(2.0), ..options(40, 30, 3) };
-    let mut renderer = Renderer::new(context.clone(), &world, &start).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), &world, &start).expect("a renderer");
     sampled(&mut renderer, 3);
     let to = RenderOptions { exposure: 2.0, denoise: denoise(0.2), tonemap: Tonemap::Agx, ..start };
     renderer.set_options(&to).expect("options");
@@ -133,7 +133,7 @@ fn exposure_curve_and_threshold_keep_the_samples() {
 fn refused_options_change_nothing() {
     let scene = scenes::mixed_outdoors();
     let (world, context) = (world_of(&scene), device());
-    let mut renderer = Renderer::new(context.clone(), &world, &options(40, 30, 3)).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), &world, &options(40, 30, 3)).expect("a renderer");
     let before = sampled(&mut renderer, 1);
     let refused = renderer.resize(1 << 20, 1);
     assert!(matches!(refused, Err(GpuError::BadOptions(_))), "{:?}", refused.err());

@@ -8,7 +8,7 @@ use kdray::{
     frame::{Picture, Primary, RenderOptions},
     gpu::Context,
     layout::{NO_TRIANGLE, PixelAovs},
-    render::Renderer,
+    render::GpuRenderer,
     scene::{Camera, Projection},
     world::{FlatScene, World},
 };
@@ -19,7 +19,7 @@ use crate::support::{meshes, scenes};
 /// Draws a sample on the device, with AOVs.
 fn on_device(context: &Arc<Context>, world: &World, options: &RenderOptions) -> (Picture, Vec<PixelAovs>) {
     let options = RenderOptions { pixel_aovs: true, ..options.clone() };
-    let mut renderer = Renderer::new(context.clone(), world, &options).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), world, &options).expect("a renderer");
     let picture = renderer.render().expect("a frame").0;
     (picture, renderer.pixel_aovs().expect("pixel_aovs"))
 }
@@ -27,7 +27,7 @@ fn on_device(context: &Arc<Context>, world: &World, options: &RenderOptions) -> 
 /// Draws the same on the CPU.
 fn on_cpu(world: &World, options: &RenderOptions) -> (Picture, Vec<PixelAovs>) {
     let options = RenderOptions { pixel_aovs: true, ..options.clone() };
-    let mut renderer = cpu::Renderer::new(world, &options, Batching::default());
+    let mut renderer = cpu::CpuRenderer::new(world, &options, Batching::default());
     renderer.draw_sample();
     (renderer.picture(), renderer.pixel_aovs())
 }

@@ -4,7 +4,7 @@
 use glam::uvec2;
 use kdray::{
     frame::{Picture, RenderOptions, View},
-    render::{Displayed, Renderer},
+    render::{Displayed, GpuRenderer},
     scene::{Camera, Projection},
 };
 
@@ -18,7 +18,7 @@ fn options_of_parts() -> RenderOptions {
 }
 
 /// Draws `n_samples` samples in parts. Returns the picture and the number of parts.
-fn in_parts(renderer: &mut Renderer, n_samples: u32) -> (Picture, u32) {
+fn in_parts(renderer: &mut GpuRenderer, n_samples: u32) -> (Picture, u32) {
     let mut n_parts = 0;
     while renderer.n_samples() < n_samples {
         assert_eq!(renderer.progress() > 0.0, renderer.is_pending());
@@ -31,7 +31,7 @@ fn in_parts(renderer: &mut Renderer, n_samples: u32) -> (Picture, u32) {
     (renderer.picture().expect("a picture"), n_parts)
 }
 
-fn at_once(renderer: &mut Renderer, n_samples: u32) -> Picture {
+fn at_once(renderer: &mut GpuRenderer, n_samples: u32) -> Picture {
     renderer.reset_samples();
     (0..n_samples).for_each(|_| drop(renderer.draw_sample().expect("a sample")));
     renderer.picture().expect("a picture")
@@ -41,7 +41,7 @@ fn at_once(renderer: &mut Renderer, n_samples: u32) -> Picture {
 fn parts_make_the_same_picture() {
     let (scene, context) = (glass_in_glass(), device());
     let world = world_of(&scene);
-    let mut renderer = Renderer::new(context.clone(), &world, &options_of_parts()).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), &world, &options_of_parts()).expect("a renderer");
     let whole = [1, 3].map(|n_samples| at_once(&mut renderer, n_samples));
     for (most_pixels, n_parts) in [(None, 1), (Some(768), 1), (Some(767), 2), (Some(100), 8)] {
         renderer.limit_batches(most_pixels).expect("batches");
@@ -61,7 +61,7 @@ fn parts_make_the_same_picture() {
 fn what_is_dropped_half_way_leaves_no_trace() {
     let (scene, context, options) = (glass_in_glass(), device(), options_of_parts());
     let world = world_of(&scene);
-    let mut renderer = Renderer::new(context.clone(), &world, &options).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), &world, &options).expect("a renderer");
     let whole = at_once(&mut renderer, 3);
     renderer.limit_batches(Some(200)).expect("batches");
     for n_before in 0..3 {
@@ -88,7 +88,7 @@ fn parts_that_overflow_are_drawn_anew() {
     let (scene, context) = (glass_in_glass(), device());
     let world = world_of(&scene);
     let new = |capacity| {
-        Renderer::with_queue_capacity(context.clone(), &world, &options_of_parts(), capacity).expect("a renderer")
+        GpuRenderer::with_queue_capacity(context.clone(), &world, &options_of_parts(), capacity).expect("a renderer")
     };
     let whole = at_once(&mut new(100_000), 3);
     assert!(identical(&in_parts(&mut new(600), 3).0, &whole));
@@ -99,7 +99,7 @@ fn parts_that_overflow_are_drawn_anew() {
 fn the_picture_changes_with_the_last_part() {
     let (scene, context) = (glass_in_glass(), device());
     let world = world_of(&scene);
-    let mut renderer = Renderer::new(context.clone(), &world, &options_of_parts()).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), &world, &options_of_parts()).expect("a renderer");
     assert_eq!(renderer.displayed(), None);
     renderer.limit_batches(Some(400)).expect("batches");
     assert!(renderer.draw_batch().expect("a part").is_none());
@@ -132,7 +132,7 @@ fn the_picture_changes_with_the_last_part() {
 fn steps_make_the_same_picture() {
     let (scene, context) = (glass_in_glass(), device());
     let world = world_of(&scene);
-    let mut renderer = Renderer::new(context.clone(), &world, &options_of_parts()).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), &world, &options_of_parts()).expect("a renderer");
     let whole = at_once(&mut renderer, 2);
     renderer.reset_samples();
     for _ in 0..2 {
@@ -156,7 +156,7 @@ fn views_of_first_hits_trace_primary_rays_only() {
     let (scene, context) = (glass_in_glass(), device());
     let world = world_of(&scene);
     let options = RenderOptions { pixel_aovs: true, ..options_of_parts() };
-    let new = || Renderer::new(context.clone(), &world, &options).expect("a renderer");
+    let new = || GpuRenderer::new(context.clone(), &world, &options).expect("a renderer");
     let (mut whole, mut renderer) = (new(), new());
     let picture = at_once(&mut whole, 2);
     whole.draw().expect("a frame");

@@ -11,7 +11,7 @@ use kdray::{
     },
     gpu::DeviceOverrides,
     layout::{MATERIAL_MICROFACET, MOST_SAMPLES_LOG2, Material},
-    render::{BandedRenderer, Renderer},
+    render::{BandedRenderer, GpuRenderer},
     scene::{self, Alpha, Maps, Projection, Texture},
     world::FlatScene,
 };
@@ -25,7 +25,7 @@ fn options(width: u32, height: u32, max_depth: u32) -> RenderOptions {
 }
 
 /// Draws samples on the device, as many in a frame as the renderer can.
-fn draw(renderer: &mut Renderer, n_samples: u32) -> Picture {
+fn draw(renderer: &mut GpuRenderer, n_samples: u32) -> Picture {
     while renderer.n_samples() < n_samples {
         renderer.set_samples_per_frame(samples_log2(renderer.n_samples(), n_samples, MOST_SAMPLES_LOG2));
         renderer.draw_sample().expect("samples");
@@ -35,7 +35,7 @@ fn draw(renderer: &mut Renderer, n_samples: u32) -> Picture {
 
 fn on_device(scene: &FlatScene, options: &RenderOptions, n_samples: u32) -> Picture {
     let context = device();
-    let mut renderer = Renderer::new(context.clone(), &world_of(scene), options).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), &world_of(scene), options).expect("a renderer");
     let picture = draw(&mut renderer, n_samples);
     assert_silent(&context);
     picture
@@ -46,7 +46,7 @@ fn on_cpu(scene: &FlatScene, options: &RenderOptions, n_samples: u32) -> Picture
 }
 
 fn on_cpu_in_batches(scene: &FlatScene, options: &RenderOptions, n_samples: u32, batching: Batching) -> Picture {
-    let mut renderer = cpu::Renderer::new(&world_of(scene), options, batching);
+    let mut renderer = cpu::CpuRenderer::new(&world_of(scene), options, batching);
     while renderer.n_samples() < n_samples {
         renderer.set_samples_per_frame(samples_log2(renderer.n_samples(), n_samples, MOST_SAMPLES_LOG2));
         renderer.draw_sample();
@@ -143,8 +143,8 @@ fn only_narrow_lobes_see_the_studio() {
 #[test]
 fn a_profile_has_the_passes_of_the_plan() {
     let (scene, options) = (scenes::mixed(), RenderOptions { pixel_aovs: true, ..options(20, 15, 2) });
-    let mut renderer = Renderer::new(device(), &world_of(&scene), &options).expect("a renderer");
-    let mut on_cpu = cpu::Renderer::new(&world_of(&scene), &options, Batching::default());
+    let mut renderer = GpuRenderer::new(device(), &world_of(&scene), &options).expect("a renderer");
+    let mut on_cpu = cpu::CpuRenderer::new(&world_of(&scene), &options, Batching::default());
     let plan = Plan::new(&FrameKind::new(&options, scene.lights.len() as u32));
     let steps = [plan.bounces.concat(), plan.light, plan.image].concat();
     let expected: Vec<_> = plan::passes(&steps).map(Pass::name).collect();
@@ -161,7 +161,7 @@ fn the_number_of_samples_in_a_frame_changes_no_bit() {
     let context = device();
     let world = world_of(&scene);
     let render = |frames: &[u32]| {
-        let mut renderer = Renderer::new(context.clone(), &world, &options).expect("a renderer");
+        let mut renderer = GpuRenderer::new(context.clone(), &world, &options).expect("a renderer");
         for log2 in frames {
             renderer.set_samples_per_frame(*log2);
             renderer.draw_sample().expect("samples");
@@ -180,7 +180,7 @@ fn the_number_of_samples_in_a_frame_changes_no_bit() {
     }
     assert!(!identical(&one_by_one, &on_device(&scene, &options, 52)));
     let on_cpu_one_by_one = {
-        let mut renderer = cpu::Renderer::new(&world, &options, Batching::default());
+        let mut renderer = cpu::CpuRenderer::new(&world, &options, Batching::default());
         (0..53).for_each(|_| drop(renderer.draw_sample()));
         renderer.picture()
     };
@@ -194,7 +194,7 @@ fn batches_and_bands_change_no_bit() {
     let world = world_of(&scene);
     let whole = on_device(&scene, &options, 20);
     for capacity in [100, 1000, 31 * 80 * 16] {
-        let renderer = Renderer::with_queue_capacity(context.clone(), &world, &options, capacity);
+        let renderer = GpuRenderer::with_queue_capacity(context.clone(), &world, &options, capacity);
         assert!(identical(&whole, &draw(&mut renderer.expect("a renderer"), 20)), "a queue for {capacity} paths");
     }
     let narrow = pretended(DeviceOverrides { storage_range: Some(31 * 25 * 128), ..DeviceOverrides::default() });
@@ -233,7 +233,7 @@ fn a_limit_of_loop_iterations_changes_no_bit() {
     let overrides =
         DeviceOverrides { loop_limit: Some(400), n_suspension_slots: Some(50), ..DeviceOverrides::default() };
     let context = pretended(overrides);
-    let mut renderer = Renderer::new(context.clone(), &world_of(&scene), &options).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), &world_of(&scene), &options).expect("a renderer");
     assert!(identical(&draw(&mut renderer, 5), &on_device(&scene, &options, 5)));
     assert_silent(&context);
 }

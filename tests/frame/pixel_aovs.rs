@@ -6,7 +6,7 @@ use kdray::{
     cpu::{self, Batching},
     frame::{Crop, Integrator, Primary, Profile, RenderOptions},
     layout::{NO_TRIANGLE, PixelAovs},
-    render::Renderer,
+    render::GpuRenderer,
     world::{FlatScene, World},
 };
 
@@ -22,7 +22,7 @@ fn on_device(scene: &FlatScene, options: &RenderOptions) -> Vec<PixelAovs> {
 
 fn on_device_by(world: &World, options: &RenderOptions) -> Vec<PixelAovs> {
     let context = device();
-    let mut renderer = Renderer::new(context.clone(), world, options).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), world, options).expect("a renderer");
     renderer.draw().expect("a frame");
     assert_silent(&context);
     renderer.pixel_aovs().expect("pixel_aovs")
@@ -33,7 +33,7 @@ fn on_cpu(scene: &FlatScene, options: &RenderOptions) -> Vec<PixelAovs> {
 }
 
 fn on_cpu_by(world: &World, options: &RenderOptions) -> Vec<PixelAovs> {
-    let mut renderer = cpu::Renderer::new(world, options, Batching::default());
+    let mut renderer = cpu::CpuRenderer::new(world, options, Batching::default());
     renderer.draw_sample();
     renderer.pixel_aovs()
 }
@@ -130,7 +130,7 @@ fn the_rays_of_the_first_sample_of_paths_are_counted() {
     for traversal in [Traversal::Mask, Traversal::Stack] {
         let options = noting(RenderOptions { integrator: Integrator::Path, traversal, ..options(60, 45, 4) });
         let on_device = |samples_log2| {
-            let mut renderer = Renderer::new(context.clone(), &world, &options).expect("a renderer");
+            let mut renderer = GpuRenderer::new(context.clone(), &world, &options).expect("a renderer");
             renderer.set_samples_per_frame(samples_log2);
             let profile = renderer.draw_sample().expect("samples");
             (profile, renderer.pixel_aovs().expect("pixel_aovs"))
@@ -138,7 +138,7 @@ fn the_rays_of_the_first_sample_of_paths_are_counted() {
         let on_cpu = |samples_log2| {
             // A batch has several pixels and is not the whole picture.
             let batching = Batching { n_pixels: 500, ..Batching::default() };
-            let mut renderer = cpu::Renderer::new(&world_of_cpu, &options, batching);
+            let mut renderer = cpu::CpuRenderer::new(&world_of_cpu, &options, batching);
             renderer.set_samples_per_frame(samples_log2);
             (renderer.draw_sample(), renderer.pixel_aovs())
         };
@@ -180,9 +180,9 @@ fn steps_through_one_leaf_are_known() {
 fn rays_are_counted_as_in_the_profile() {
     let (scene, options) = (scenes::mixed(), noting(options(40, 30, 4)));
     let world = world_of(&scene);
-    let mut device = Renderer::new(device(), &world, &options).expect("a renderer");
+    let mut device = GpuRenderer::new(device(), &world, &options).expect("a renderer");
     let batching = Batching { n_pixels: 500, queue_capacity: 300 };
-    let mut cpu = cpu::Renderer::new(&world, &options, batching);
+    let mut cpu = cpu::CpuRenderer::new(&world, &options, batching);
     let profiles = [device.draw().expect("a frame"), cpu.draw_sample()];
     for (profile, pixel_aovs) in profiles.iter().zip([device.pixel_aovs().expect("pixel_aovs"), cpu.pixel_aovs()]) {
         let counted: u64 = pixel_aovs.iter().map(|aovs| u64::from(aovs.n_rays)).sum();
@@ -196,7 +196,7 @@ fn neither_batches_nor_crops_nor_the_picture_are_changed_by_them() {
     let (scene, plain, context) = (glass_in_glass(), options(32, 24, 6), device());
     let (world, options) = (world_of(&scene), noting(plain.clone()));
     let pixel_aovs = |options: &RenderOptions, capacity| {
-        let renderer = Renderer::with_queue_capacity(context.clone(), &world, options, capacity);
+        let renderer = GpuRenderer::with_queue_capacity(context.clone(), &world, options, capacity);
         let mut renderer = renderer.expect("a renderer");
         renderer.draw_sample().expect("a sample");
         renderer.draw_sample().expect("a sample");

@@ -13,7 +13,7 @@ use kdray::{
         primary_hit::camera_ray,
         traverser::{Tracer, Traverser},
     },
-    render::Renderer,
+    render::GpuRenderer,
     world::{FlatScene, World},
 };
 
@@ -75,7 +75,7 @@ fn compute_and_trace_are_the_same() {
             let options = RenderOptions { primary, ..options.clone() };
             let world = world_of(scene);
             let mut renderer =
-                Renderer::with_queue_capacity(context.clone(), &world, &options, capacity).expect("a renderer");
+                GpuRenderer::with_queue_capacity(context.clone(), &world, &options, capacity).expect("a renderer");
             (0..n_samples).for_each(|_| drop(renderer.draw_sample().expect("a sample")));
             assert_silent(&context);
             renderer.picture().expect("a picture")
@@ -120,7 +120,7 @@ fn primaries_change_between_frames() {
     let context = device();
     let (scene, raster) = (scenes::mixed(), options(60, 45, 2));
     let world = world_of(&scene);
-    let mut renderer = Renderer::new(context.clone(), &world, &raster).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), &world, &raster).expect("a renderer");
     let mut pictures = Vec::new();
     let all = if context.has_int64_atomics() { Primary::ALL } else { &[Primary::Raster, Primary::Trace] };
     for &primary in all.iter().chain(all) {

@@ -9,7 +9,7 @@ use kdray::{
     buffers::SceneAccess,
     frame::{Crop, Denoise, Picture, Primary, RenderOptions, Tonemap},
     gpu::{Context, DeviceOverrides, GpuError},
-    render::Renderer,
+    render::GpuRenderer,
     scene::{Camera, Projection},
     world::World,
 };
@@ -34,13 +34,13 @@ fn small() -> RenderOptions {
 const BATCH: u32 = 30;
 
 /// Draws one sample and a part of the second one.
-fn begin(renderer: &mut Renderer) {
+fn begin(renderer: &mut GpuRenderer) {
     renderer.draw().expect("a sample");
     assert_eq!(renderer.draw_batch().expect("a part"), None, "the sample has more parts");
 }
 
 /// Draws the rest of the second sample.
-fn finish(renderer: &mut Renderer) -> Picture {
+fn finish(renderer: &mut GpuRenderer) -> Picture {
     renderer.draw_sample().expect("a sample");
     assert_eq!(renderer.n_samples(), 2);
     renderer.picture().expect("a picture")
@@ -57,7 +57,7 @@ struct State {
     displayed: Option<(u32, u32)>,
 }
 
-fn state(renderer: &Renderer) -> State {
+fn state(renderer: &GpuRenderer) -> State {
     State {
         options: renderer.options().clone(),
         camera: *renderer.camera(),
@@ -72,7 +72,7 @@ fn state(renderer: &Renderer) -> State {
 struct Trial {
     context: Arc<Context>,
     world: World,
-    renderer: Renderer,
+    renderer: GpuRenderer,
     /// Pictures of two samples by new renderers, one for each of the options so far.
     untouched: Vec<(RenderOptions, Picture)>,
 }
@@ -85,8 +85,8 @@ impl Trial {
         Self { context, world, renderer, untouched: Vec::new() }
     }
 
-    fn renderer(context: &Arc<Context>, world: &World, options: &RenderOptions) -> Renderer {
-        let mut renderer = Renderer::new(context.clone(), world, options).expect("a renderer");
+    fn renderer(context: &Arc<Context>, world: &World, options: &RenderOptions) -> GpuRenderer {
+        let mut renderer = GpuRenderer::new(context.clone(), world, options).expect("a renderer");
         renderer.set_camera(&CAMERA);
         renderer.limit_batches(Some(BATCH)).expect("batches");
         renderer
@@ -139,7 +139,7 @@ impl Trial {
     }
 }
 
-type Change<'a> = dyn Fn(&mut Renderer) -> Result<(), GpuError> + 'a;
+type Change<'a> = dyn Fn(&mut GpuRenderer) -> Result<(), GpuError> + 'a;
 
 #[test]
 fn another_traversal() {

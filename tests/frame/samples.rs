@@ -3,7 +3,7 @@
 use glam::{Vec3, vec3};
 use kdray::{
     frame::{Picture, Primary, RenderOptions},
-    render::Renderer,
+    render::GpuRenderer,
     scene::Projection,
     world::FlatScene,
 };
@@ -93,7 +93,7 @@ fn small_queues_give_the_same_bits() {
     let (scene, options, context) = (glass_in_glass(), options(31, 25, 6), device());
     let world = world_of(&scene);
     let render = |capacity| {
-        let renderer = Renderer::with_queue_capacity(context.clone(), &world, &options, capacity);
+        let renderer = GpuRenderer::with_queue_capacity(context.clone(), &world, &options, capacity);
         let mut renderer = renderer.expect("a renderer");
         let profiles: Vec<_> = (0..9).map(|_| renderer.draw_sample().expect("a sample")).collect();
         (renderer.picture().expect("a picture"), profiles)

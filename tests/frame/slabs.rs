@@ -9,7 +9,7 @@ use kdray::{
     frame::{Picture, Primary, RenderOptions},
     gpu::Context,
     layout::{PixelAovs, Slab},
-    render::Renderer,
+    render::GpuRenderer,
     world::{FlatScene, World},
 };
 
@@ -38,14 +38,14 @@ fn steps(pixel_aovs: &[PixelAovs]) -> u64 {
 
 /// Returns the picture and the number of steps of all its rays.
 fn render(context: &Arc<Context>, world: &World, traversal: Traversal) -> (Picture, u64) {
-    let mut renderer = Renderer::new(context.clone(), world, &options_of(traversal)).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), world, &options_of(traversal)).expect("a renderer");
     let picture = renderer.render().expect("a frame").0;
     (picture, steps(&renderer.pixel_aovs().expect("pixel_aovs")))
 }
 
 fn steps_on_cpu(world: &World, traversal: Traversal) -> u64 {
     let options = options_of(traversal);
-    let mut renderer = cpu::Renderer::new(world, &options, Batching::default());
+    let mut renderer = cpu::CpuRenderer::new(world, &options, Batching::default());
     renderer.draw_sample();
     steps(&renderer.pixel_aovs())
 }
@@ -73,7 +73,7 @@ fn slabs_beside_their_surface_lose_it() {
     let (scene, context) = (scene(), device());
     let world = world_of(&scene);
     let options = options_of(Traversal::Mask);
-    let mut renderer = Renderer::new(context.clone(), &world, &options).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), &world, &options).expect("a renderer");
     let expected = renderer.render().expect("a frame").0;
     let moved: Vec<Slab> =
         world.tree().slabs().iter().map(|slab| Slab { offset: slab.offset + 2.0, ..*slab }).collect();

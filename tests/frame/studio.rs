@@ -3,7 +3,7 @@
 use kdray::{
     cpu::{self, Batching},
     frame::{Denoise, Picture, RenderOptions},
-    render::Renderer,
+    render::GpuRenderer,
     world::FlatScene,
 };
 
@@ -16,7 +16,7 @@ pub fn options(width: u32, height: u32, max_depth: u32) -> RenderOptions {
 
 pub fn on_device(scene: &FlatScene, options: &RenderOptions) -> Picture {
     let context = device();
-    let mut renderer = Renderer::new(context.clone(), &world_of(scene), options).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), &world_of(scene), options).expect("a renderer");
     let picture = renderer.render().expect("a frame").0;
     assert_silent(&context);
     picture
@@ -29,7 +29,7 @@ pub fn on_cpu(scene: &FlatScene, options: &RenderOptions) -> Picture {
 /// Renders the mean of `n_samples` samples per pixel on the device.
 pub fn samples_on_device(scene: &FlatScene, options: &RenderOptions, n_samples: u32) -> Picture {
     let context = device();
-    let mut renderer = Renderer::new(context.clone(), &world_of(scene), options).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), &world_of(scene), options).expect("a renderer");
     (0..n_samples).for_each(|_| drop(renderer.draw_sample().expect("a sample")));
     assert_silent(&context);
     renderer.picture().expect("a picture")
@@ -38,7 +38,7 @@ pub fn samples_on_device(scene: &FlatScene, options: &RenderOptions, n_samples: 
 /// Renders the mean of `n_samples` samples per pixel on the CPU.
 pub fn samples_on_cpu(scene: &FlatScene, options: &RenderOptions, n_samples: u32) -> Picture {
     let world = world_of(scene);
-    let mut renderer = cpu::Renderer::new(&world, options, Batching::default());
+    let mut renderer = cpu::CpuRenderer::new(&world, options, Batching::default());
     (0..n_samples).for_each(|_| drop(renderer.draw_sample()));
     renderer.picture()
 }

@@ -8,7 +8,7 @@ use kdray::{
     accel::kdtree::Traversal,
     cpu,
     frame::{BounceStats, Picture, Primary, RenderOptions},
-    render::Renderer,
+    render::GpuRenderer,
     scene::{
         Alpha, Camera, Channel, Image, Light, Lobes, Maps, Material, Microfacet, Pixels, Projection, Scene, Texture,
         Transform, Wrap,
@@ -199,7 +199,7 @@ fn a_hole_is_seen_through_and_lit_through_in_every_way() {
     }
     for world in grid_worlds(&scene) {
         let context = device();
-        let mut renderer = Renderer::new(context.clone(), &world, &traced).expect("a renderer");
+        let mut renderer = GpuRenderer::new(context.clone(), &world, &traced).expect("a renderer");
         let pictures = [renderer.render().expect("a frame").0, cpu::render(&world, &traced).0];
         assert_silent(&context);
         for picture in pictures {
@@ -280,7 +280,7 @@ fn rays_that_carry_next_to_nothing_are_dropped() {
     let (scene, options) = (flat(&scene), RenderOptions { profile: true, ..options(16, 16, 10) });
     let n_rays = |stats: &[BounceStats]| stats.iter().map(|bounce| bounce.n_rays).collect::<Vec<_>>();
     let context = device();
-    let mut renderer = Renderer::new(context.clone(), &world_of(&scene), &options).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), &world_of(&scene), &options).expect("a renderer");
     let on_device = n_rays(&renderer.render().expect("a frame").1.bounces);
     assert_silent(&context);
     assert_eq!(on_device[..3], [256; 3]);

@@ -3,7 +3,7 @@
 use kdray::{
     buffers::Resources,
     frame::{Primary, RenderOptions},
-    render::Renderer,
+    render::GpuRenderer,
     world::FlatScene,
 };
 
@@ -31,7 +31,7 @@ fn assert_drawn_by(resources: &Resources, scene: &FlatScene, primary: Primary) {
     assert_eq!(found, expected, "{primary}");
 }
 
-fn indices(renderer: &Renderer) -> Vec<u32> {
+fn indices(renderer: &GpuRenderer) -> Vec<u32> {
     renderer.resources().vertex_indices.as_ref().expect("indices").download().expect("indices")
 }
 
@@ -39,7 +39,7 @@ fn indices(renderer: &Renderer) -> Vec<u32> {
 fn only_what_draws_has_indices_and_targets() {
     let (scene, context) = (scenes::mixed_outdoors(), device());
     let world = world_of(&scene);
-    let new = |primary| Renderer::new(context.clone(), &world, &with(primary)).expect("a renderer");
+    let new = |primary| GpuRenderer::new(context.clone(), &world, &with(primary)).expect("a renderer");
     let mut drawing = new(Primary::Raster);
     let drawn = drawing.render().expect("a frame").0;
     let ways = [Primary::Trace, Primary::SoftwareRaster];

@@ -9,7 +9,7 @@ use kdray::{
     layout::{Batch, Hit, RASTER_GROUPS_X, RASTER_GROUPS_Y, Triangle},
     passes::{Inputs, Passes, Rasterize, Trace},
     reference::primary_hit::camera_ray,
-    render::Renderer,
+    render::GpuRenderer,
     scene::{Camera, Projection},
     world::FlatScene,
 };
@@ -257,7 +257,7 @@ fn a_device_without_wide_atomics_is_told_so() {
     let context = without_wide_atomics();
     let scene = scenes::mixed();
     let options = RenderOptions { primary: Primary::SoftwareRaster, ..options(9, 7) };
-    match Renderer::new(context, &world_of(&scene), &options).err() {
+    match GpuRenderer::new(context, &world_of(&scene), &options).err() {
         Some(GpuError::Lacks { missing, .. }) => assert_eq!(missing, "shaderBufferInt64Atomics"),
         other => panic!("{other:?}"),
     }

@@ -9,7 +9,7 @@ use kdray::{
         Accel, Query,
         kdtree::{BuildOptions, KdTree, Traversal},
     },
-    cast::{Caster, CpuCaster},
+    cast::{CpuCaster, GpuCaster},
     gpu::Context,
     layout::{Hit, NO_TRIANGLE, Ray, Triangle},
     scene::{MIN_EXTENT, SceneError},
@@ -74,7 +74,7 @@ fn cast_on_cpu(triangles: &[Triangle], traversal: Traversal, rays: &[Ray]) -> Ve
 fn cast_on_device(context: &std::sync::Arc<Context>, triangles: &[Triangle], rays: &[Ray]) -> Vec<Hit> {
     let accel = Accel::KdTree(KdTree::build(triangles, &BuildOptions::default()));
     let geometry = Geometry::new(triangles, &accel).expect("a tree of these triangles");
-    Caster::new(context, geometry, Traversal::Stack).unwrap().cast(rays, Query::Closest, 1).unwrap().hits
+    GpuCaster::new(context, geometry, Traversal::Stack).unwrap().cast(rays, Query::Closest, 1).unwrap().hits
 }
 
 /// Returns the number of rays whose hits differ in the triangle or in the distance.

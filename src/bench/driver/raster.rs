@@ -8,13 +8,13 @@ use crate::{
     bench::{Spread, stage::Stage},
     frame::{Denoise, Primary, RenderOptions},
     gpu::{Context, GpuError},
-    render::Renderer,
+    render::GpuRenderer,
 };
 
 /// A renderer of a stage's view, and the times of its passes.
 pub struct Raster {
     primary: Primary,
-    renderer: Renderer,
+    renderer: GpuRenderer,
     /// One entry per frame: names and milliseconds of its passes. Empty where the device has no timestamps.
     frames: Vec<Vec<(&'static str, f64)>>,
 }
@@ -23,7 +23,7 @@ impl Raster {
     /// Makes a renderer with one method of rasterization.
     ///
     /// # Errors
-    /// Fails as [`Renderer::new`] does.
+    /// Fails as [`GpuRenderer::new`] does.
     pub fn new(context: &Arc<Context>, stage: &Stage, primary: Primary) -> Result<Self, GpuError> {
         let options = RenderOptions {
             width: stage.frame.width,
@@ -33,14 +33,14 @@ impl Raster {
             primary,
             ..RenderOptions::default()
         };
-        let renderer = Renderer::new(Arc::clone(context), &stage.world, &options)?;
+        let renderer = GpuRenderer::new(Arc::clone(context), &stage.world, &options)?;
         Ok(Self { primary, renderer, frames: Vec::new() })
     }
 
     /// Makes a renderer for each method of rasterization that the device supports.
     ///
     /// # Errors
-    /// Fails as [`Renderer::new`] does.
+    /// Fails as [`GpuRenderer::new`] does.
     pub fn all(context: &Arc<Context>, stage: &Stage) -> Result<Vec<Self>, GpuError> {
         let software_raster = context.has_int64_atomics().then_some(Primary::SoftwareRaster);
         [Primary::Raster].into_iter().chain(software_raster).map(|primary| Self::new(context, stage, primary)).collect()
@@ -49,7 +49,7 @@ impl Raster {
     /// Draws `n_frames` frames, after one that is not counted.
     ///
     /// # Errors
-    /// Fails as [`Renderer::draw`] does.
+    /// Fails as [`GpuRenderer::draw`] does.
     pub fn draw(&mut self, n_frames: u16) -> Result<(), GpuError> {
         self.renderer.draw()?;
         for _ in 0..n_frames {

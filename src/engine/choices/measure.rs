@@ -18,7 +18,7 @@ use crate::{
     gpu::{Context, GpuError},
     layout::{Frame, Hit, PathRay, Ray},
     reference::{inputs::KernelInputs, primary_hit::primary_rays},
-    render::Renderer,
+    render::GpuRenderer,
     world::{FlatScene, World},
 };
 
@@ -100,7 +100,7 @@ pub fn measure_primaries(
 ) -> Result<Option<Timings>, GpuError> {
     let n_pixels = f64::from(options.width) * f64::from(options.height);
     let options = RenderOptions { max_depth: 1, denoise: Denoise::Off, profile: true, ..options.clone() };
-    let mut renderer = Renderer::new(Arc::clone(context), world, &options)?;
+    let mut renderer = GpuRenderer::new(Arc::clone(context), world, &options)?;
     let mut times = Vec::new();
     for &primary in primaries {
         renderer.set_options(&RenderOptions { primary, ..options.clone() })?;
