@@ -32,14 +32,14 @@ use super::{
     },
 };
 
-const PROGRESS: &str = "How the progress is shown: auto, none, or openjd for engines of Open Job Description [default: \
-                        auto]";
+const PROGRESS: &str = "How the progress is shown: auto, none, or openjd for schedulers of Open Job Description \
+                        [default: auto]";
 const PROGRESS_LONG: &str = "How the progress is shown [default: auto]
 
 - auto: on standard error, as a bar or as lines, without --quiet
 - none: not at all; the report and notes remain
-- openjd: on standard output, as lines that engines of Open Job Description read: openjd_progress, openjd_status, and \
-                             openjd_fail if the command fails; also with --quiet
+- openjd: on standard output, as lines that schedulers of Open Job Description read: openjd_progress, \
+                             openjd_status, and openjd_fail if the command fails; also with --quiet
 - openjd:A-B: the same for one of several commands of a task, as percents A to B of the task";
 const AOV: &str = "Layers of each pixel to write into an .exr, separated by commas";
 

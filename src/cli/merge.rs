@@ -7,7 +7,7 @@ use super::{
     progress::Progress,
 };
 
-/// What an engine is told of the shares of the work: reading and joining, and writing.
+/// What a scheduler is told of the shares of the work: reading and joining, and writing.
 const SHARES: [f64; 2] = [0.7, 0.3];
 
 /// Reads the parts, checks that they make up one picture, and writes it.
@@ -17,7 +17,7 @@ pub fn run(args: &MergeArgs) -> Result<(), CliError> {
     roles.write("--output", &args.output)?;
     output::Format::of(&args.output)?;
     output::check(&args.output)?;
-    // Joining is quick, so only an engine is told of it.
+    // Joining is quick, so only a scheduler is told of it.
     let kind = if args.progress == ProgressKind::Auto { ProgressKind::None } else { args.progress };
     let progress = Progress::of_kind(kind, args.quiet, &SHARES, None);
     let noun = if args.parts.len() == 1 { "part" } else { "parts" };

@@ -1,6 +1,6 @@
 //! The command line: arguments, progress, reports and exit codes.
 //!
-//! Reports go to standard output. Progress, notes and errors go to standard error, but progress for an engine goes to
+//! Reports go to standard output. Progress, notes and errors go to standard error, but progress for a scheduler goes to
 //! standard output.
 
 mod args;

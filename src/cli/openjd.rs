@@ -1,6 +1,6 @@
-//! The progress of a command as lines on standard output, by which Open Job Description's engines follow a task.
+//! The progress of a command as lines on standard output, by which Open Job Description's schedulers follow a task.
 //!
-//! An engine reads lines that begin with `openjd_progress: `, `openjd_status: ` and `openjd_fail: `. All other lines
+//! A scheduler reads lines that begin with `openjd_progress: `, `openjd_status: ` and `openjd_fail: `. All other lines
 //! are the task's log.
 
 use std::{
@@ -14,7 +14,7 @@ use std::{
 
 use kdray::util::text::one_line;
 
-/// The beginning of all lines that engines obey.
+/// The beginning of all lines that schedulers obey.
 const PREFIX: &str = "openjd_";
 /// Least time between two lines of progress.
 const PAUSE: Duration = Duration::from_millis(300);
@@ -29,7 +29,7 @@ pub enum ProgressKind {
     /// On standard error, for people.
     #[default]
     Auto,
-    /// On standard output, for an engine.
+    /// On standard output, for a scheduler.
     OpenJd(Percents),
     /// Not at all.
     None,
@@ -63,7 +63,7 @@ impl FromStr for ProgressKind {
 
 impl ProgressKind {
     /// Returns the value of `--progress` among the words of a command. The words need not be valid otherwise, so that
-    /// an engine learns of them, too.
+    /// a scheduler learns of them, too.
     pub fn of_words(words: &[OsString]) -> Self {
         let value_of = |(word, next): (&OsString, Option<&OsString>)| {
             let value = match word.to_str()? {
@@ -76,7 +76,7 @@ impl ProgressKind {
         words.iter().zip(nexts).find_map(value_of).unwrap_or_default()
     }
 
-    /// Tells an engine that the command has ended, and whether it failed.
+    /// Tells a scheduler that the command has ended, and whether it failed.
     pub fn end(self, failure: Option<&str>) {
         match (self, failure) {
             (Self::OpenJd(_), Some(message)) => say("fail", message),
@@ -85,7 +85,7 @@ impl ProgressKind {
         }
     }
 
-    /// Returns a report whose lines an engine does not take for the protocol's.
+    /// Returns a report whose lines a scheduler does not take for the protocol's.
     pub fn report(self, text: &str) -> Cow<'_, str> {
         match self {
             Self::OpenJd(_) if text.contains(PREFIX) => {
@@ -107,7 +107,7 @@ fn say(what: &str, message: &str) {
     let _ = stdout.write_all(line.as_bytes()).and_then(|()| stdout.flush());
 }
 
-/// Tells an engine the progress of a command that consists of stages.
+/// Tells a scheduler the progress of a command that consists of stages.
 pub struct OpenJd {
     percents: Percents,
     /// The share of the work that each stage is. The sum is 1.

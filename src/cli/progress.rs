@@ -1,5 +1,5 @@
 //! Progress of a command: on standard error a bar on a terminal, elsewhere one line per stage; or on standard output
-//! lines for an engine.
+//! lines for a scheduler.
 
 use std::{
     io::{self, IsTerminal},
@@ -70,7 +70,7 @@ impl Meter {
         }
     }
 
-    /// Shows the message of a stage with what is left of it. An engine computes the time that is left by itself.
+    /// Shows the message of a stage with what is left of it. A scheduler computes the time that is left by itself.
     fn set_message(&self, message: String) {
         if let Self::Bar(bar) = self {
             bar.set_message(message);

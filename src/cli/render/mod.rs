@@ -40,7 +40,7 @@ use super::{
     trace::trace_json,
 };
 
-/// What an engine is told of the shares of the work: loading, building, and rendering, which takes longest in films.
+/// What a scheduler is told of the shares of the work: loading, building, and rendering, which takes longest in films.
 const SHARES: [f64; 3] = [0.05, 0.05, 0.9];
 
 /// Runs `kdray render`: loads the scene, builds its structure, renders, writes and reports. Arguments, files and

@@ -1,4 +1,4 @@
-"""Tests of farm/openjd.yaml and farm/dask_film.py, with the engines themselves."""
+"""Tests of farm/openjd.yaml and farm/dask_film.py, with the schedulers themselves."""
 
 import collections
 import subprocess
@@ -7,7 +7,7 @@ import sys
 from film import BIN, BLOCKS, FARM, FRAMES, KDRAY, OPTIONS, SPP, TILES, FilmCase, end, film, run
 
 
-class Engines(FilmCase):
+class Schedulers(FilmCase):
     def test_openjd(self):
         out, template = self.out(), FARM / "openjd.yaml"
         run(BIN / "openjd", "check", template)
@@ -21,7 +21,7 @@ class Engines(FilmCase):
         log = run(BIN / "openjd", "run", template, *parameters, "--step", "Merge", "--run-dependencies").stdout
         self.assertIn("openjd_progress: 100.0", log)
         self.assertEqual(film(out), self.alone)
-        # What fails is told to the engine.
+        # What fails is told to the scheduler.
         parameters += ["-p", "Options=--size none", "-p", f"Out={self.out()}"]
         command = [BIN / "openjd", "run", template, *parameters, "--step", "Render", "--maximum-tasks", "1"]
         failed = subprocess.run([str(word) for word in command], capture_output=True, text=True)
@@ -31,10 +31,10 @@ class Engines(FilmCase):
     def test_dask_loses_a_worker(self):
         out, addresses = self.out(), self.out()
         address = addresses / "scheduler.json"
-        engine = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "start_new_session": True}
+        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "start_new_session": True}
         scheduler = [BIN / "dask", "scheduler", "--scheduler-file", address, "--port", "0", "--no-dashboard"]
         worker = [BIN / "dask", "worker", "--scheduler-file", address, "--nthreads", "1", "--no-dashboard"]
-        started = [subprocess.Popen([*map(str, command)], **engine) for command in (scheduler, worker, worker)]
+        started = [subprocess.Popen([*map(str, command)], **quiet) for command in (scheduler, worker, worker)]
         self.addCleanup(lambda: [end(process) for process in started])
         command = [
             sys.executable, FARM / "dask_film.py", self.pack, out, "--frames", f"0-{FRAMES - 1}", "--tiles", TILES,
