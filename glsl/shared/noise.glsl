@@ -1,4 +1,4 @@
-// Measures of noise. Twin of src/reference/noise.rs. Needs nothing; provides the functions below.
+// Measures of noise. Twin of src/frame/noise.rs. Needs nothing; provides the functions below.
 #ifndef KDRAY_NOISE
 #define KDRAY_NOISE
 

@@ -1,5 +1,5 @@
 // Lookups in textures, whose texels are words of the array `texels`. Positions within an image and weights of texels
-// are multiples of 1/256, so all devices blend alike. Twin of src/reference/texture.rs.
+// are multiples of 1/256, so all devices blend alike. Twin of src/world/texture.rs.
 //
 // Needs load_texels(uint) -> uint, a word of the array `texels`.
 #ifndef KDRAY_TEXTURE

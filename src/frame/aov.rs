@@ -1,11 +1,8 @@
 //! AOVs (arbitrary output variables): what a pixel shows and costs, beside its colour. Users see the names of this
 //! file.
 
-use super::variance_of_joined;
-use crate::{
-    layout::{LIGHT_LAYERS, PixelAovs},
-    reference::noise,
-};
+use super::{noise, variance_of_joined};
+use crate::layout::{LIGHT_LAYERS, PixelAovs};
 
 /// An output variable, in world space and world units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -23,6 +23,8 @@ mod crop;
 mod drawn;
 mod goal;
 mod light_layers;
+#[doc(hidden)]
+pub mod noise;
 mod noise_tiles;
 mod pass;
 pub mod plan;

@@ -53,7 +53,6 @@ pub(crate) mod live_paths;
 pub mod maps;
 pub mod material;
 pub mod microfacet;
-pub mod noise;
 pub mod noise_tiles;
 pub mod path_accumulate;
 pub mod path_begin;
@@ -84,7 +83,6 @@ pub mod slab;
 pub mod studio;
 pub mod surface;
 mod tent;
-pub mod texture;
 pub mod tone_curves;
 pub mod tonemap;
 pub mod trace;
@@ -93,6 +91,9 @@ pub mod traverser;
 pub mod triangle;
 pub mod turns;
 pub mod visibility;
+
+// Twins with which `frame` and `world` compute, too.
+pub use crate::{frame::noise, world::texture};
 
 /// Rays that one thread handles at a time. A task of this size is worth its scheduling, and small enough to balance
 /// the threads' load.

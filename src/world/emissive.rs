@@ -5,11 +5,12 @@ use std::f64::consts::PI;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{FlatScene, emitters::luminance};
-use crate::{
-    layout::{MATERIAL_UNLIT, Material, NO_TEXTURE, Triangle},
-    reference::texture::{sample_texture, uv_set_of},
+use super::{
+    FlatScene,
+    emitters::luminance,
+    texture::{sample_texture, uv_set_of},
 };
+use crate::layout::{MATERIAL_UNLIT, Material, NO_TEXTURE, Triangle};
 
 /// The number of parts of each edge of a triangle over whose cells the mean of its emission is taken.
 const EMISSION_CELLS: usize = 8;

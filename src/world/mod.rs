@@ -19,6 +19,8 @@ mod mips;
 mod mismatch;
 mod path_materials;
 mod scene_hash;
+#[doc(hidden)]
+pub mod texture;
 mod texture_arrays;
 mod textured;
 

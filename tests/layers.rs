@@ -1,0 +1,135 @@
+//! Tests that the folders of `src` use each other only as the table in docs/architecture.md allows, and that unsafe
+//! code is in its folder.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs,
+    path::{Path, PathBuf},
+};
+
+/// A row of the table: folders with one place in the order.
+struct Row {
+    folders: Vec<String>,
+    /// Folders further down that these may use all the same.
+    exceptions: Vec<String>,
+}
+
+/// Returns the rows of the table "The folders", from the top.
+fn rows(architecture: &str) -> Vec<Row> {
+    let section = architecture.split("\n## ").find(|section| section.starts_with("The folders\n"));
+    let table = section.expect("a section").lines().filter_map(|line| {
+        let cells: Vec<_> = line.strip_prefix('|')?.strip_suffix('|')?.split('|').collect();
+        let [folders, _, exceptions] = cells[..] else { return None };
+        Some(Row { folders: quoted(folders), exceptions: quoted(exceptions) })
+    });
+    table.filter(|row| !row.folders.is_empty()).collect()
+}
+
+/// Returns the words between backticks.
+fn quoted(cell: &str) -> Vec<String> {
+    cell.split('`').skip(1).step_by(2).map(str::to_owned).collect()
+}
+
+/// Returns a file's code up to its unit tests, without comments.
+fn code_of(text: &str) -> String {
+    let code = text.split("#[cfg(test)]\nmod ").next().unwrap_or_default();
+    code.lines().map(|line| line.split("//").next().unwrap_or_default()).collect::<Vec<_>>().join("\n")
+}
+
+/// Returns the names of the crate's modules that the code uses: `name` of `crate::name` and of `crate::{name, ..}`.
+fn used(code: &str) -> BTreeSet<String> {
+    let name = |text: &str| text.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>();
+    let mut names = BTreeSet::new();
+    for rest in code.split("crate::").skip(1) {
+        let Some(group) = rest.strip_prefix('{') else {
+            names.insert(name(rest));
+            continue;
+        };
+        let (mut depth, mut is_first) = (1, true);
+        for (at, c) in group.char_indices() {
+            if is_first && depth == 1 && c.is_alphabetic() {
+                names.insert(name(&group[at..]));
+                is_first = false;
+            }
+            match c {
+                '{' => depth += 1,
+                '}' => depth -= 1,
+                ',' if depth == 1 => is_first = true,
+                _ => {}
+            }
+            if depth == 0 {
+                break;
+            }
+        }
+    }
+    names
+}
+
+/// Returns all Rust files below a folder but those of tests.
+fn sources(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let (folders, files): (Vec<_>, Vec<_>) = entries.partition(|path| path.is_dir());
+    let is_source = |path: &PathBuf| {
+        let stem = path.file_stem().unwrap().to_str().unwrap();
+        path.extension().is_some_and(|it| it == "rs") && !stem.split('_').any(|word| word == "tests")
+    };
+    let inner = folders.iter().filter(|folder| !folder.ends_with("tests")).flat_map(|folder| sources(folder));
+    files.into_iter().filter(is_source).chain(inner).collect()
+}
+
+/// Returns what the table does not allow of what a file uses. `file`: its path below `src`.
+fn violations(rows: &[Row], file: &str, code: &str) -> Vec<String> {
+    let places: BTreeMap<&str, usize> =
+        rows.iter().enumerate().flat_map(|(ix, row)| row.folders.iter().map(move |name| (&name[..], ix))).collect();
+    // lib.rs and main.rs are above all.
+    let Some((folder, _)) = file.split_once('/') else { return Vec::new() };
+    let Some(&place) = places.get(folder) else { return vec![format!("{file}: the table has no `{folder}`")] };
+    let is_refused = |name: &&String| match places.get(&name[..]) {
+        Some(&other) => other > place && !rows[place].exceptions.contains(name),
+        None => true,
+    };
+    used(code).iter().filter(is_refused).map(|name| format!("{file} uses `{name}`")).collect()
+}
+
+fn table() -> Vec<Row> {
+    rows(&fs::read_to_string("docs/architecture.md").unwrap())
+}
+
+#[test]
+fn folders_use_only_what_the_table_allows() {
+    let (rows, mut found, mut n_uses) = (table(), Vec::new(), 0);
+    for path in sources(Path::new("src")) {
+        let code = code_of(&fs::read_to_string(&path).unwrap());
+        let file = path.strip_prefix("src").unwrap().to_str().unwrap().to_owned();
+        n_uses += used(&code).len();
+        found.extend(violations(&rows, &file, &code));
+    }
+    assert!(n_uses > 500, "{n_uses} uses were found");
+    assert!(found.is_empty(), "{found:#?}");
+}
+
+#[test]
+fn forbidden_uses_are_found() {
+    let rows = table();
+    let of = |file: &str, code: &str| violations(&rows, file, &code_of(code));
+    assert_eq!(of("gpu/x.rs", "use crate::scene::Scene;"), ["gpu/x.rs uses `scene`"]);
+    assert_eq!(
+        of("world/x.rs", "use crate::{\n    layout::{A, B},\n    reference::texture,\n};"),
+        ["world/x.rs uses `reference`"]
+    );
+    assert_eq!(of("cpu/x.rs", "fn f() { crate::passes::g() }"), ["cpu/x.rs uses `passes`"]);
+    assert_eq!(of("new/x.rs", ""), ["new/x.rs: the table has no `new`"]);
+    assert_eq!(of("scene/x.rs", "use crate::{frame::Denoise, util};\n// crate::engine\n"), [""; 0]);
+    assert_eq!(of("gpu/x.rs", "#[cfg(test)]\nmod tests {\n    use crate::engine;\n}"), [""; 0]);
+}
+
+/// `#![deny(unsafe_code)]` holds where nothing allows it.
+#[test]
+fn unsafe_code_is_in_the_vulkan_layer() {
+    for root in ["src/lib.rs", "src/main.rs"] {
+        assert!(fs::read_to_string(root).unwrap().contains("#![deny(unsafe_code)]"), "{root}");
+    }
+    let allows = |path: &PathBuf| fs::read_to_string(path).unwrap().contains("allow(unsafe_code");
+    let found: Vec<_> = sources(Path::new("src")).into_iter().filter(allows).collect();
+    assert!(!found.is_empty() && found.iter().all(|path| path.starts_with("src/gpu")), "{found:?}");
+}
