@@ -8,8 +8,7 @@
 
 // The albedo below which a colour of a surface counts as black.
 #define LEAST_ALBEDO 1.0e-4
-// The sine of the angle between a pixel's surface and the straight line to another pixel's point at which the weight of
-// the other pixel has fallen to 1 / e.
+// Plane-distance falloff: the weight is 1 / e where the neighbour is seen at this sine above the pixel's tangent plane.
 #define PLANE_SINE 0.2
 // The squared distance of two mean normals at which the weight has fallen to 1 / e.
 #define NORMAL_DISTANCE 0.0625

@@ -12,8 +12,9 @@ use crate::{
 /// handle to the same buffers.
 #[derive(Clone)]
 pub struct PathQueue {
-    /// One for each path, as in the next buffer.
+    /// One element per path.
     pub path_states: Buffer<PathState>,
+    /// One element per path.
     pub shadow_rays: Buffer<ShadowRay>,
     /// Three lists, each with room for all paths: those that are alive at this bounce, those that are alive at the
     /// next, and those that have a shadow ray.

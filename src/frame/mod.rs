@@ -87,8 +87,8 @@ pub struct RenderOptions {
     /// Whether the picture has layers of its light: emission, direct and indirect light ([`Aov::OF_LIGHT`]). Only
     /// frames of [`Integrator::Path`] have them. They take three times the memory of the pixels' samples in addition.
     pub light_layers: bool,
-    /// Whether [`Integrator::Whitted`] shows ambient light in place of light that only paths show: of an environment,
-    /// of lights with an area and of surfaces that shine.
+    /// Whether [`Integrator::Whitted`] approximates the light of the environment, of area lights and of emissive
+    /// surfaces by an ambient term.
     pub approximates_ambient: bool,
     /// What only paths have: filters, lens, bounds.
     pub paths: PathOptions,

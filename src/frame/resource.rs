@@ -49,7 +49,7 @@ pub enum Resource {
     /// States of suspended rays: rays that have spent the loop iterations of a dispatch and go on in a further
     /// dispatch.
     SuspendedRays,
-    /// What is known of each path beside its ray: the light that it has brought, the pdf of its direction.
+    /// Radiance of each path so far, and the pdf of its last direction.
     PathStates,
     /// The shadow ray of each path from its last hit to a sampled light.
     ShadowRays,

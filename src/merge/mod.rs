@@ -2,8 +2,8 @@
 //!
 //! A crop has the bits that the whole picture has there, and sums of aligned blocks of samples are nodes of the tree in
 //! which all samples are added ([`SampleSums`](crate::frame::SampleSums)). So the joined picture has the same bits as
-//! one that is rendered at once on a device of the same kind. Of the layers, the variance of joined samples is another
-//! estimate, and costs are those of the structure that each part was rendered with.
+//! one that is rendered at once on a device of the same kind. Two layers differ: `variance` is estimated from the
+//! blocks of samples, and `cost` depends on the structure that each part was rendered with.
 //!
 //! ```text
 //! part      file -> pixels, sums and record

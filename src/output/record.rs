@@ -64,8 +64,8 @@ pub struct WholeRecord {
     pub tonemap: String,
     /// The noise filter, with its threshold if it has one.
     pub denoise: String,
-    /// Whether the graphics pipeline rasterizes primary rays, which hits are computed from in another way than by
-    /// `trace` and by the rasterizer of kernels.
+    /// Whether primary hits came from the graphics pipeline. Their bits differ from those of `trace` and of the compute
+    /// rasterizer.
     pub is_rasterized: bool,
     /// The filters and bounds of paths; none for whitted.
     #[serde(skip_serializing_if = "Option::is_none", default)]

@@ -7,8 +7,8 @@ use crate::layout::Auxiliary;
 
 /// The albedo below which a colour of a surface counts as black.
 pub const LEAST_ALBEDO: f32 = 1e-4;
-/// The sine of the angle between a pixel's surface and the straight line to another pixel's point at which the weight
-/// of the other pixel has fallen to 1 / e.
+/// Plane-distance falloff: the weight is 1 / e where the neighbour is seen at this sine above the pixel's tangent
+/// plane.
 const PLANE_SINE: f32 = 0.2;
 /// The squared distance of two mean normals at which the weight has fallen to 1 / e.
 const NORMAL_DISTANCE: f32 = 0.0625;

@@ -168,8 +168,7 @@ impl QueueSizing {
     }
 }
 
-/// Returns the number of paths of a batch that the device should get, if the picture has so many. Pictures have the
-/// same bits whatever it is.
+/// Returns the upper bound of paths per batch, from the device's memory. Pictures have the same bits whatever it is.
 fn most_paths(info: &DeviceInfo) -> u64 {
     if info.is_software() {
         return FEW_PATHS;

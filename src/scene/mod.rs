@@ -115,10 +115,10 @@ pub struct Scene {
     pub chosen_light: Option<ChosenLight>,
     /// The image of what is seen beyond the scene; without one, that is `background`. Only the path tracer knows it.
     pub environment: Option<Environment>,
-    /// The sky and its sun. The path tracer knows both, in place of `environment`, and otherwise only the sun is known.
+    /// The sky and its sun. Paths: replaces `environment`. Whitted: only the sun is used.
     pub sky: Option<Sky>,
-    /// The studio that surfaces mirror where rays leave the scene, by the horizontal unit vector towards the viewer for
-    /// whom it is set up: a bright ceiling and three soft boxes. Camera rays do not see it.
+    /// Horizontal unit vector to the viewer of the built-in studio environment (a bright ceiling and three soft boxes),
+    /// which reflections see and camera rays do not; `None` for no studio.
     pub studio: Option<Vec3>,
     /// The camera that renders the scene unless another one is set.
     pub camera: Camera,

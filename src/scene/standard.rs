@@ -21,8 +21,7 @@ pub(super) struct Lacks {
     pub camera: bool,
     /// The axis that points up in a scene without a camera, unless the user states one.
     pub up: Up,
-    /// The file is no scene file but a mesh or glTF file, whose maker has not described a picture. A ground is below
-    /// such a scene if the user chooses a sky, and it gets ambient light beside its lamps.
+    /// The input is a bare model, no scene file. It gets a ground under a sky, and ambient light beside its lamps.
     pub description: bool,
     /// The scene has neither lights nor ambient light.
     pub light: bool,

@@ -23,7 +23,7 @@ use crate::{
     scene::RenderDefaults,
 };
 
-/// Number of parts of a picture at rest whose time is unknown, since others were drawn while the camera moved.
+/// Initial number of parts of a full-quality picture, before its cost has been measured.
 const FIRST_PARTS: u32 = 64;
 /// Least length in seconds of the history that the panel shows.
 const HISTORY_S: f64 = 5.0;

@@ -67,9 +67,9 @@ struct Parts {
     ambient_approximations: [OnceLock<AmbientApproximation>; 2],
 }
 
-/// Returns what `cell` holds. If it is empty, calls `make` first. Other threads do not wait meanwhile, so two may both
-/// call `make`. If they waited, a thread that waits for rayon could take a task that needs the same, and wait for
-/// itself.
+/// Returns the cell's value, computed by `make` if the cell is empty. Does not block: `OnceLock::get_or_init` could
+/// deadlock when rayon steals a task that initializes the same cell. Two threads may compute the value; the first
+/// result is kept.
 fn made_once<T>(cell: &OnceLock<T>, make: impl FnOnce() -> T) -> &T {
     if let Some(made) = cell.get() {
         return made;

@@ -55,9 +55,8 @@ pub fn check(tree: &KdTree, triangles: &[Triangle]) -> Result<(), Invalid> {
 }
 
 impl Descent<'_> {
-    /// Returns the first node, from `node` with its cell down, that lacks a part of the triangle: a leaf that comes
-    /// near the
-    /// polygon and does not have the triangle, or a node with a slab that the polygon reaches out of.
+    /// Searches the subtree of `node` for a leaf near the polygon that lacks the triangle, or a slab that the polygon
+    /// leaves.
     fn lack_below(&self, node: u32, cell: &Bounds, polygon: &[DVec3]) -> Option<Lack> {
         if polygon.is_empty() {
             return None;

@@ -55,7 +55,7 @@ mod tests {
     #[test]
     fn colours_follow_the_points() {
         let file = "#MRGB of ZBrush\nv 0 0 0\r\nv 1 0 0\n#MRGB ff0000FFFF\n#MRGB ffff00\nf 1 2 1\n";
-        // The first line is no block, and the blocks are cut in the middle of a point.
+        // Neither the comment nor blocks of 12 digits (1.5 points) count.
         assert_eq!(with_polypaint(file.to_owned()), file);
         let file = "# MRGB\nv 0 0 0\r\nv 1 0 0\n#MRGB FF0000FF80ff0033\nf 1 2 1";
         let painted = "# MRGB\nv 0 0 0 0 0 1\r\nv 1 0 0 1 0 0.2\n#MRGB FF0000FF80ff0033\nf 1 2 1";
