@@ -1,8 +1,14 @@
 //! A small mesh on a ground of many kilometres. The rounding of hits on the ground is larger than the mesh's triangles.
 //! Yet rays find the mesh's triangles about as fast as without the ground, and miss none.
 
-mod support;
-
+use crate::support::{
+    MeshWithTree, assert_silent,
+    compare::first_difference,
+    device, meshes,
+    packets::check_one_by_one,
+    random::Random,
+    rays::{N_KINDS, nasty_ray, outward_ray, ray},
+};
 use fearless_simd::Level;
 use glam::{Vec3, vec3};
 use kdray::{
@@ -19,14 +25,6 @@ use kdray::{
     },
 };
 use rayon::prelude::*;
-use support::{
-    MeshWithTree, assert_silent,
-    compare::first_difference,
-    device, meshes,
-    packets::check_one_by_one,
-    random::Random,
-    rays::{N_KINDS, nasty_ray, outward_ray, ray},
-};
 
 /// Half of the edges of the grounds, m: 10 km and 1000 km.
 const GROUNDS: [f32; 2] = [1e4, 1e6];
@@ -204,9 +202,9 @@ fn the_device_finds_the_same() {
             let mut caster = GpuCaster::new(&context, world.geometry(), traversal).expect("a caster");
             let found = caster.cast(&rays, Query::Closest, 1).expect("a cast").hits;
             if context.is_software() {
-                support::compare::exact(&expected, &found).unwrap();
+                crate::support::compare::exact(&expected, &found).unwrap();
             } else {
-                support::compare::hits(rays.len() / 500, &expected, &found).unwrap();
+                crate::support::compare::hits(rays.len() / 500, &expected, &found).unwrap();
             }
         }
     }

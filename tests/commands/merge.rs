@@ -1,11 +1,9 @@
 //! Tests of `kdray merge` and of the parts that it joins.
 
-mod support;
-
 use std::{fs, path::Path};
 
+use crate::support::command::{cornell, fail, names, stdout, succeed};
 use exr::prelude::{FlatSamples, ReadChannels, ReadLayers};
-use support::command::{cornell, fail, names, stdout, succeed};
 use tempfile::TempDir;
 
 const SIZE: &str = "40x30";

@@ -1,11 +1,9 @@
 //! Tests of `kdray doctor`.
 
-mod support;
-
 use std::{fs, path::Path, process::Output};
 
+use crate::support::command::{cornell, kdray, stderr, stdout};
 use serde_json::Value;
-use support::command::{cornell, kdray, stderr, stdout};
 use tempfile::TempDir;
 
 /// Runs the command, which has to end with an exit code.

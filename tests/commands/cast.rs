@@ -1,16 +1,14 @@
 //! Tests `kdray cast`: input files, output files, exit codes and one-line errors.
 
-mod support;
-
 use std::{
     fs::{self, File},
     io::BufReader,
     path::Path,
 };
 
+use crate::support::command::{COMPLAINTS, cornell, fail, kdray, names, stderr, stdout, succeed};
 use npyz::{NpyFile, WriterBuilder};
 use serde_json::Value;
-use support::command::{COMPLAINTS, cornell, fail, kdray, names, stderr, stdout, succeed};
 use tempfile::TempDir;
 use zip::ZipArchive;
 

@@ -1,17 +1,15 @@
 //! Tests of `kdray pack`, and of packs as scenes.
 
-mod support;
-
 use std::{
     fs,
     path::{Path, PathBuf},
 };
 
+use crate::support::command::{fail, names, stderr, stdout, succeed};
 use kdray::{
     pack::pack,
     scene::{LoadOptions, Scene},
 };
-use support::command::{fail, names, stderr, stdout, succeed};
 use tempfile::TempDir;
 
 const SCENE: &str = "\

@@ -1,10 +1,8 @@
 //! Runs the examples, and tests that they show what they should.
 
-mod support;
-
 use std::{path::PathBuf, process::Command};
 
-use support::command::{pixels, shipped, succeed};
+use crate::support::command::{pixels, shipped, succeed};
 use tempfile::TempDir;
 
 /// Runs an example and returns what it prints. `cargo test` builds the examples, unless it runs only certain tests.

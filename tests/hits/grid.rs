@@ -1,8 +1,13 @@
 //! Tests that the search through a grid finds the hits of a test of every triangle, for rays on which traversals may
 //! fail.
 
-mod support;
-
+use crate::support::{
+    MeshWithTree,
+    compare::first_difference,
+    meshes,
+    random::Random,
+    rays::{nasty_ray, outward_ray, ray},
+};
 use glam::{Vec3, vec3};
 use kdray::{
     accel::grid::{Grid, GridOptions},
@@ -15,13 +20,6 @@ use kdray::{
     },
 };
 use rayon::prelude::*;
-use support::{
-    MeshWithTree,
-    compare::first_difference,
-    meshes,
-    random::Random,
-    rays::{nasty_ray, outward_ray, ray},
-};
 
 const N_RAYS: usize = 100_000;
 

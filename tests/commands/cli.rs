@@ -1,15 +1,13 @@
 //! Tests the `kdray` command: exit codes, one-line errors, files and closed pipes.
 
-mod support;
-
 use std::{
     fs,
     path::Path,
     process::{Command, Output},
 };
 
+use crate::support::command::{COMPLAINTS, cornell, fail, kdray, names, pixels, stderr, stdout, succeed};
 use serde_json::Value;
-use support::command::{COMPLAINTS, cornell, fail, kdray, names, pixels, stderr, stdout, succeed};
 use tempfile::TempDir;
 
 #[test]

@@ -1,11 +1,9 @@
 //! Tests the messages of the command: each warning appears once, and names from files are printed without control
 //! characters.
 
-mod support;
-
 use std::{fs, path::Path, process::Output};
 
-use support::command::{cornell, kdray, stderr, stdout, succeed};
+use crate::support::command::{cornell, kdray, stderr, stdout, succeed};
 use tempfile::TempDir;
 
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";

@@ -1,10 +1,14 @@
 //! Compares sixteen rays at once, and one ray with sixteen boxes or triangles at once, with the reference, which does
 //! one test after the other. This is done with each instruction set of the machine. The hits are the same, bit for bit.
 
-mod support;
-
 use std::array::from_fn;
 
+use crate::support::{
+    MeshWithTree, meshes,
+    packets::{check_one_by_one, levels, traced},
+    random::Random,
+    rays::nasty_ray,
+};
 use fearless_simd::{Level, dispatch, f32x16, prelude::*};
 use glam::{Vec3, Vec3Swizzles};
 use kdray::{
@@ -17,12 +21,6 @@ use kdray::{
         traverser::{Tracer, Traverser},
         triangle::{Shear, longest_axis},
     },
-};
-use support::{
-    MeshWithTree, meshes,
-    packets::{check_one_by_one, levels, traced},
-    random::Random,
-    rays::nasty_ray,
 };
 
 #[test]
@@ -150,7 +148,7 @@ fn sixteen_rays_of_one_class_of_directions_are_a_packet() {
     let mut seen = vec![];
     let mut n_packets = 0;
     for (ray_ix, direction) in directions_in_turn().enumerate() {
-        let search_ray = SearchRay::from(&support::rays::ray(Vec3::X * ray_ix as f32, direction));
+        let search_ray = SearchRay::from(&crate::support::rays::ray(Vec3::X * ray_ix as f32, direction));
         let Some(bin) = bins.push(ray_ix, &search_ray) else { continue };
         n_packets += 1;
         assert_eq!(bin.keys.len(), LANES);
@@ -174,7 +172,8 @@ fn sixteen_rays_of_one_class_of_directions_are_a_packet() {
 fn rays_of_the_same_signs_take_children_in_one_order() {
     let world = MeshWithTree::new(meshes::cube(2, 0.0));
     for direction in directions_in_turn() {
-        let ray = TraversalRay::new(&world.inputs(), &SearchRay::from(&support::rays::ray(Vec3::ZERO, direction)));
+        let ray =
+            TraversalRay::new(&world.inputs(), &SearchRay::from(&crate::support::rays::ray(Vec3::ZERO, direction)));
         for axis in 0..3 {
             assert_eq!(signs_of(direction) >> axis & 1 == 1, ray.inv_direction[axis] < 0.0, "{direction}");
         }

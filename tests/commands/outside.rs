@@ -1,13 +1,10 @@
 //! Tests that the files of a scene are read below their own folders only, unless the user allows more. strace tells
 //! which files the command opens.
-#![cfg(target_os = "linux")]
-
-mod support;
 
 use std::{fs, os::unix::fs::symlink, path::Path, process::Command};
 
+use crate::support::command::{kdray, stderr};
 use serde_json::json;
-use support::command::{kdray, stderr};
 use tempfile::TempDir;
 
 const OBJ: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl m\nf 1/1 2/1 3/1\n";

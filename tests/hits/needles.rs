@@ -1,22 +1,20 @@
 //! Tests hits of needles and other narrow triangles. Their t, and the points that their weights give, are within the
 //! bounds that the documentation of `reference::triangle` proves.
 
-mod support;
-
-use glam::{DVec3, Vec3};
-use kdray::{
-    accel::{Query, kdtree::Traversal},
-    cast::{GpuCaster, Ray, cast_on_cpu},
-    layout::{Hit, NO_TRIANGLE, PathRay, Triangle},
-    reference::triangle::Shear,
-};
-use support::{
+use crate::support::{
     MeshWithTree, compare, device,
     meshes::triangle,
     packets::{levels, traced},
     random::Random,
     rays::ray,
     with_lanes,
+};
+use glam::{DVec3, Vec3};
+use kdray::{
+    accel::{Query, kdtree::Traversal},
+    cast::{GpuCaster, Ray, cast_on_cpu},
+    layout::{Hit, NO_TRIANGLE, PathRay, Triangle},
+    reference::triangle::Shear,
 };
 
 /// Half of the distance between 1 and the next float.

@@ -1,19 +1,17 @@
 //! Meshes of very different sizes side by side. The rounding of a far origin is larger than the small meshes, so two
 //! methods agree on hits only if both move such an origin to the same place. All methods do, bit for bit.
 
-mod support;
-
+use crate::support::{
+    MeshWithTree, assert_silent, compare, device, meshes,
+    random::Random,
+    rays::{N_KINDS, nasty_ray},
+};
 use glam::{Vec3, vec3};
 use kdray::{
     accel::{Accel, AccelOptions, Query, grid::GridOptions, kdtree::Traversal},
     cast::{GpuCaster, Ray, cast_on_cpu},
     layout::{Hit, NO_TRIANGLE, Triangle},
     world::Geometry,
-};
-use support::{
-    MeshWithTree, assert_silent, compare, device, meshes,
-    random::Random,
-    rays::{N_KINDS, nasty_ray},
 };
 
 const N_RAYS: usize = 1000 * N_KINDS;

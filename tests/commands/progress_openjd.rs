@@ -1,11 +1,9 @@
 //! Tests of `--progress openjd`: the lines of `kdray render` and `kdray merge` that engines of Open Job Description
 //! read.
 
-mod support;
-
 use std::{fs, path::Path, time::Instant};
 
-use support::command::{cornell, kdray, stderr, stdout, succeed};
+use crate::support::command::{cornell, kdray, stderr, stdout, succeed};
 use tempfile::TempDir;
 
 /// Returns the messages of all lines `openjd_WHAT: MESSAGE`, and checks that no other line begins as they do.

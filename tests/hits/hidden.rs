@@ -1,8 +1,9 @@
 //! Tests that rays pass through hidden triangles, on the device and on the CPU: they find what they would find in a
 //! mesh without these triangles.
 
-mod support;
-
+use crate::support::{
+    MeshWithTree, compare, device, meshes, packets::traced_one_by_one, random::Random, rays::nasty_ray,
+};
 use fearless_simd::Level;
 use glam::Vec3;
 use kdray::{
@@ -16,7 +17,6 @@ use kdray::{
         traverser::{Tracer, Traverser},
     },
 };
-use support::{MeshWithTree, compare, device, meshes, packets::traced_one_by_one, random::Random, rays::nasty_ray};
 
 const MISS: Hit = Hit { t: f32::INFINITY, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
 

@@ -1,10 +1,8 @@
 //! Tests that an output is refused if another output or a file that is read has the same path.
 
-mod support;
-
 use std::{fs, path::Path};
 
-use support::command::{fail, names};
+use crate::support::command::{fail, names};
 use tempfile::TempDir;
 
 const MESH: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n";

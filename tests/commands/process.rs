@@ -1,7 +1,4 @@
 //! Tests what ends the command from outside: signals while it works, and limits on the size of files and on memory.
-#![cfg(target_os = "linux")]
-
-mod support;
 
 use std::{
     fs::{self, File},
@@ -12,9 +9,9 @@ use std::{
     time::{Duration, Instant},
 };
 
+use crate::support::command::{PATIENCE, cornell, kdray, names, stderr};
 use npyz::WriterBuilder;
 use rustix::process::{Pid, Signal, kill_process};
-use support::command::{PATIENCE, cornell, kdray, names, stderr};
 use tempfile::TempDir;
 
 const N_RAYS: u64 = 1_500_000;

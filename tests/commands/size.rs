@@ -1,12 +1,10 @@
 //! Tests `kdray bench size`: the mesh that it generates, its measurements, and the arguments that it refuses.
 
-mod support;
-
 use std::{collections::HashMap, fs};
 
+use crate::support::command::{fail, kdray, names, stderr, stdout, succeed};
 use kdray::{bench::size::knot, layout::BRUTE_MAX_TRIANGLES, world::FlatScene};
 use serde_json::Value;
-use support::command::{fail, kdray, names, stderr, stdout, succeed};
 use tempfile::TempDir;
 
 #[test]

@@ -1,11 +1,9 @@
 //! Tests the samples, crops, tone curves, layers and camera paths of `kdray render`.
 
-mod support;
-
 use std::{fs, path::Path, process::Output};
 
+use crate::support::command::{cornell, fail, names, stderr, stdout, succeed};
 use exr::prelude::{FlatSamples, ReadChannels, ReadLayers};
-use support::command::{cornell, fail, names, stderr, stdout, succeed};
 use tempfile::TempDir;
 
 /// Renders a small picture of the Cornell box on the CPU, in a directory.
@@ -110,7 +108,7 @@ fn curves_change_what_is_shown_and_not_what_is() {
         render(path, &["-o", &format!("{curve}.exr"), "--tonemap", curve]);
     }
     render(path, &["-o", "default.png"]);
-    let read = |name: &str| support::command::pixels(&path.join(name));
+    let read = |name: &str| crate::support::command::pixels(&path.join(name));
     assert!(read("default.png") == read("linear.png"));
     assert!(read("agx.png") != read("linear.png") && read("agx.png") != read("aces.png"));
     assert!(read("agx.exr") == read("linear.exr") && read("aces.exr") == read("linear.exr"));

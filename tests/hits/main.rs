@@ -1,0 +1,11 @@
+//! Tests that rays find the right hits where that is hard, in all structures, on the CPU and on a device.
+
+#[path = "../support/mod.rs"]
+mod support;
+
+mod grid;
+mod hidden;
+mod huge_ground;
+mod mixed_scales;
+mod needles;
+mod packets;
