@@ -19,7 +19,7 @@ use support::{
     MeshWithTree, assert_silent, compare, device, meshes, pretended, random::Random, rays::nasty_ray, scenes, world_of,
 };
 
-/// Opens the device as it is. Opens a device that ends shaders after `loop_limit` iterations. With `n_lanes` it is a
+/// Opens a device that ends shaders after `loop_limit` iterations. With `n_lanes` it is a
 /// GPU of that many lanes, in place of a software driver.
 fn limited_device(loop_limit: u32, n_lanes: Option<u32>, n_suspension_slots: Option<usize>) -> Arc<Context> {
     pretended(DeviceOverrides {

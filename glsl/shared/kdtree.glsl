@@ -63,8 +63,8 @@ Visit next_leaf(TraversalRay ray, float t_best, inout Cell cell) {
 }
 
 // Searches in one loop, each of whose iterations either tests a triangle or goes on to the next leaf. So lanes that
-// test stay together, and so do lanes that go on. If a iteration tested all triangles of a leaf instead, lanes with few
-// triangles would wait for lanes with many. If a iteration went from leaf to leaf until it has a triangle to test,
+// test stay together, and so do lanes that go on. If an iteration tested all triangles of a leaf instead, lanes with
+// few triangles would wait for lanes with many. If an iteration went from leaf to leaf until it has a triangle to test,
 // lanes that have one would wait for lanes that still seek. Returns 0, or the mark of a ray that was suspended.
 uint search_in_one_loop(TraversalRay ray, bool any_hit, inout Nearest best) {
     if (!is_in(ray)) return 0u;

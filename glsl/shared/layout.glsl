@@ -1181,7 +1181,7 @@ struct GridBuild {
     uint greatest_y;
     uint greatest_z;
     uint n_triangles;
-    // What the host requires. *_pdf: cells for each triangle. max_references: the most pairs of a level, and also
+    // What the host requires. *_density: cells for each triangle. max_references: the most pairs of a level, and also
     // the most cells of the lower level. max_columns: the most columns.
     float upper_density;
     float lower_density;

@@ -4,8 +4,8 @@
 //
 // On such devices, an `if` saves nothing: its body costs the same whether all lanes, some lanes or no lane take it. A
 // loop ends as soon as no lane continues, but runs its body at least once. So loops test at their end whether to
-// continue, which saves a iteration in which no lane takes part. They test at their beginning, too. Without that second
-// test, lavapipe (Mesa 22.3) computes wrong results for lanes that leave the loop early: their variables get the
+// continue, which saves an iteration in which no lane takes part. They test at their beginning, too. Without that
+// second test, lavapipe (Mesa 22.3) computes wrong results for lanes that leave the loop early: their variables get the
 // values of the loop's last iteration.
 //
 // Needs everything that kdtree.glsl includes, and its `next_leaf`. Provides `search_in_step`.
@@ -57,7 +57,7 @@ bool go_on_in_step(TraversalRay ray, float t_best, inout bool begins, inout Cell
 }
 
 // Searches in one loop. Each iteration seeks a triangle to test in at most two leaves: the second one only if the first
-// one has none. Then it makes at most one test. If a iteration went on until all lanes have something to test, most
+// one has none. Then it makes at most one test. If an iteration went on until all lanes have something to test, most
 // lanes would wait. If it tested after every leaf, often no lane would have anything to test. Returns 0, or the mark of
 // a ray that was suspended.
 uint search_in_step(TraversalRay ray, bool any_hit, inout Nearest best) {

@@ -9,7 +9,7 @@
 //! vertex_indices  the index buffer of the triangles that the graphics pipeline rasterizes
 //! texture_words   textures, and what leads from triangles to them
 //! surface_kinds   which kinds of surfaces a scene has, as specialization constants
-//! suspended_rays          rays that have spent a dispatch's loop iterations
+//! suspended_rays  rays that have spent a dispatch's loop iterations
 //! resources       all of these, with the frame's descriptor set
 //! grid            the build of a grid
 //! cast            given rays, their hits, and the cast's descriptor set

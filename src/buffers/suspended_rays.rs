@@ -111,8 +111,7 @@ impl SuspendedRays {
         let mut n_resume_passes = 0;
         loop {
             let [n_slots, n_suspended, n_waiting, _] = self.rows.download_first(1)?[0];
-            // Rays without a slot do not run in a resume_pass of `Resume`, so their count is kept for a resume_pass of
-            // `Restart`.
+            // Rays without a slot do not run in a pass of `Resume`, so their count is kept for a pass of `Restart`.
             let (resume_pass, counts) = match (n_suspended, n_waiting) {
                 (1.., _) => (ResumePass::Resume, [n_slots, 0, n_waiting, 0]),
                 (0, 1..) => (ResumePass::Restart, Counts::default()),

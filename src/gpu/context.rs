@@ -30,7 +30,7 @@ pub struct ContextOptions {
 }
 
 impl ContextOptions {
-    /// Returns options for the selected device, or for the best one if `device` is `None`. `validate` iterations the
+    /// Returns options for the selected device, or for the best one if `device` is `None`. `validate` turns the
     /// validation layer on.
     pub fn new(device: Option<DeviceSelector>, validate: bool) -> Self {
         Self { device, validate, overrides: DeviceOverrides::default() }

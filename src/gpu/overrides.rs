@@ -16,7 +16,7 @@ pub struct DeviceOverrides {
     /// Whether the device checks the bounds of buffers, so that a kernel that reads or writes beyond them harms nothing
     /// else. Otherwise kernels are made without such checks (`robustness.rs`).
     pub bounds_checks: bool,
-    /// Number of iterations (iterations) of a kernel's loops after which the driver ends the kernel.
+    /// Number of iterations of a kernel's loops after which the driver ends the kernel.
     pub loop_limit: Option<u32>,
     /// Whether each buffer has memory of its own, which is overwritten before it is released. In a block that buffers
     /// share, a kernel that reads a released buffer finds what was there, and nobody notices.

@@ -46,7 +46,7 @@ impl Cast {
     }
 
     /// Needs the first `n_rays` elements of `cast_rays`. Leaves the first `n_rays` elements of `cast_hits`; a ray that
-    /// was suspended leaves a mark in place of its hit. `resume_pass`: which rays are traced, all or those that have
+    /// was suspended leaves a mark in place of its hit. `resume_pass`: which rays are traced, all or those that were
     /// suspended.
     pub fn record(&self, commands: &Commands, set: &BindingSet, n_rays: u32, pass: ResumePass) {
         commands.bind(set);

@@ -31,7 +31,7 @@ impl PathTrace {
     /// Needs `rays` of the paths that are alive, `shadow_rays`, and in `live_paths` the lists of this bounce and of the
     /// shadow rays. Leaves `hits`. Updates `shadow_rays` and `path_states`, the counters if the options ask for a
     /// profile, and `pixel_aovs` if they ask for AOVs. A ray that was suspended leaves a mark in place of its
-    /// hit, a shadow ray in place of its state. `batch.resume_pass`: which of them are traced, all or those that have
+    /// hit, a shadow ray in place of its state. `batch.resume_pass`: which of them are traced, all or those that were
     /// suspended.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         commands.dispatch(&self.kernel, Some(batch.depth), batch, resources.trace_dispatch(batch));

@@ -17,7 +17,7 @@ use crate::{
     world::World,
 };
 
-/// GpuRenderer of whole pictures of any size. If the widest buffer of pixels exceeds what the device can bind as one
+/// Renderer of whole pictures of any size. If the widest buffer of pixels exceeds what the device can bind as one
 /// storage buffer, bands are drawn. The joined picture has the same bits as one that is drawn at once.
 pub struct BandedRenderer {
     pub(super) renderer: GpuRenderer,

@@ -282,8 +282,8 @@ impl GpuRenderer {
         Ok(PartialSample { parts: parts.into(), n_done: 0, sample_ix, begun_at: None })
     }
 
-    /// Sets the view that the next sample and [`GpuRenderer::show`] display: the picture, or an AOV in its place. A
-    /// AOVs is displayed only if the options ask for AOVs. `brightest`: in views of costs and of numbers of
+    /// Sets the view that the next sample and [`GpuRenderer::show`] display: the picture, or an AOV in its place. An
+    /// AOV is displayed only if the options ask for AOVs. `brightest`: in views of costs and of numbers of
     /// rays, the value that is displayed brightest; in the view of depth, the depth that is half as bright as
     /// depth 0.
     ///

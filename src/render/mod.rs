@@ -12,7 +12,7 @@
 //!
 //! Each line except `each batch` is one command buffer, and each bounce has one of its own. Where rays can be
 //! suspended, a bounce or `light` has two command buffers. A ray is suspended if the driver limits the loop iterations
-//! of a kernel and the ray has spent its turns; it goes on in a further dispatch.
+//! of a kernel and the ray has spent its budget; it goes on in a further dispatch.
 
 mod bands;
 mod external;
@@ -62,7 +62,7 @@ pub struct GpuRenderer {
     n_samples: u32,
     /// Base-2 logarithm of the number of samples that a frame of paths draws.
     samples_log2: u32,
-    /// The AOVs that is displayed in place of the picture. Used only if the options ask for AOVs.
+    /// The AOV that is displayed in place of the picture. Used only if the options ask for AOVs.
     false_color: Option<FalseColor>,
     /// Whether the view needs only the hits of primary rays. Used only if the options ask for AOVs.
     needs_primary_rays_only: bool,

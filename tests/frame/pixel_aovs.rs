@@ -1,4 +1,4 @@
-//! Tests of AOVs, the AOVs of the first hits: position, normal, albedo, depth, ids and costs of each pixel.
+//! Tests of the AOVs of first hits: position, normal, albedo, depth, ids and costs of each pixel.
 
 use glam::{Vec3, vec3};
 use kdray::{

@@ -14,7 +14,7 @@ use kdray::{
 use super::stage::{FIRST, Stage, UNTOUCHED_RAY, UNTOUCHED_WORD, options};
 use crate::support::{compare, meshes, random::Random, scenes};
 
-/// Number of rays whose counts fit in one resume_pass of the spine, the prefix sum over workgroups, if it has the
+/// Number of rays whose counts fit in one round of the spine, the prefix sum over workgroups, if it has the
 /// fewest invocations.
 const ROUND: u32 = SCAN_GROUP_SIZE * SCAN_GROUP_SIZE * SPINE_ITEMS;
 

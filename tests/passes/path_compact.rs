@@ -17,7 +17,7 @@ use crate::support::{compare, pretended, random::Random, scenes};
 
 /// Number of paths for which the stage has room.
 const CAPACITY: usize = 1200 << 7;
-/// Number of paths whose counts fit in one resume_pass of the spine, if it has the fewest invocations.
+/// Number of paths whose counts fit in one round of the spine, if it has the fewest invocations.
 const ROUND: usize = (SCAN_GROUP_SIZE * SCAN_GROUP_SIZE * SPINE_ITEMS) as usize;
 
 /// Compacts `n` paths by the kernels and by their twin, and compares the results. The array has the share of the paths

@@ -1,4 +1,4 @@
-//! Tests of the kernel AOVs against its twin on the CPU.
+//! Tests of the kernel pixel_aovs against its twin on the CPU.
 
 use std::collections::HashSet;
 
@@ -61,7 +61,7 @@ fn agrees_with_its_twin() {
     let stage = stage();
     for n in RAY_COUNTS {
         let rays = primary_rays(&stage, n);
-        // PixelAovs are cleared except for their counts, which the kernel keeps.
+        // AOVs are cleared except for their counts, which the kernel keeps.
         let before: Vec<_> =
             (0..2000).map(|i| PixelAovs { n_rays: i, n_steps: 7 * i, ..PixelAovs::default() }).collect();
         let mut expected = before.clone();

@@ -29,8 +29,7 @@ bool refracts_between(vec3 to_viewer, vec3 to_light, vec3 half_vector) {
     return dot(to_viewer, half_vector) > 0.0 && dot(to_light, half_vector) < 0.0;
 }
 
-// Solid angle of directions to the light for each steradian of normals, as its inverse: pdf of directions for a
-// pdf 1 of normals.
+// Jacobian of refraction: the factor by which the pdf of a normal becomes the pdf of the light's direction.
 float refraction_jacobian(vec3 to_viewer, vec3 to_light, vec3 half_vector, float eta) {
     float cos_light = dot(to_light, half_vector);
     float sum = cos_light + eta * dot(to_viewer, half_vector);

@@ -1,4 +1,4 @@
-// Alias tables: a sample among n entries, each with its own probability, in constant time (Walker: An Efficient Method
+// Alias tables: sample one of n entries, each with its own probability, in constant time (Walker: An Efficient Method
 // for Generating Discrete Random Variables With General Distributions, ACM TOMS 1977). The host builds the tables
 // (src/world/alias.rs). Twin of src/reference/emitters/alias.rs.
 //

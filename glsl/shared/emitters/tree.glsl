@@ -1,4 +1,4 @@
-// The light tree: a sample among many lights by what they may send to a point (Conty Estevez, Kulla: Importance
+// The light tree: samples one of many lights by what they may send to a point (Conty Estevez, Kulla: Importance
 // Sampling of Many Lights with Adaptive Tree Splitting, HPG 2018). The host builds it (src/world/light_tree.rs). Twin
 // of src/reference/emitters/tree.rs.
 //

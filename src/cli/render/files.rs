@@ -165,7 +165,7 @@ mod tests {
             Picture { width: 2, height: 1, radiance: vec![[0.5, 1.5, 2.5, 1.0]; 2], display: vec![[9, 8, 7, 255]; 2] };
         for name in ["x.png", "y.exr"] {
             let path = directory.path().join(name);
-            // No AOV is there for the two pixels.
+            // The two pixels have no AOVs.
             let layers = Layers { aovs: &[Aov::Depth], ..Layers::default() };
             let error = Files::of(path.clone(), layers.aovs).write(&picture, &layers).unwrap_err();
             assert!(error.to_string().contains("cannot encode"), "{error}");

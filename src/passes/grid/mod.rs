@@ -220,7 +220,7 @@ mod tests {
     const ARITHMETIC: [u32; 8] = [129, 131, 133, 142, 143, 144, 145, 148];
 
     /// Counts the arithmetic instructions of a module that lack `NoContraction`. A device may contract these to
-    /// others, which resume_pass differently.
+    /// others, which round differently.
     fn n_contractible(spirv: &[u8]) -> usize {
         let words: Vec<u32> = spirv.chunks_exact(4).map(|b| u32::from_le_bytes(b.try_into().unwrap())).collect();
         let (mut results, mut exact) = (Vec::new(), Vec::new());

@@ -28,8 +28,7 @@ pub fn refracts_between(to_viewer: Vec3, to_light: Vec3, half_vector: Vec3) -> b
     to_viewer.dot(half_vector) > 0.0 && to_light.dot(half_vector) < 0.0
 }
 
-/// Solid angle of directions to the light for each steradian of normals, as its inverse: pdf of directions for a
-/// pdf 1 of normals.
+/// Jacobian of refraction: the factor by which the pdf of a normal becomes the pdf of the light's direction.
 pub fn refraction_jacobian(to_viewer: Vec3, to_light: Vec3, half_vector: Vec3, eta: f32) -> f32 {
     let cos_light = to_light.dot(half_vector);
     let sum = cos_light + eta * to_viewer.dot(half_vector);

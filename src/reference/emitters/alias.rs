@@ -1,5 +1,5 @@
-//! Alias tables: a sample among entries, each with its own probability. Twin of `emitters/alias.glsl`, which names the
-//! source.
+//! Alias tables: sample one of many entries, each with its own probability. Twin of `emitters/alias.glsl`, which names
+//! the source.
 
 /// The largest float below 1.
 pub const ALMOST_ONE: f32 = 1.0 - f32::EPSILON / 2.0;

@@ -1,4 +1,4 @@
-//! The light tree: a sample among many lights by what they may send to a point. Twin of `emitters/tree.glsl`, which
+//! The light tree: samples one of many lights by what they may send to a point. Twin of `emitters/tree.glsl`, which
 //! names the source.
 
 use glam::Vec3;
