@@ -9,9 +9,9 @@ use std::{env, error::Error, path::Path};
 use kdray::{
     accel::Query,
     cast::{NO_TRIANGLE, Ray},
-    engine::{Built, Engine, choices::Workload},
+    engine::{Engine, LoadRequest},
     gpu::ContextOptions,
-    scene::{Camera, Projection, Scene},
+    scene::{Camera, Projection},
 };
 
 /// Numbers of columns and rows of characters.
@@ -19,9 +19,6 @@ const SIZE: (u32, u32) = (64, 28);
 
 fn main() -> Result<(), Box<dyn Error>> {
     let path = env::args_os().nth(1).ok_or("usage: cast SCENE")?;
-    let scene = Scene::load(Path::new(&path))?;
-    let rays: Vec<_> =
-        (0..SIZE.1).flat_map(|y| (0..SIZE.0).map(move |x| (x, y))).map(|(x, y)| ray(&scene.camera, x, y)).collect();
     // Only a machine without a Vulkan driver casts on the CPU: any other error is one.
     let engine = match Engine::open(&ContextOptions::default()) {
         Err(error) if error.is_without_driver() => {
@@ -30,7 +27,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         opened => opened?,
     };
-    let Built { world, .. } = engine.build(scene, &Workload::of_rays(rays.len() as u64))?;
+    let request = LoadRequest::rays(u64::from(SIZE.0 * SIZE.1));
+    let world = engine.load(Path::new(&path), &request)?.world;
+    let places = (0..SIZE.1).flat_map(|y| (0..SIZE.0).map(move |x| (x, y)));
+    let rays: Vec<_> = places.map(|(x, y)| ray(&world.scene().camera, x, y)).collect();
     let hits = engine.cast(&world, &rays, Query::Closest)?;
     for row in hits.chunks(SIZE.0 as usize) {
         let letter = |material: u32| char::from(b'a' + (material % 26) as u8);

@@ -7,10 +7,9 @@
 use std::{env, error::Error, path::PathBuf};
 
 use kdray::{
-    engine::{Built, Engine, choices::Workload},
+    engine::{Engine, LoadRequest},
     gpu::ContextOptions,
     output,
-    scene::Scene,
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -18,10 +17,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (Some(scene), Some(picture)) = (arguments.next(), arguments.next()) else {
         return Err("usage: render SCENE PICTURE".into());
     };
-    let scene = Scene::load(&scene)?;
-    let options = scene.defaults.options();
-    // The engine chooses a tree that suits the number of rays.
-    let workload = Workload::of_pictures(&options, scene.lights.len(), 1);
     // Only a machine without a Vulkan driver renders on the CPU: any other error is one.
     let engine = match Engine::open(&ContextOptions::default()) {
         Err(error) if error.is_without_driver() => {
@@ -30,8 +25,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         opened => opened?,
     };
-    let Built { world, .. } = engine.build(scene, &workload)?;
-    let rendered = engine.render(&world, &options)?;
+    let loaded = engine.load(&scene, &LoadRequest::default())?;
+    loaded.notes.iter().for_each(|note| eprintln!("{note}"));
+    let rendered = engine.render(&loaded.world, &loaded.options)?;
     output::write_picture(&picture, &rendered.picture)?;
     println!("{} on {}", picture.display(), engine.device_name());
     Ok(())

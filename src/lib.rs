@@ -2,20 +2,17 @@
 //! first, with a bit mask as the stack. It implements Cao Jiayin's paper on interactive ray tracing by depth-first
 //! kd-tree traversal (2010). A machine without Vulkan renders on the CPU.
 //!
-//! An [`Engine`](engine::Engine) opens a device, builds the tree of a scene, and renders pictures or casts rays:
+//! An [`Engine`](engine::Engine) opens a device, loads a scene and builds its tree, and renders pictures or casts rays:
 //!
 //! ```
-//! use kdray::engine::{Engine, choices::Workload};
-//! use kdray::frame::RenderOptions;
-//! use kdray::scene::Scene;
+//! use kdray::engine::{Engine, LoadRequest};
+//! use kdray::scene::PictureChoices;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let scene = Scene::load("scenes/cornell.toml".as_ref())?;
-//! let options = RenderOptions { width: 64, height: 64, ..scene.defaults.options() };
-//! let workload = Workload::of_pictures(&options, scene.lights.len(), 1);
 //! let engine = Engine::on_cpu(); // or Engine::open(&ContextOptions::default())?
-//! let world = engine.build(scene, &workload)?.world;
-//! let picture = engine.render(&world, &options)?.picture;
+//! let choices = PictureChoices { size: Some((64, 64)), ..PictureChoices::default() };
+//! let loaded = engine.load("scenes/cornell.toml", &LoadRequest::pictures(choices))?;
+//! let picture = engine.render(&loaded.world, &loaded.options)?.picture;
 //! assert_eq!(picture.display.len(), 64 * 64); // sRGB, rows from the top
 //! # Ok(())
 //! # }

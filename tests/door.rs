@@ -17,7 +17,7 @@ use kdray::{
         kdtree::{BuildOptions, KdTree, Traversal},
     },
     cast::{CpuCaster, Ray},
-    engine::{Engine, NoiseGoal, choices::Workload},
+    engine::{Engine, NoiseGoal},
     frame::{Crop, Denoise, Goal, Integrator, NoiseTiles, RenderOptions, SampleRange, TileSamples},
     gpu::DeviceOverrides,
     layout::{
@@ -126,7 +126,6 @@ fn a_scene_with_one_thing_wrong_is_refused() {
     let (good, options) = (textured::every_kind(), BuildOptions::default());
     assert!(World::of_flat(good.clone(), &options).is_ok());
     let tree = KdTree::build(&good.triangles, &options);
-    let engine = Engine::on_cpu();
     for (expected, change) in CHANGES {
         let mut scene = good.clone();
         change(&mut scene);
@@ -134,7 +133,6 @@ fn a_scene_with_one_thing_wrong_is_refused() {
             World::of_flat(scene.clone(), &options).map(drop),
             World::with_accel(scene.clone(), &AccelOptions::Grid(GridOptions::uniform())).map(drop),
             World::with_tree(scene.clone(), tree.clone(), &options).map(drop),
-            engine.build_flat(scene, &Workload::of_rays(1)).map(drop),
         ];
         for error in errors {
             let error = error.expect_err(expected).to_string();
@@ -210,7 +208,7 @@ fn a_leaf_of_a_light_is_not_taken_from_the_scene() {
 fn draw_everywhere(scene: &FlatScene) {
     let context = device();
     for engine in [Engine::on_cpu(), Engine::on_device(context.clone())] {
-        let world = engine.build_flat(scene.clone(), &Workload::of_rays(1)).expect("a world").world;
+        let world = world_of(scene);
         for integrator in [Integrator::Whitted, Integrator::Path] {
             engine.render(&world, &RenderOptions { integrator, ..small() }).expect("a picture");
         }

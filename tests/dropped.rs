@@ -15,12 +15,12 @@ use glam::Vec3;
 use kdray::{
     accel::{Query, kdtree::Traversal},
     cast::{GpuCaster, Hit, NO_TRIANGLE, Ray},
-    engine::{Built, Engine, choices::Workload},
+    engine::Engine,
     frame::{Goal, RenderOptions},
     gpu::{Context, Device, DeviceOverrides, ExternalBuffer, ExternalCommands, ExternalImage, TimelinePoint},
 };
 use program::Program;
-use support::scenes;
+use support::{scenes, world_of};
 use target::Target;
 
 /// Values of the program's timeline: the image is cleared, the device may copy the picture into it, has copied it, and
@@ -85,8 +85,7 @@ fn pictures_that_are_being_copied() {
             let image = ExternalImage::new(target.image, (options.width, options.height), layouts);
             let point = |value| TimelinePoint::new(program.timeline, value);
             let engine = Engine::on_device(&device);
-            let Built { world, .. } =
-                engine.build_flat(scenes::mixed(), &Workload::of_pictures(&options, 2, 1)).expect("a world");
+            let world = world_of(&scenes::mixed());
             let mut renderer = engine.renderer(&world, &options).expect("a renderer");
             renderer.draw(&world.scene().camera, Goal::Samples(1), || ()).expect("a sample");
             renderer.copy_picture_to(&image, Some(point(MAY_COPY)), Some(point(COPIED))).expect("a copy");
@@ -133,7 +132,7 @@ fn casts_that_are_recorded() {
             write(&program, ray_memory, bytemuck::cast_slice(&rays));
             let device = device(&program);
             let engine = Engine::on_device(&device);
-            let Built { world, .. } = engine.build_flat(scene.clone(), &Workload::of_rays(64)).expect("a world");
+            let world = world_of(&scene);
             let mut caster = GpuCaster::new(&device, world.geometry(), Traversal::Mask).expect("a caster");
             let external = |raw, bytes: usize| ExternalBuffer::new(raw, 0, 64 * bytes as u64);
             let (from, to) = (external(ray_buffer, size_of::<Ray>()), external(hit_buffer, size_of::<Hit>()));

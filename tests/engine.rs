@@ -2,17 +2,22 @@
 
 mod support;
 
+use std::{fs, path::PathBuf};
+
+use glam::Vec3;
 use kdray::{
     accel::{
         Query,
         kdtree::{BuildOptions, Traversal},
     },
     cast::{CpuCaster, NO_TRIANGLE, Ray},
-    engine::{Built, Engine, choices::Workload},
+    engine::{Engine, LoadRequest, Loaded},
     frame::RenderOptions,
     gpu::ContextOptions,
+    scene::{Mesh, PictureChoices},
 };
-use support::scenes;
+use support::{scenes, world_of};
+use tempfile::TempDir;
 
 #[test]
 fn an_engine_renders_and_casts_alike_on_device_and_cpu() {
@@ -21,14 +26,13 @@ fn an_engine_renders_and_casts_alike_on_device_and_cpu() {
     let device = Engine::open(&ContextOptions::new(None, true)).expect("a device with validation");
     let engines = [device.clone(), Engine::on_cpu()];
     let rendered = engines.map(|engine| {
-        let workload = Workload::of_pictures(&options, scene.lights.len(), 1);
-        let Built { world, .. } = engine.build_flat(scene.clone(), &workload).expect("a world");
+        let world = world_of(&scene);
         let picture = engine.render(&world, &options).expect("a picture").picture;
         let eye = scene.camera.eye;
         let ray = |i: u32| Ray {
             origin: eye,
             t_min: 0.0,
-            direction: scene.camera.target - eye + 0.01 * glam::Vec3::splat(i as f32),
+            direction: scene.camera.target - eye + 0.01 * Vec3::splat(i as f32),
             t_max: f32::INFINITY,
         };
         let rays: Vec<_> = (0..50).map(ray).collect();
@@ -61,4 +65,61 @@ fn trees_of_either_kind_give_the_same_hits() {
         CpuCaster::new(world.geometry(), Traversal::Stack).cast(&[ray], Query::Closest)
     });
     assert_eq!(hits[0], hits[1]);
+}
+
+/// Writes a glTF file of one triangle, 2 wide and high, in the light of a sun of 1000 lux. Returns its path.
+fn sunlit(folder: &TempDir) -> PathBuf {
+    let corners: [f32; 9] = [-1.0, -1.0, 0.0, 1.0, -1.0, 0.0, 0.0, 1.0, 0.0];
+    fs::write(folder.path().join("t.bin"), bytemuck::cast_slice(&corners)).unwrap();
+    let gltf = r#"{"asset": {"version": "2.0"}, "extensionsUsed": ["KHR_lights_punctual"],
+        "extensions": {"KHR_lights_punctual": {"lights": [{"type": "directional", "intensity": 1000}]}},
+        "scene": 0, "scenes": [{"nodes": [0, 1]}],
+        "nodes": [{"mesh": 0}, {"extensions": {"KHR_lights_punctual": {"light": 0}}}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+            "min": [-1, -1, 0], "max": [1, 1, 0]}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"uri": "t.bin", "byteLength": 36}]}"#;
+    let path = folder.path().join("t.gltf");
+    fs::write(&path, gltf).unwrap();
+    path
+}
+
+/// A program that loads a file of physical light gets the picture that the command draws, and no white one.
+#[test]
+fn physical_light_is_metered() {
+    let (folder, engine) = (TempDir::new().unwrap(), Engine::on_cpu());
+    let path = sunlit(&folder);
+    let middle = |exposure| {
+        let choices = PictureChoices { size: Some((32, 32)), exposure, ..PictureChoices::default() };
+        let loaded = engine.load(&path, &LoadRequest::pictures(choices)).unwrap();
+        let picture = engine.render(&loaded.world, &loaded.options).unwrap().picture;
+        (loaded, picture.display[16 * 32 + 16])
+    };
+    let (Loaded { options, notes, .. }, [r, g, b, _]) = middle(None);
+    assert!(options.exposure < 0.01, "{}", options.exposure);
+    assert_eq!(notes, [format!("exposure {0}, measured in the first view; --exposure {0} pins it", options.exposure)]);
+    assert!([r, g, b].iter().all(|channel| (60..200).contains(channel)), "{r} {g} {b}");
+    let (Loaded { options, notes, .. }, white) = middle(Some(1.0));
+    assert_eq!((options.exposure, notes.len(), white), (1.0, 0, [255; 4]));
+}
+
+/// Triangles alone get a camera that sees them, and lights.
+#[test]
+fn a_mesh_of_a_program_is_shown() {
+    let corners = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
+    let tetrahedron = Mesh::of_triangles(corners, vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]);
+    let engine = Engine::on_cpu();
+    let choices = PictureChoices { size: Some((32, 32)), ..PictureChoices::default() };
+    let loaded = engine.load(tetrahedron.clone(), &LoadRequest::pictures(choices)).unwrap();
+    let picture = engine.render(&loaded.world, &loaded.options).unwrap().picture;
+    let [middle, corner] = [16 * 32 + 16, 0].map(|ix| picture.display[ix]);
+    assert!(middle != corner && middle[..3] != [0; 3], "{middle:?} before {corner:?}");
+    let odd = [
+        (Mesh { faces: vec![[0, 1, 4]; 4], ..tetrahedron.clone() }, "mesh: it has a face with vertex 4 of 4"),
+        (Mesh { slots: Vec::new(), ..tetrahedron }, "mesh: it has 4 faces, 4 normals, 0 slots"),
+        (Mesh::default(), "mesh: has no triangles"),
+    ];
+    for (mesh, expected) in odd {
+        assert_eq!(engine.load(mesh, &LoadRequest::default()).unwrap_err().to_string(), expected);
+    }
 }

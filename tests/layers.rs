@@ -133,3 +133,33 @@ fn unsafe_code_is_in_the_vulkan_layer() {
     let found: Vec<_> = sources(Path::new("src")).into_iter().filter(allows).collect();
     assert!(!found.is_empty() && found.iter().all(|path| path.starts_with("src/gpu")), "{found:?}");
 }
+
+/// What loading consists of, and the only files that may call it: `scene` itself aside. Packs are made of scene files as
+/// they are.
+const ONE_WAY_IN: &[(&str, &[&str])] = &[
+    ("Scene::load", &["engine/load.rs", "pack/mod.rs"]),
+    ("choose_accel(", &["engine/load.rs", "engine/choices/mod.rs"]),
+    ("metered_exposure(", &["engine/load.rs", "cpu/meter.rs"]),
+    ("require_for_build(", &["engine/load.rs", "engine/memory.rs"]),
+];
+
+/// Returns how often the code contains `call`, but not as the end of a longer name.
+fn n_calls(code: &str, call: &str) -> usize {
+    let is_whole = |at: usize| !code[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_');
+    code.match_indices(call).filter(|(at, _)| is_whole(*at)).count()
+}
+
+#[test]
+fn there_is_one_way_into_the_library() {
+    let sources = sources(Path::new("src"));
+    let codes = sources.iter().map(|path| (path.strip_prefix("src").unwrap(), fs::read_to_string(path).unwrap()));
+    let codes: Vec<_> = codes.map(|(path, text)| (path.to_str().unwrap(), code_of(&text))).collect();
+    for (call, allowed) in ONE_WAY_IN {
+        let is_caller = |(file, code): &&(&str, String)| !file.starts_with("scene/") && n_calls(code, call) > 0;
+        let callers: BTreeSet<_> = codes.iter().filter(is_caller).map(|(file, _)| *file).collect();
+        assert_eq!(callers, allowed.iter().copied().collect(), "{call}");
+        let (_, load) = codes.iter().find(|(file, _)| *file == "engine/load.rs").unwrap();
+        assert_eq!(n_calls(load, call), 1, "{call}");
+    }
+    assert_eq!(n_calls("let a = Scene::load(b)?; let c = LoadedScene::load(d)?;", "Scene::load"), 1);
+}

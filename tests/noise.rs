@@ -5,10 +5,9 @@ mod support;
 use std::fs;
 
 use kdray::{
-    engine::{Engine, NoiseGoal, NoisePicture, choices::Workload},
+    engine::{Engine, LoadRequest, NoiseGoal, NoisePicture},
     frame::{Crop, Denoise, Drawn, Goal, Integrator, Picture, RenderOptions, Watcher},
     gpu::DeviceOverrides,
-    scene::Scene,
     world::World,
 };
 use support::{
@@ -34,10 +33,8 @@ fn options() -> RenderOptions {
     }
 }
 
-fn world(options: &RenderOptions) -> World {
-    let scene = Scene::load(cornell().as_ref()).unwrap();
-    let workload = Workload::of_pictures(options, scene.lights.len(), 1);
-    Engine::on_cpu().build(scene, &workload).unwrap().world
+fn world() -> World {
+    Engine::on_cpu().load(cornell().as_str(), &LoadRequest::default()).unwrap().world
 }
 
 /// Returns the picture of a fixed number of samples.
@@ -70,7 +67,7 @@ fn samples_of_tiles(drawn: &Drawn, options: &RenderOptions) -> Vec<u32> {
 #[test]
 fn tiles_have_the_bits_of_pictures_of_fixed_numbers_of_samples() {
     let options = options();
-    let world = world(&options);
+    let world = world();
     let goal = NoiseGoal { noise: 0.03, most_samples: 256 };
     let devices = [device(), device()];
     let engines = [Engine::on_cpu(), Engine::on_device(devices[0].clone()), Engine::on_devices(devices.to_vec())];
@@ -115,7 +112,7 @@ fn the_progress_of_a_picture_in_bands_adds_up_to_one_sample() {
         }
     }
     let options = RenderOptions { width: 64, height: 96, max_depth: 2, ..options() };
-    let world = world(&options);
+    let world = world();
     let device = pretended(DeviceOverrides { storage_range: Some(64 * 128 * 50), ..DeviceOverrides::default() });
     let mut renderer = Engine::on_device(device).renderer(&world, &options).unwrap();
     let (mut told, goal) = (Told::default(), NoiseGoal { noise: 1e-9, most_samples: 128 });
@@ -140,7 +137,7 @@ fn the_progress_of_a_picture_in_bands_adds_up_to_one_sample() {
 #[test]
 fn without_an_end_the_picture_has_the_most_samples() {
     let options = RenderOptions { light_layers: true, width: 20, height: 12, ..options() };
-    let world = world(&options);
+    let world = world();
     for engine in [Engine::on_cpu(), Engine::on_device(device())] {
         let drawn = until(&engine, &world, &options, NoiseGoal { noise: 1e-9, most_samples: 64 });
         let (picture, of_picture) = fixed(&engine, &world, &options, 64);
@@ -154,7 +151,7 @@ fn without_an_end_the_picture_has_the_most_samples() {
 #[test]
 fn crops_have_the_bits_of_the_whole_picture() {
     let options = options();
-    let world = world(&options);
+    let world = world();
     let engine = Engine::on_device(device());
     let goal = NoiseGoal { noise: 0.03, most_samples: 128 };
     let whole = until(&engine, &world, &options, goal).picture;
@@ -171,7 +168,7 @@ fn crops_have_the_bits_of_the_whole_picture() {
 #[test]
 fn other_pictures_follow() {
     let options = options();
-    let world = world(&options);
+    let world = world();
     let camera = world.scene().camera;
     let devices = [device(), device()];
     for engine in [Engine::on_cpu(), Engine::on_device(device()), Engine::on_devices(devices.to_vec())] {
@@ -189,7 +186,7 @@ fn other_pictures_follow() {
 #[test]
 fn the_error_is_what_the_goal_says() {
     let options = RenderOptions { width: 48, height: 32, ..options() };
-    let world = world(&options);
+    let world = world();
     let engine = Engine::on_device(device());
     let (reference, _) = fixed(&engine, &world, &options, 2048);
     let shown = |value: f32| match f64::from(value) {

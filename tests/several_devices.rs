@@ -15,10 +15,10 @@ use std::{
 
 use glam::Vec3;
 use kdray::{
-    engine::{Engine, FilmRenderer, NoiseGoal, Renderer, choices::Workload},
+    engine::{Engine, FilmRenderer, LoadRequest, NoiseGoal, Renderer},
     frame::{Denoise, Drawn, Goal, Integrator, Picture, RenderOptions, Watcher},
     gpu::{Context, DeviceOverrides, GpuError},
-    scene::{Camera, Scene},
+    scene::Camera,
     world::World,
 };
 use support::{
@@ -28,10 +28,8 @@ use support::{
 };
 use tempfile::TempDir;
 
-fn world(options: &RenderOptions) -> World {
-    let scene = Scene::load(cornell().as_ref()).unwrap();
-    let workload = Workload::of_pictures(options, scene.lights.len(), 1);
-    Engine::on_cpu().build(scene, &workload).unwrap().world
+fn world() -> World {
+    Engine::on_cpu().load(cornell().as_str(), &LoadRequest::default()).unwrap().world
 }
 
 /// Draws two pictures one after the other, the second by speeds that the first has shown.
@@ -80,7 +78,7 @@ fn pictures_have_the_bits_of_one_device() {
         (RenderOptions { crop: Some("0,1,48,2".parse().unwrap()), ..RenderOptions::default() }, 1),
     ] {
         let options = RenderOptions { width: 48, height: 36, profile: true, ..options };
-        let world = world(&options);
+        let world = world();
         let contexts = [device(), device(), device()];
         let [one, _] = draw(contexts[..1].to_vec(), &world, &options, n_samples);
         for several in [&contexts[..2], &contexts] {
@@ -106,7 +104,7 @@ fn pictures_have_the_bits_of_one_device() {
 fn other_samples_make_another_picture() {
     let options = RenderOptions { integrator: Integrator::Path, denoise: Denoise::Off, ..RenderOptions::default() };
     let options = RenderOptions { width: 24, height: 18, max_depth: 2, ..options };
-    let world = world(&options);
+    let world = world();
     let mut renderer = Engine::on_devices(vec![device(), device()]).renderer(&world, &options).unwrap();
     let camera = world.scene().camera;
     let range = |word: &str| word.parse().unwrap();
@@ -123,7 +121,7 @@ fn a_device_that_fails_leaves_its_work_to_the_others() {
     for (integrator, n_samples) in [(Integrator::Path, 64), (Integrator::Whitted, 1)] {
         let options = RenderOptions { integrator, denoise: Denoise::Off, max_depth: 2, ..RenderOptions::default() };
         let options = RenderOptions { width: 32, height: 24, ..options };
-        let world = world(&options);
+        let world = world();
         let [(one, _), _] = draw(vec![device()], &world, &options, n_samples);
         let contexts = [device(), device()];
         let mut renderer = Engine::on_devices(contexts.to_vec()).renderer(&world, &options).unwrap();
@@ -143,7 +141,7 @@ fn a_device_that_fails_leaves_its_work_to_the_others() {
 fn numbers_of_samples_may_alternate() {
     let options = RenderOptions { integrator: Integrator::Path, denoise: Denoise::Off, ..RenderOptions::default() };
     let options = RenderOptions { width: 24, height: 18, max_depth: 2, ..options };
-    let world = world(&options);
+    let world = world();
     let camera = world.scene().camera;
     let mut alone = Engine::on_device(device()).renderer(&world, &options).unwrap();
     let mut several = Engine::on_devices(vec![device(), device(), device()]).renderer(&world, &options).unwrap();
@@ -166,7 +164,7 @@ fn numbers_of_samples_may_alternate() {
 fn bands_are_drawn_again() {
     let options = RenderOptions { integrator: Integrator::Path, denoise: Denoise::Off, ..RenderOptions::default() };
     let options = RenderOptions { width: 64, height: 96, max_depth: 2, ..options };
-    let world = world(&options);
+    let world = world();
     let [(one, _), _] = draw(vec![device()], &world, &options, 32);
     let small = || pretended(DeviceOverrides { storage_range: Some(64 * 128 * 50), ..DeviceOverrides::default() });
     for (picture, _) in draw(vec![small(), small()], &world, &options, 32) {
@@ -178,7 +176,7 @@ fn bands_are_drawn_again() {
 #[test]
 fn bands_of_a_tile_count_once() {
     let options = RenderOptions { width: 64, height: 384, ..RenderOptions::default() };
-    let world = world(&options);
+    let world = world();
     let small = || pretended(DeviceOverrides { storage_range: Some(1 << 16), ..DeviceOverrides::default() });
     let alone = Engine::on_device(small()).renderer(&world, &options).unwrap();
     assert!(alone.n_bands() > 4, "{}", alone.n_bands());
@@ -191,7 +189,7 @@ fn bands_of_a_tile_count_once() {
 fn a_device_may_fail_at_any_time() {
     let options = RenderOptions { integrator: Integrator::Path, denoise: Denoise::Off, ..RenderOptions::default() };
     let options = RenderOptions { width: 32, height: 16, max_depth: 1, ..options };
-    let world = world(&options);
+    let world = world();
     let contexts = [device(), device()];
     // Samples of the first picture are shared, and rows of the second.
     for (n_samples, steps) in [(48, [2, 4]), (8, [4, 6])] {
@@ -272,7 +270,7 @@ fn draw_film<E: From<GpuError> + Send>(
 #[test]
 fn a_film_outlives_a_device() {
     let options = RenderOptions { width: 32, height: 24, ..RenderOptions::default() };
-    let world = world(&options);
+    let world = world();
     let cameras = cameras(&world, 4);
     let mut alone = Engine::on_device(device()).renderer(&world, &options).unwrap();
     let expected: Vec<_> = (cameras.iter())
@@ -316,7 +314,7 @@ fn a_film_outlives_a_device() {
 fn frames_that_end_at_a_noise_count_once() {
     let options = RenderOptions { integrator: Integrator::Path, denoise: Denoise::Off, ..RenderOptions::default() };
     let options = RenderOptions { width: 64, height: 96, max_depth: 1, ..options };
-    let world = world(&options);
+    let world = world();
     let small = || pretended(DeviceOverrides { storage_range: Some(64 * 128 * 50), ..DeviceOverrides::default() });
     let mut film = Engine::on_devices(vec![small(), small()]).film_renderer(&world, &options).unwrap();
     let (mut samples, goal) = (Samples::default(), NoiseGoal { noise: 0.1, most_samples: 32 });
@@ -334,7 +332,7 @@ fn frames_that_end_at_a_noise_count_once() {
 #[test]
 fn an_error_of_writing_ends_a_film() {
     let options = RenderOptions { width: 8, height: 6, ..RenderOptions::default() };
-    let world = world(&options);
+    let world = world();
     let cameras = cameras(&world, 16);
     let mut film = Engine::on_devices(vec![device(), device()]).film_renderer(&world, &options).unwrap();
     let (n_written, is_refused) = (AtomicU32::new(0), AtomicBool::new(false));

@@ -11,9 +11,9 @@ use std::{
 
 use glam::Vec3;
 use kdray::{
-    accel::Query,
+    accel::{Query, kdtree::BuildOptions},
     cast::{GpuCaster, Hit, Ray, RecordedCast},
-    engine::{self, Built, Engine, choices::Workload},
+    engine::{self, Engine},
     frame::{Goal, Integrator, Picture, RenderOptions},
     gpu::{Access, Buffer, BufferUse, CommandBuffer, Commands, Device},
     render,
@@ -32,10 +32,8 @@ fn options(integrator: Integrator) -> RenderOptions {
     RenderOptions { width: 16, height: 12, max_depth: 2, integrator, ..RenderOptions::default() }
 }
 
-fn world(engine: &Engine) -> World {
-    let workload = Workload::of_pictures(&options(Integrator::Whitted), 2, 1);
-    let Built { world, .. } = engine.build_flat(scenes::mixed(), &workload).expect("a world");
-    world
+fn world() -> World {
+    World::of_flat(scenes::mixed(), &BuildOptions::default()).expect("a world")
 }
 
 /// Rays from the camera in slightly different directions.
@@ -69,7 +67,7 @@ fn at_once<T: Send>(body: impl Fn(usize) -> T + Sync) -> Vec<T> {
 fn clones_of_an_engine_render_and_cast_at_once() {
     let context = device();
     let engine = Engine::on_device(&context);
-    let world = world(&engine);
+    let world = world();
     let integrators = [Integrator::Whitted, Integrator::Path];
     let alone = integrators.map(|integrator| work(&engine, &world, integrator));
     let clones: Vec<_> = (0..N_THREADS).map(|_| engine.clone()).collect();
@@ -85,7 +83,7 @@ fn clones_of_an_engine_render_and_cast_at_once() {
 fn renderers_of_an_engine_draw_at_once() {
     let context = device();
     let engine = Engine::on_device(&context);
-    let world = world(&engine);
+    let world = world();
     let draw = |renderer: &mut engine::Renderer| {
         renderer.draw(&world.scene().camera, Goal::Samples(2), || ()).expect("samples");
         renderer.picture().expect("a picture").into_owned()
@@ -108,7 +106,7 @@ fn renderers_of_an_engine_draw_at_once() {
 fn an_engine_may_have_the_same_device_twice() {
     let context = device();
     let engine = Engine::on_device(&context);
-    let (world, options) = (world(&engine), options(Integrator::Path));
+    let (world, options) = (world(), options(Integrator::Path));
     let draw = |engine: &Engine| {
         let mut renderer = engine.renderer(&world, &options).expect("a renderer");
         renderer.draw(&world.scene().camera, Goal::Samples(64), || ()).expect("samples");
@@ -149,7 +147,7 @@ fn submissions_of_threads_overlap() {
 fn a_panic_of_one_thread_leaves_the_others_their_device() {
     let context = device();
     let engine = Engine::on_device(&context);
-    let world = world(&engine);
+    let world = world();
     let work = || work(&engine, &world, Integrator::Whitted);
     let alone = work();
     let drawn = at_once(|thread_ix| {

@@ -12,10 +12,9 @@ use std::{env, error::Error, path::PathBuf};
 
 use ash::vk;
 use kdray::{
-    engine::{Built, Engine, choices::Workload},
-    frame::{Goal, RenderOptions},
+    engine::{Engine, LoadRequest, Loaded, Opened, Work},
+    frame::Goal,
     gpu::{Device, ExternalImage, TimelinePoint},
-    scene::Scene,
 };
 use program::Program;
 use target::Target;
@@ -31,18 +30,18 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (Some(scene), Some(picture)) = (arguments.next(), arguments.next()) else {
         return Err("usage: own_device SCENE PICTURE".into());
     };
-    let scene = Scene::load(&scene)?;
-    let options = scene.defaults.options();
+    let opened = Opened::read(&scene, &LoadRequest::default())?;
+    let (width, height) = (opened.options.width, opened.options.height);
     // SAFETY: the program destroys what it has made after kdray's objects are gone and the device is idle.
     unsafe {
         let program = Program::new()?;
-        let target = Target::new(&program, options.width, options.height)?;
+        let target = Target::new(&program, width, height)?;
         program.submit(&target.clear, None, Some(CLEARED))?;
-        render(&program, &target, scene, &options)?;
+        render(&program, &target, opened, (width, height))?;
         program.submit(&target.read_back, Some(WRITTEN), Some(READ))?;
         program.wait_for(READ)?;
         let pixels = target.pixels(&program)?;
-        image::save_buffer(&picture, &pixels, options.width, options.height, image::ColorType::Rgba8)?;
+        image::save_buffer(&picture, &pixels, width, height, image::ColorType::Rgba8)?;
         target.destroy(&program);
         program.destroy();
     }
@@ -51,25 +50,19 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// Draws the scene with kdray, and writes the picture into the target.
-unsafe fn render(
-    program: &Program,
-    target: &Target,
-    scene: Scene,
-    options: &RenderOptions,
-) -> Result<(), Box<dyn Error>> {
+unsafe fn render(program: &Program, target: &Target, opened: Opened, size: (u32, u32)) -> Result<(), Box<dyn Error>> {
     // SAFETY: the handles are the program's, which lives longer than the device handle; it has one thread.
     let (device, image, [cleared, written]) = unsafe {
         let layouts = [vk::ImageLayout::TRANSFER_DST_OPTIMAL, vk::ImageLayout::TRANSFER_SRC_OPTIMAL];
         (
             Device::external(program.external())?,
-            ExternalImage::new(target.image, (options.width, options.height), layouts),
+            ExternalImage::new(target.image, size, layouts),
             [CLEARED, WRITTEN].map(|value| TimelinePoint::new(program.timeline, value)),
         )
     };
-    let workload = Workload::of_pictures(options, scene.lights.len(), 1);
     let engine = Engine::on_device(device);
-    let Built { world, .. } = engine.build(scene, &workload)?;
-    let options = engine.methods(&world, &workload)?.apply(options);
+    let (Loaded { world, options, .. }, methods) = engine.build(opened, &Work::picture())?;
+    let options = methods.apply(&options);
     let mut renderer = engine.renderer(&world, &options)?;
     renderer.draw(&world.scene().camera, Goal::Samples(1), || ())?;
     renderer.copy_picture_to(&image, Some(cleared), Some(written))?;

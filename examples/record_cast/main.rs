@@ -15,9 +15,8 @@ use glam::Vec3;
 use kdray::{
     accel::{Query, kdtree::Traversal},
     cast::{GpuCaster, Hit, NO_TRIANGLE, Ray},
-    engine::{Built, Engine, choices::Workload},
+    engine::{Engine, LoadRequest, Loaded, Opened, Work},
     gpu::{Device, ExternalBuffer, ExternalCommands},
-    scene::Scene,
 };
 use program::Program;
 
@@ -25,15 +24,15 @@ const N_RAYS: usize = 100_000;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let path = env::args_os().nth(1).map(PathBuf::from).ok_or("usage: record_cast SCENE")?;
-    let scene = Scene::load(&path)?;
-    let (least, greatest) = scene.bounds();
+    let opened = Opened::read(&path, &LoadRequest::rays(N_RAYS as u64))?;
+    let (least, greatest) = opened.scene.bounds();
     let rays = rays((least + greatest) / 2.0);
     // SAFETY: the program destroys what it has made after kdray's objects are gone and the device is idle.
     unsafe {
         let program = Program::new()?;
         let buffers = Buffers::new(&program)?;
         buffers.write(&rays);
-        cast(&program, &buffers, scene)?;
+        cast(&program, &buffers, opened)?;
         let n_hits = buffers.hits().iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count();
         println!("{n_hits} of {N_RAYS} rays hit something");
         buffers.destroy(&program);
@@ -57,14 +56,14 @@ fn rays(origin: Vec3) -> Vec<Ray> {
 const WRITTEN: u64 = 1;
 
 /// Casts the rays in a command buffer of the program.
-unsafe fn cast(program: &Program, buffers: &Buffers, scene: Scene) -> Result<(), Box<dyn Error>> {
+unsafe fn cast(program: &Program, buffers: &Buffers, opened: Opened) -> Result<(), Box<dyn Error>> {
     // SAFETY: the handles are the program's, which lives longer than the device handle; it has one thread.
     let (device, [rays, hits]) = unsafe {
         let external = |ix: usize| ExternalBuffer::new(buffers.raw[ix], 0, SIZES[ix]);
         (Device::external(program.external())?, [0, 1].map(external))
     };
     let engine = Engine::on_device(&device);
-    let Built { world, .. } = engine.build(scene, &Workload::of_rays(N_RAYS as u64))?;
+    let (Loaded { world, .. }, _) = engine.build(opened, &Work::Rays(N_RAYS as u64))?;
     let mut caster = GpuCaster::new(&device, world.geometry(), Traversal::Mask)?;
     let cast = caster.recorded(rays, hits, Query::Closest)?;
     let record = |commands: vk::CommandBuffer| {

@@ -389,11 +389,9 @@ impl RenderArgs {
         Ok((range != SampleRange::whole(n_samples)).then_some(range))
     }
 
-    /// Returns the render options: the user's, and the scene's own where the user gave none. Refuses a crop beyond
-    /// the picture.
-    pub fn options(&self, scene: &Scene) -> Result<RenderOptions, CliError> {
-        let options = self.picture.options(&scene.defaults);
-        let RenderOptions { width, height, .. } = options;
+    /// Sets the options of the command that are not those of every picture. Refuses a crop beyond the picture.
+    pub fn set_options(&self, options: &mut RenderOptions) -> Result<(), CliError> {
+        let &mut RenderOptions { width, height, .. } = options;
         let crop = match self.tile {
             Some(tile) => Some(tile.crop(width, height)?),
             None => self.crop,
@@ -417,7 +415,8 @@ impl RenderArgs {
         let profile = !self.quiet || self.profile.is_some() || self.trace.is_some();
         let pixel_aovs = self.aov.iter().any(|aov| !aov.is_of_light());
         let light_layers = self.aov.iter().any(|aov| aov.is_of_light());
-        Ok(RenderOptions { crop, pixel_aovs, light_layers, profile, ..options })
+        *options = RenderOptions { crop, pixel_aovs, light_layers, profile, ..options.clone() };
+        Ok(())
     }
 }
 

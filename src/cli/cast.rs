@@ -2,18 +2,14 @@
 
 use kdray::{
     cast::{CastResult, Hit, HitWriter, NO_TRIANGLE, RAYS_PER_BATCH, RayReader},
-    engine::{
-        Built, Caster, Engine,
-        choices::{Choices, Workload},
-    },
-    gpu::{ContextOptions, GpuError},
+    engine::{Caster, Engine, Loaded, Opened, Work, choices::Choices},
+    gpu::ContextOptions,
     layout::Triangle,
     output,
 };
 
 use super::{
     args::CastArgs,
-    build,
     cast_report::{CastReport, Times},
     device_args::open_device,
     error::CliError,
@@ -34,19 +30,18 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
 
     let rays = RayReader::open(&args.rays)?;
     let progress = Progress::new(args.quiet, 3);
-    let (scene, load_ms) = progress.stage(&format!("loading {}", args.mesh.display()), || args.load.load(&args.mesh));
-    let scene = scene?;
+    let loading = format!("loading {}", args.mesh.display());
+    let (opened, load_ms) = progress.stage(&loading, || Opened::read(&args.mesh, &args.load.rays()));
+    let opened = opened?;
     let options = ContextOptions::new(args.device.clone(), args.validate);
     let device = if args.cpu { None } else { Some(open_device(&options, &progress)?) };
 
     let engine = device.clone().map_or_else(Engine::on_cpu, Engine::on_device).with_request(args.request());
-    let (n_triangles, workload) = (scene.n_triangles(), Workload::of_rays(rays.n_rays()));
-    let accel = engine.choose_accel(n_triangles, &workload);
-    build::check_memory(accel, n_triangles)?;
-    let (built, build_ms) = progress.stage(&build::building(accel, n_triangles), || engine.build(scene, &workload));
-    let Built { world, accel } = built.map_err(GpuError::from)?;
+    let n_triangles = opened.scene.n_triangles();
+    let building = engine.builder().describe(n_triangles);
+    let (built, _) = progress.stage(&building, || engine.build(opened, &Work::Rays(rays.n_rays())));
+    let (Loaded { world, accel, build_ms, .. }, methods) = built?;
     let casting = format!("casting {} rays", rays.n_rays());
-    let methods = engine.methods(&world, &workload)?;
     let traversal = methods.traversal.value;
     let caster = engine.caster(world.geometry(), traversal)?;
     let (done, cast_ms) = progress.stage(&casting, || cast_all(args, rays, caster, &world.scene().triangles));

@@ -5,8 +5,8 @@ use std::io;
 #[cfg(feature = "view")]
 use kdray::view::ViewError;
 use kdray::{
-    cast::RayFileError, gpu::GpuError, merge::MergeError, output::OutputError, pack::PackError, scene::SceneError,
-    util::memory::OutOfMemory,
+    cast::RayFileError, engine::LoadError, gpu::GpuError, merge::MergeError, output::OutputError, pack::PackError,
+    scene::SceneError, util::memory::OutOfMemory,
 };
 
 /// The reason why a command failed. It displays as one line.
@@ -68,6 +68,17 @@ impl CliError {
         match self {
             Self::Device(error) if error.is_out_of_memory() => Self::DeviceMemory(error),
             other => other,
+        }
+    }
+}
+
+impl From<LoadError> for CliError {
+    fn from(error: LoadError) -> Self {
+        match error {
+            LoadError::Scene(error) => Self::Scene(error),
+            LoadError::Mismatch(error) => Self::Device(error.into()),
+            LoadError::Memory(error) => Self::Memory(error),
+            LoadError::Device(error) => Self::Device(error),
         }
     }
 }

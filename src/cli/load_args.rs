@@ -1,8 +1,6 @@
 //! Arguments that say what is loaded of a scene's file. All commands that load a scene share them.
 
-use std::path::Path;
-
-use kdray::scene::{LoadOptions, Scene, SceneError};
+use kdray::{engine::LoadRequest, scene::LoadOptions, util::progress::Progress};
 
 use super::{look_args::LookArgs, picture_args::PictureArgs};
 
@@ -22,15 +20,20 @@ pub struct LoadArgs {
 }
 
 impl LoadArgs {
-    /// Loads a scene for rays of the user's, which count from the origin of its file.
-    pub fn load(&self, path: &Path) -> Result<Scene, SceneError> {
-        Scene::load_with(path, &self.options())
+    /// Returns the request for a scene for rays of the user's, which count from the origin of its file.
+    pub fn rays(&self) -> LoadRequest {
+        LoadRequest { scene: self.options(), ..LoadRequest::rays(0) }
     }
 
-    /// Returns the options of loading a scene whose picture has the user's size and look.
-    pub fn options_for(&self, picture: &PictureArgs, look: &LookArgs) -> LoadOptions {
-        let aspect = picture.size.map(|size| size.width as f32 / size.height as f32);
-        LoadOptions { aspect, look: look.look(), ..self.options_of_pictures() }
+    /// Returns the request for a scene whose picture has the user's options and look. `progress` shows the reading.
+    pub fn pictures(&self, picture: &PictureArgs, look: &LookArgs, progress: Progress) -> LoadRequest {
+        let scene = LoadOptions { look: look.look(), progress, ..self.options_of_pictures() };
+        LoadRequest { scene, ..LoadRequest::pictures(picture.choices()) }
+    }
+
+    /// Returns the request for a scene as it is.
+    pub fn scene(&self, progress: Progress) -> LoadRequest {
+        LoadRequest { scene: LoadOptions { progress, ..self.options_of_pictures() }, ..LoadRequest::rays(0) }
     }
 
     /// Returns the options of loading a scene for pictures.

@@ -1,9 +1,7 @@
 //! Arguments that replace the camera, the lights and the background of a scene.
 
-use std::path::Path;
-
 use glam::{DVec3, Vec3};
-use kdray::scene::{LightChoice, Look, MaterialChoice, Preset, Scene, Sky, SkyChoice, Up};
+use kdray::scene::{LightChoice, Look, MaterialChoice, Preset, Sky, SkyChoice, Up};
 
 use super::{
     or_auto::OrAuto,
@@ -51,13 +49,6 @@ impl LookArgs {
         let &Self { up, eye, target, fov, light, sky, background, ref materials } = self;
         let materials = materials.clone();
         Look { up: up.pinned(), eye, target, vertical_fov_degrees: fov, light, sky, background, materials }
-    }
-
-    /// Returns a note that says which axis of an STL file points up, if the user has not stated it.
-    pub fn note_up(&self, path: &Path, scene: &Scene) -> Option<String> {
-        let is_stl = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("stl"));
-        let is_assumed = is_stl && self.up == OrAuto::Auto && scene.camera.up == Up::Z.vector();
-        is_assumed.then(|| "+z points up, as in most STL files; --up y turns the picture".to_owned())
     }
 }
 

@@ -6,7 +6,6 @@
 mod args;
 #[cfg(feature = "bench")]
 mod bench;
-mod build;
 mod cast;
 mod cast_report;
 mod convert;

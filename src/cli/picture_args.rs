@@ -3,11 +3,9 @@
 use clap::{ValueEnum, value_parser};
 use kdray::{
     accel::{AccelKind, kdtree::Traversal},
-    cpu::metered_exposure,
     engine::choices::{BuildPolicy, Request},
-    frame::{Denoise, Integrator, PathOptions, PixelFilter, Primary, RenderOptions, Tonemap},
-    scene::RenderDefaults,
-    world::World,
+    frame::{Integrator, PathOptions, PixelFilter, Primary, RenderOptions, Tonemap},
+    scene::{DenoiseChoice, PictureChoices},
 };
 
 use super::{args::Size, error::CliError, or_auto::OrAuto};
@@ -208,17 +206,17 @@ impl PictureArgs {
         }
     }
 
-    /// Returns the render options: the user's, and the scene's own where the user gave none. Traversal and primary
-    /// visibility depend on the device and keep their defaults; [`Self::request`] returns the user's choice of them.
-    pub fn options(&self, scene: &RenderDefaults) -> RenderOptions {
-        let Size { width, height } = self.size.unwrap_or(Size { width: scene.width, height: scene.height });
-        let scene = scene.for_integrator(self.integrator);
+    /// Returns what the user sets in place of the scene's options. Traversal and primary visibility depend on the device;
+    /// [`Self::request`] returns the user's choice of them.
+    pub fn choices(&self) -> PictureChoices {
         let paths = PathOptions::default();
-        RenderOptions {
-            width,
-            height,
-            crop: None,
-            integrator: scene.integrator,
+        PictureChoices {
+            size: self.size.map(|Size { width, height }| (width, height)),
+            integrator: self.integrator,
+            max_depth: self.max_depth,
+            exposure: self.exposure,
+            tonemap: self.tonemap,
+            denoise: self.denoise(),
             paths: PathOptions {
                 first_sample: 0,
                 filter: self.pixel_filter.unwrap_or(paths.filter),
@@ -226,40 +224,21 @@ impl PictureArgs {
                 aperture: self.aperture.unwrap_or(paths.aperture),
                 focus: self.focus.or(paths.focus),
             },
-            max_depth: self.max_depth.unwrap_or(scene.max_depth),
-            exposure: self.exposure.unwrap_or(scene.exposure),
-            tonemap: self.tonemap.unwrap_or(scene.tonemap),
-            denoise: self.denoise(scene.denoise),
-            ..RenderOptions::default()
         }
     }
 
-    /// Sets the exposure of a scene whose light has physical units, unless the user has set it. Returns a note that
-    /// says what it is.
-    pub fn meter(&self, world: &World, options: &mut RenderOptions) -> Option<String> {
-        if self.exposure.is_some() || !world.scene().defaults.is_metered {
-            return None;
-        }
-        options.exposure = metered_exposure(world);
-        Some(format!("exposure {0}, measured in the first view; --exposure {0} pins it", options.exposure))
-    }
-
-    /// Returns the user's noise filter, or the scene's. `--denoise-threshold` alone turns the filter on.
-    fn denoise(&self, scene: Denoise) -> Denoise {
-        let threshold = match scene {
-            Denoise::Paper { threshold } => threshold,
-            Denoise::Off | Denoise::Edge => Denoise::DEFAULT_THRESHOLD,
-        };
+    /// Returns the user's noise filter. `--denoise-threshold` alone turns the paper's filter on.
+    fn denoise(&self) -> Option<DenoiseChoice> {
         match (self.denoise, self.denoise_threshold) {
-            (None, None) => scene,
-            (Some(DenoiseWord::Off), _) => Denoise::Off,
-            (Some(DenoiseWord::Edge), _) => Denoise::Edge,
-            (_, asked) => Denoise::Paper { threshold: asked.unwrap_or(threshold) },
+            (None, None) => None,
+            (Some(DenoiseWord::Off), _) => Some(DenoiseChoice::Off),
+            (Some(DenoiseWord::Edge), _) => Some(DenoiseChoice::Edge),
+            (_, threshold) => Some(DenoiseChoice::Paper(threshold)),
         }
     }
 }
 
-/// Value of `--denoise`; [`Denoise`] without the threshold.
+/// Value of `--denoise`; [`DenoiseChoice`] without the threshold.
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
 pub enum DenoiseWord {
     /// Smooths pixels that differ from their four neighbours (the paper's filter)
@@ -285,6 +264,7 @@ pub fn positive(word: &str) -> Result<f32, String> {
 #[cfg(test)]
 mod tests {
     use clap::Parser;
+    use kdray::{frame::Denoise, scene::RenderDefaults};
 
     use super::*;
     use crate::cli::args::{Args, Command};
@@ -292,7 +272,9 @@ mod tests {
     fn denoise(words: &[&str], scene: Denoise) -> Denoise {
         let words = ["kdray", "render", "x.toml"].iter().chain(words);
         match Args::try_parse_from(words).unwrap().command {
-            Command::Render(args) => args.picture.denoise(scene),
+            Command::Render(args) => {
+                RenderDefaults { denoise: scene, ..RenderDefaults::default() }.with(&args.picture.choices()).denoise
+            }
             _ => unreachable!(),
         }
     }

@@ -3,21 +3,19 @@
 use std::{path::Path, sync::Arc};
 
 use kdray::{
-    engine::choices::{Processor, Workload},
-    frame::{RenderOptions, View},
+    engine::{self, Builder, Opened, choices::Processor},
+    frame::View,
     gpu::{ContextOptions, chosen_device},
     output::{self, Format, OutputError},
-    scene::{self, CameraPath, RenderDefaults, Scene},
+    scene::{CameraPath, LoadOptions, Look, Scene},
     util::{self, progress::Work},
-    view::{Display, LoadOptions, LoadedScene, Opened, Opener, Settings, Tour, ViewOptions, ViewReport},
+    view::{Display, LoadSettings, LoadedScene, Opener, Settings, Tour, ViewOptions, ViewReport},
 };
 use serde::Serialize;
 
 use super::{
-    build,
     error::CliError,
     file_roles::FileRoles,
-    picture_args::PictureArgs,
     print, print_line,
     progress::Progress,
     render::set_threads,
@@ -38,17 +36,14 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
     let display = Display::open()?;
 
     let progress = Progress::new(args.quiet, 2);
-    let Start { loaded, options, tour } = match &args.scene {
-        Some(path) => load(args, path, &progress)?,
-        None => without_scene(args)?,
-    };
+    let Start { loaded, tour } = load(args, &progress)?;
     drop(progress);
 
-    let processor = loaded.load_options.processor;
+    let processor = loaded.load_settings.builder.processor;
     let max_samples = n_samples(args, tour.is_some());
     let vsync = args.vsync == Switch::On;
     let settings = Settings {
-        options,
+        options: loaded.built.options.clone(),
         in_motion: args.in_motion,
         max_samples,
         budget_ms: args.budget_ms,
@@ -87,82 +82,55 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
 /// Returns the function that loads the files which the user opens in the window. The options of pictures on the
 /// command line apply to them, too.
 fn opener(args: &ViewArgs, processor: Processor) -> Opener {
-    let picture = args.picture.clone();
-    let first = args.load.options_for(&picture, &args.look);
+    let mut settings = load_settings(args, processor, Default::default());
     // The camera and the scene on the command line are those of the first file.
-    let look = scene::Look { eye: None, target: None, ..first.look };
-    let load_options = scene::LoadOptions { scene: None, camera: None, look, ..first };
+    let first = settings.request.scene;
+    let look = Look { eye: None, target: None, ..first.look };
+    settings.request.scene = LoadOptions { scene: None, camera: None, look, ..first };
     Arc::new(move |path, progress| {
-        open(path, (&load_options, progress), &picture, processor).map_err(|error| error.to_string())
+        let mut settings = settings.clone();
+        settings.request.scene.progress = progress.clone();
+        settings.builder.progress = progress;
+        LoadedScene::load(path, &settings).map_err(|error| error.to_string())
     })
 }
 
-fn open(
-    path: &Path,
-    (scene_options, progress): (&scene::LoadOptions, util::progress::Progress),
-    picture: &PictureArgs,
-    processor: Processor,
-) -> Result<Opened, CliError> {
-    let observed = scene::LoadOptions { progress: progress.clone(), ..scene_options.clone() };
-    let scene = Scene::load_with(path, &observed)?;
-    let mut options = picture.options(&scene.defaults);
-    scene.warn_of_missing_light(path, options.integrator);
-    let (request, workload) = (picture.request(), Workload::of_window((options.width, options.height)));
-    let accel = request.choose_accel(processor, scene.n_triangles(), &workload);
-    build::check_memory(accel, scene.n_triangles())?;
-    let load_options = LoadOptions { request, processor, workload, scene: scene_options.clone() };
-    let loaded = LoadedScene::with_tree(path, scene, &load_options, &progress);
-    picture.meter(&loaded.world, &mut options);
-    Ok(Opened { loaded, options })
+/// Returns how files are loaded. `progress` shows the reading.
+fn load_settings(args: &ViewArgs, processor: Processor, progress: util::progress::Progress) -> LoadSettings {
+    let mut request = args.load.pictures(&args.picture, &args.look, progress);
+    request.work = engine::Work::Window { n_samples: None };
+    LoadSettings { request, builder: Builder::new(processor, args.picture.request()) }
 }
 
 /// What the window shows first.
 struct Start {
     loaded: LoadedScene,
-    options: RenderOptions,
     tour: Option<Tour>,
 }
 
-/// Loads the scene and builds its structure.
-fn load(args: &ViewArgs, path: &Path, progress: &Progress) -> Result<Start, CliError> {
-    let scene_options = args.load.options_for(&args.picture, &args.look);
+/// Loads the scene and builds its structure, or returns the start of a window that waits for a file.
+fn load(args: &ViewArgs, progress: &Progress) -> Result<Start, CliError> {
+    let processor = Processor::of_device(&chosen_device(args.device.as_ref())?);
+    let Some(path) = &args.scene else {
+        let settings = load_settings(args, processor, Default::default());
+        return Ok(Start { loaded: LoadedScene::none(&settings)?, tour: None });
+    };
     let loading = format!("loading {}", path.display());
-    let observed = scene::LoadOptions {
-        progress: progress.observer(&loading, &[Work::Reading, Work::Images]),
-        ..scene_options.clone()
-    };
-    let (scene, _) = progress.stage(&loading, || Scene::load_with(path, &observed));
-    let scene = scene?;
-    scene.warn_of_missing_light(path, args.picture.options(&scene.defaults).integrator);
-    args.look.note_up(path, &scene).into_iter().for_each(|note| progress.note(&note));
-    let mut options = args.picture.options(&scene.defaults);
-    let tour = tour(args, &scene)?;
-    let workload = match &tour {
-        Some(tour) => {
-            let n_pictures = u64::from(tour.n_frames()) * u64::from(n_samples(args, true));
-            Workload::of_pictures(&options, scene.lights.len(), n_pictures)
-        }
-        None => Workload::of_window((options.width, options.height)),
-    };
-    let processor = Processor::of_device(&chosen_device(args.device.as_ref())?);
-    let load_options = LoadOptions { request: args.picture.request(), processor, workload, scene: scene_options };
-    let accel = load_options.request.choose_accel(processor, scene.n_triangles(), &workload);
-    build::check_memory(accel, scene.n_triangles())?;
-    let building = build::building(accel, scene.n_triangles());
-    let observer = progress.observer(&building, &[Work::Building]);
-    let (loaded, _) = progress.stage(&building, || LoadedScene::with_tree(path, scene, &load_options, &observer));
-    args.picture.meter(&loaded.world, &mut options).into_iter().for_each(|note| progress.note(&note));
-    Ok(Start { loaded, options, tour })
-}
-
-/// Returns the start of a window that waits for a file.
-fn without_scene(args: &ViewArgs) -> Result<Start, CliError> {
-    let scene = args.load.options_for(&args.picture, &args.look);
-    let options = args.picture.options(&RenderDefaults::default());
-    let processor = Processor::of_device(&chosen_device(args.device.as_ref())?);
-    let (request, workload) = (args.picture.request(), Workload::of_window((options.width, options.height)));
-    let loaded = LoadedScene::none(&LoadOptions { request, processor, workload, scene });
-    Ok(Start { loaded, options, tour: None })
+    let observer = progress.observer(&loading, &[Work::Reading, Work::Images]);
+    let mut settings = load_settings(args, processor, observer);
+    let (opened, _) = progress.stage(&loading, || Opened::read(path, &settings.request));
+    let opened = opened?;
+    let tour = tour(args, &opened.scene)?;
+    if let Some(tour) = &tour {
+        let n_samples = u64::from(tour.n_frames()) * u64::from(n_samples(args, true));
+        settings.request.work = engine::Work::Window { n_samples: Some(n_samples) };
+    }
+    let building = settings.builder.describe(opened.scene.n_triangles());
+    settings.builder.progress = progress.observer(&building, &[Work::Building]);
+    let (loaded, _) = progress.stage(&building, || LoadedScene::build(Some(path), opened, &settings));
+    let loaded = loaded?;
+    loaded.built.notes.iter().for_each(|note| progress.note(note));
+    Ok(Start { loaded, tour })
 }
 
 /// Returns the number of samples per pixel while the camera rests.

@@ -2,22 +2,25 @@
 //! kd-tree, the traversal and the primary visibility where the user leaves them open.
 //!
 //! ```text
-//! Scene ─> Engine::build ─> World ─> Engine::render ─> Picture
-//!                             └────> Engine::cast ───> hits
+//! file, scene, mesh ─> Engine::load ─> World ─> Engine::render ─> Picture
+//!                                       └─────> Engine::cast ───> hits
 //! ```
 
 mod caster;
 pub mod choices;
 mod group;
+mod load;
+mod memory;
 mod noise;
 mod renderer;
 
 use std::sync::Arc;
 
-use self::choices::{Cache, ChosenAccel, Methods, Processor, Request, Workload};
+use self::choices::{Cache, Methods, Processor, Request, Workload};
 pub use self::{
     caster::Caster,
     group::FilmRenderer,
+    load::{Builder, LoadError, LoadRequest, Loaded, Opened, Source, Work},
     noise::{NoiseGoal, NoisePicture},
     renderer::{Rendered, Renderer},
 };
@@ -26,9 +29,8 @@ use crate::{
     cast::{Hit, Ray},
     frame::{Goal, RenderOptions},
     gpu::{Context, ContextOptions, Device, GpuError},
-    scene::Scene,
     util::progress::Progress,
-    world::{FlatScene, Geometry, Mismatch, World},
+    world::{Geometry, World},
 };
 
 /// A Vulkan device or the CPU, with the choices that the user has pinned and a cache of measurements. A clone is a
@@ -42,15 +44,6 @@ pub struct Engine {
     request: Request,
     cache: Cache,
     progress: Progress,
-}
-
-/// A world, and the acceleration structure that was chosen for it.
-#[derive(Clone, Debug)]
-pub struct Built {
-    /// The scene with its acceleration structure.
-    pub world: World,
-    /// The structure, and for a kd-tree why it was chosen.
-    pub accel: ChosenAccel,
 }
 
 impl Engine {
@@ -126,34 +119,6 @@ impl Engine {
             Some(device) => device.info().name.clone(),
             None => format!("CPU, {} threads", rayon::current_num_threads()),
         }
-    }
-
-    /// Returns the requested kind of acceleration structure for `n_triangles` triangles. For a kd-tree whose
-    /// [`BuildPolicy`](choices::BuildPolicy) is `Auto`, chooses the tree with which building and the workload are
-    /// estimated to take the least time together.
-    pub fn choose_accel(&self, n_triangles: usize, workload: &Workload) -> ChosenAccel {
-        self.request.choose_accel(self.processor(), n_triangles, workload)
-    }
-
-    /// Builds the acceleration structure that [`Engine::choose_accel`] returns, on the current rayon pool.
-    ///
-    /// # Errors
-    /// The scene does not fit together: see [`Mismatch`].
-    pub fn build(&self, scene: Scene, workload: &Workload) -> Result<Built, Mismatch> {
-        let flat = FlatScene::new(&scene)?;
-        // The memory of the scene is freed for the build of the structure.
-        drop(scene);
-        self.build_flat(flat, workload)
-    }
-
-    /// Does what [`Engine::build`] does, with a scene that is already flattened.
-    ///
-    /// # Errors
-    /// The scene's parts do not fit together: see [`Mismatch`].
-    pub fn build_flat(&self, scene: FlatScene, workload: &Workload) -> Result<Built, Mismatch> {
-        let accel = self.choose_accel(scene.triangles.len(), workload);
-        let world = World::with_accel_observed(scene, &accel.options(self.processor()), &self.progress)?;
-        Ok(Built { world, accel })
     }
 
     /// Chooses the traversal and the primary visibility. On a GPU, if the workload is large enough to pay for a short

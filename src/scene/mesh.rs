@@ -35,6 +35,29 @@ pub struct Mesh {
 }
 
 impl Mesh {
+    /// A mesh of points and triangles, shaded with the normals of their planes.
+    pub fn of_triangles(positions: Vec<Vec3>, faces: Vec<[u32; 3]>) -> Self {
+        let (normals, slots) = (vec![[Vec3::ZERO; 3]; faces.len()], vec![0; faces.len()]);
+        Self { positions, faces, normals, slots, ..Self::default() }
+    }
+
+    /// Checks that the arrays belong together, and that the indices of positions are in range. The error follows a
+    /// subject: `has ...`.
+    pub(crate) fn check(&self) -> Checked<()> {
+        let Self { positions, faces, normals, slots, uvs, colours, tangents, name: _ } = self;
+        if (normals.len(), slots.len()) != (faces.len(), faces.len()) {
+            return Err(format!("has {} faces, {} normals, {} slots", faces.len(), normals.len(), slots.len()));
+        }
+        let lens = [uvs[0].len(), uvs[1].len(), colours.len(), tangents.len()];
+        if let Some(len) = lens.into_iter().find(|&len| len != 0 && len != faces.len()) {
+            return Err(format!("has {} faces, and corners of {len}", faces.len()));
+        }
+        match faces.as_flattened().par_iter().find_first(|ix| **ix as usize >= positions.len()) {
+            Some(ix) => Err(format!("has a face with vertex {ix} of {}", positions.len())),
+            None => Ok(()),
+        }
+    }
+
     /// Adds a face that is shaded with its plane's normal.
     pub fn push_flat(&mut self, face: [u32; 3], slot: u32) {
         self.faces.push(face);

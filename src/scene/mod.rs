@@ -64,7 +64,7 @@ use rayon::prelude::*;
 pub use self::{
     camera::{Camera, Projection},
     convert::scene_file_of,
-    defaults::{PathDefaults, RenderDefaults},
+    defaults::{DenoiseChoice, PathDefaults, PictureChoices, RenderDefaults},
     environment::{Environment, MendedTexels},
     error::SceneError,
     extent::MIN_EXTENT,
@@ -213,6 +213,39 @@ impl Scene {
         Ok(scene)
     }
 
+    /// Makes a scene of a mesh, which gets a default material for each slot, a camera and lights, as the mesh of a file
+    /// does.
+    ///
+    /// # Errors
+    /// The mesh's arrays do not fit together; it has no triangles, is too small to be traced, or reaches too far.
+    pub fn of_mesh(mesh: Mesh, options: &LoadOptions) -> Result<Scene, SceneError> {
+        let name = if mesh.name.is_empty() { "mesh".to_owned() } else { mesh.name.clone() };
+        let path = Path::new(&name);
+        mesh.check().map_err(|what| SceneError::file(path, format!("it {what}")))?;
+        if mesh.faces.is_empty() {
+            return Err(SceneError::file(path, "has no triangles"));
+        }
+        let lacks = Lacks::all(options.look.up.unwrap_or_default());
+        let (mut scene, lacks) = Self::of_bare_mesh(path, Scene::empty(path), (mesh, Vec::new()), lacks)?;
+        preset::replace(&mut scene, &options.look.materials).map_err(|what| SceneError::file(path, what))?;
+        standard::fill_in(path, &mut scene, lacks, options).map_err(|what| SceneError::file(path, what))?;
+        Ok(scene)
+    }
+
+    /// Places a mesh with its own materials in an empty scene, which lacks everything else.
+    fn of_bare_mesh(
+        path: &Path,
+        mut scene: Scene,
+        (mesh, materials): (Mesh, Vec<Material>),
+        lacks: Lacks,
+    ) -> Result<(Scene, Lacks), SceneError> {
+        let slots = scene.push_materials(materials);
+        scene.push_mesh(mesh, Transform::IDENTITY, slots).map_err(|what| SceneError::file(path, what))?;
+        extent::check(path, scene.bounds())?;
+        scene.defaults.samples = standard::SAMPLES;
+        Ok((scene, lacks))
+    }
+
     /// Loads a scene from a file that is no pack.
     fn load_file(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
         let (mut scene, lacks) = if is_scene_file(path) {
@@ -354,21 +387,8 @@ fn load_mesh_file(path: &Path, options: &LoadOptions) -> Result<(Scene, Lacks), 
     if let (Some(why), None) = (&guess.why, options.look.up) {
         tracing::info!("{}: {why}", path.display());
     }
-    let slots = scene.push_materials(materials);
     scene.images = images.finish();
-    scene.push_mesh(mesh, Transform::IDENTITY, slots).map_err(|what| SceneError::file(path, what))?;
-    extent::check(path, scene.bounds())?;
-    scene.defaults.samples = standard::SAMPLES;
-    let lacks = Lacks {
-        camera: true,
-        up: guess.up,
-        description: true,
-        light: true,
-        background: true,
-        integrator: true,
-        exposure: true,
-    };
-    Ok((scene, lacks))
+    Scene::of_bare_mesh(path, scene, (mesh, materials), Lacks::all(guess.up))
 }
 
 /// Refuses the choice of a scene for a file that has only one.

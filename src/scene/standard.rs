@@ -33,6 +33,13 @@ pub(super) struct Lacks {
     pub exposure: bool,
 }
 
+impl Lacks {
+    /// What a bare mesh lacks: everything.
+    pub fn all(up: Up) -> Self {
+        Self { camera: true, up, description: true, light: true, background: true, integrator: true, exposure: true }
+    }
+}
+
 /// The lights that are chosen for a scene whose file has none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ChosenLight {

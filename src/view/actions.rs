@@ -115,7 +115,7 @@ impl Session {
         let (width, height) = displayed.size;
         let pixel = pixel_at(at, window, displayed.size);
         let options = RenderOptions { width, height, ..options.clone() };
-        self.picked = Some(pick(&self.loaded.world, &options, &displayed.camera, pixel));
+        self.picked = Some(pick(&self.loaded.built.world, &options, &displayed.camera, pixel));
     }
 
     /// Reads the AOVs of the pixel at a point of the window, if the view shows AOVs. While a sample is drawn in
@@ -172,9 +172,12 @@ mod tests {
 
     use super::*;
     use crate::{
-        engine::choices::{Processor, Request, Workload},
+        engine::{
+            Builder, LoadRequest,
+            choices::{Processor, Request},
+        },
         frame::View,
-        view::{InMotion, LoadOptions, LoadedScene, Settings, saver::Saver},
+        view::{InMotion, LoadSettings, LoadedScene, Settings, saver::Saver},
     };
 
     #[test]
@@ -207,14 +210,10 @@ mod tests {
             view: View::Picture,
             gain: 1.0,
         };
-        let load_options = LoadOptions {
-            scene: crate::scene::LoadOptions::default(),
-            request: Request::default(),
-            processor: Processor::SoftwareDriver,
-            workload: Workload::of_window((640, 480)),
-        };
+        let builder = Builder::new(Processor::SoftwareDriver, Request::default());
+        let settings_of_load = LoadSettings { request: LoadRequest::default(), builder };
         let mut session = Session::new(
-            LoadedScene::load(&path, &load_options).unwrap(),
+            LoadedScene::load(&path, &settings_of_load).unwrap(),
             settings.clone(),
             true,
             (|_| (), Saver::new(|| ())),

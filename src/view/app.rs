@@ -19,8 +19,8 @@ use super::{
     error::ViewError,
     gpu_session::GpuSession,
     input::{Action, Input},
+    loaded_scene::LoadedScene,
     message::Topic,
-    opened::Opened,
     panel::{Layers, Settings},
     reload::{Reloader, Wake},
     script::Script,
@@ -89,7 +89,8 @@ impl App {
         let window = event_loop.create_window(attributes).map_err(|error| ViewError::Window(error.to_string()))?;
         let window = Arc::new(window);
         let (device, loaded) = (&self.options.device, &self.session.loaded);
-        let gpu = GpuSession::open(window.clone(), device, loaded, options, loaded.load_options.request, *vsync)?;
+        let gpu =
+            GpuSession::open(window.clone(), device, loaded, options, loaded.load_settings.builder.request, *vsync)?;
         self.choices = Some(gpu.choices.clone());
         self.session.settings.options = gpu.renderer.options().clone();
         Ok(Shown { gpu, ui: Ui::new(&window), window })
@@ -121,7 +122,7 @@ impl App {
     }
 
     /// Shows the file that was opened, or the error.
-    fn opened(&mut self, opened: Result<Opened, String>) {
+    fn opened(&mut self, opened: Result<LoadedScene, String>) {
         if let Some(Shown { gpu, window, .. }) = &mut self.shown {
             if self.session.open_scene(gpu, opened) {
                 self.reloader.follow(&self.session.loaded);
@@ -209,7 +210,7 @@ impl App {
         let Settings { options, vsync, .. } = &self.session.settings;
         let loaded = &self.session.loaded;
         let (traversal, primary) = (Some(options.traversal), Some(options.primary));
-        let request = Request { traversal, primary, ..loaded.load_options.request };
+        let request = Request { traversal, primary, ..loaded.load_settings.builder.request };
         match GpuSession::open(window.clone(), &self.options.device, loaded, options, request, *vsync) {
             Ok(gpu) => {
                 self.is_reopened = true;

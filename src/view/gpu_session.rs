@@ -53,9 +53,9 @@ impl GpuSession {
         let options = methods.apply(options);
         let presenter = Presenter::new(&context, surface, vsync)?;
         let overlay = Overlay::new(&context, &presenter)?;
-        let renderer = GpuRenderer::new(context.clone(), &loaded.world, &options)?;
+        let renderer = GpuRenderer::new(context.clone(), &loaded.built.world, &options)?;
         let present = Present::new(&context, renderer.resources(), &presenter)?;
-        let choices = Choices::of_pictures(loaded.accel, methods);
+        let choices = Choices::of_pictures(loaded.built.accel, methods);
         let (other, shows_other) = (None, false);
         Ok(Self { renderer, choices, present, other, shows_other, overlay, presenter, context })
     }
@@ -117,7 +117,7 @@ impl GpuSession {
     /// The scene exceeds the device's limits or memory.
     pub fn set_scene(&mut self, loaded: &LoadedScene) -> Result<(), GpuError> {
         let camera = *self.renderer.camera();
-        let mut renderer = GpuRenderer::new(self.context.clone(), &loaded.world, self.renderer.options())?;
+        let mut renderer = GpuRenderer::new(self.context.clone(), &loaded.built.world, self.renderer.options())?;
         renderer.set_camera(&camera);
         self.install(renderer)
     }
@@ -128,11 +128,11 @@ impl GpuSession {
     ///
     /// # Errors
     /// The scene exceeds the device's limits or memory.
-    pub fn open_scene(&mut self, loaded: &LoadedScene, options: &RenderOptions) -> Result<RenderOptions, GpuError> {
+    pub fn open_scene(&mut self, loaded: &LoadedScene) -> Result<RenderOptions, GpuError> {
         let RenderOptions { width, height, .. } = *self.renderer.options();
-        let methods = methods_for(&self.context, loaded, loaded.load_options.request, (width, height))?;
-        let options = methods.apply(&RenderOptions { width, height, ..options.clone() });
-        self.install(GpuRenderer::new(self.context.clone(), &loaded.world, &options)?)?;
+        let methods = methods_for(&self.context, loaded, loaded.load_settings.builder.request, (width, height))?;
+        let options = methods.apply(&RenderOptions { width, height, ..loaded.built.options.clone() });
+        self.install(GpuRenderer::new(self.context.clone(), &loaded.built.world, &options)?)?;
         Ok(options)
     }
 
@@ -191,8 +191,8 @@ fn methods_for(
     request: Request,
     window: (u32, u32),
 ) -> Result<Methods, GpuError> {
-    let workload = Workload { size: (window.0 / 4, window.1 / 4), ..loaded.load_options.workload };
-    request.methods(Some(context), &loaded.world, &workload, &Cache::open())
+    let workload = Workload { size: (window.0 / 4, window.1 / 4), ..loaded.built.workload };
+    request.methods(Some(context), &loaded.built.world, &workload, &Cache::open())
 }
 
 impl Drop for GpuSession {

@@ -33,8 +33,8 @@ pub use self::{
     display::{Display, PaceReport, ViewOptions, ViewReport},
     error::ViewError,
     in_motion::InMotion,
-    loaded_scene::{LoadOptions, LoadedScene},
-    opened::{Opened, Opener},
+    loaded_scene::{LoadSettings, LoadedScene},
+    opened::Opener,
     panel::Settings,
     tour::Tour,
 };

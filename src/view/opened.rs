@@ -10,22 +10,11 @@ use super::{
     message::{Message, Topic},
     session::Session,
 };
-use crate::{
-    frame::{Profile, RenderOptions},
-    util::progress::Progress,
-};
-
-/// A file that was opened.
-pub struct Opened {
-    /// The scene with its acceleration structure.
-    pub loaded: LoadedScene,
-    /// The options that the scene is rendered with. Their size is not used, since pictures have the window's size.
-    pub options: RenderOptions,
-}
+use crate::{frame::Profile, util::progress::Progress};
 
 /// Loads a file that the user opens in the window, and reports the progress. It runs on a thread of its own. The error
 /// is a message for people.
-pub type Opener = Arc<dyn Fn(&Path, Progress) -> Result<Opened, String> + Send + Sync>;
+pub type Opener = Arc<dyn Fn(&Path, Progress) -> Result<LoadedScene, String> + Send + Sync>;
 
 impl Session {
     /// Shows that a file is being opened.
@@ -40,11 +29,12 @@ impl Session {
 
     /// Replaces the scene by another file's and looks from that file's camera. Returns whether it succeeds. If the
     /// file could not be loaded or uploaded, shows a message and keeps the previous scene.
-    pub fn open_scene(&mut self, gpu: &mut GpuSession, opened: Result<Opened, String>) -> bool {
+    pub fn open_scene(&mut self, gpu: &mut GpuSession, opened: Result<LoadedScene, String>) -> bool {
         // A save that is due is of the scene that is seen.
         self.save_as_it_is(gpu);
-        let uploaded = opened.and_then(|Opened { loaded, options }| {
-            let options = gpu.open_scene(&loaded, &options).map_err(|error| error.to_string())?;
+        // The size of the options is not used, since pictures have the window's size.
+        let uploaded = opened.and_then(|loaded| {
+            let options = gpu.open_scene(&loaded).map_err(|error| error.to_string())?;
             Ok((loaded, options))
         });
         let (loaded, options) = match uploaded {
@@ -54,7 +44,7 @@ impl Session {
                 return false;
             }
         };
-        self.controller = Controller::new(loaded.scene().camera, loaded.bounds());
+        self.controller = Controller::new(loaded.scene().camera, loaded.built.bounds);
         self.settings.options = options;
         self.loaded = loaded;
         self.picked = None;

@@ -12,15 +12,16 @@ use winit::event_loop::EventLoopProxy;
 
 use super::{
     gpu_session::GpuSession,
-    loaded_scene::{LoadOptions, LoadedScene},
+    loaded_scene::{LoadSettings, LoadedScene},
     message::Topic,
-    opened::{Opened, Opener},
+    opened::Opener,
     session::Session,
     shaders::Shaders,
     watch::Watch,
 };
 use crate::{
-    scene::{SceneError, source_files_with},
+    engine::LoadError,
+    scene::source_files_with,
     util::progress::{Observer, Progress, Work},
 };
 
@@ -29,13 +30,13 @@ pub enum Wake {
     /// A file of the scene has changed.
     Changed,
     /// The scene was read again, or could not be read.
-    Reloaded(Box<Result<LoadedScene, SceneError>>),
+    Reloaded(Box<Result<LoadedScene, LoadError>>),
     /// A picture was written, or could not be written.
     Saved,
     /// How far the loading of a file has come that the user opens, in words.
     Progress(String),
     /// A file that the user opens was loaded, or could not be loaded.
-    Opened(Box<Result<Opened, String>>),
+    Opened(Box<Result<LoadedScene, String>>),
     /// A shader has changed.
     ShadersChanged,
     /// The shaders were compiled again, or could not be compiled.
@@ -67,7 +68,7 @@ impl OneAtATime {
 pub struct Reloader {
     /// The scene's file; none while no file is open.
     path: Option<PathBuf>,
-    load_options: LoadOptions,
+    load_settings: LoadSettings,
     /// All files that the scene has named so far.
     files: BTreeSet<PathBuf>,
     proxy: EventLoopProxy<Wake>,
@@ -88,7 +89,7 @@ impl Reloader {
     pub fn new(loaded: &LoadedScene, opener: Opener, shaders: Option<&Path>, proxy: EventLoopProxy<Wake>) -> Self {
         let mut reloader = Self {
             path: loaded.path.clone(),
-            load_options: loaded.load_options.clone(),
+            load_settings: loaded.load_settings.clone(),
             files: BTreeSet::new(),
             shaders: shaders.map(|checkout| Shaders::new(checkout, proxy.clone())),
             proxy,
@@ -107,7 +108,7 @@ impl Reloader {
     fn watch(&mut self) {
         let Some(path) = &self.path else { return };
         let n_known = self.files.len();
-        self.files.extend(source_files_with(path, &self.load_options.scene));
+        self.files.extend(source_files_with(path, &self.load_settings.request.scene));
         if self.files.len() == n_known {
             return;
         }
@@ -158,8 +159,8 @@ impl Reloader {
             }
             (None, Some(path)) => {
                 self.is_changed = false;
-                let load_options = self.load_options.clone();
-                Box::new(move || Wake::Reloaded(Box::new(LoadedScene::load(&path, &load_options))))
+                let settings = self.load_settings.clone();
+                Box::new(move || Wake::Reloaded(Box::new(LoadedScene::load(&path, &settings))))
             }
             (None, None) => {
                 self.loading.end();
@@ -178,7 +179,7 @@ impl Reloader {
     /// Follows the changes of another scene's files from now on.
     pub fn follow(&mut self, loaded: &LoadedScene) {
         self.path.clone_from(&loaded.path);
-        self.load_options.clone_from(&loaded.load_options);
+        self.load_settings.clone_from(&loaded.load_settings);
         self.files.clear();
         self.is_changed = false;
     }
@@ -224,7 +225,7 @@ impl<F: Fn(String) + Send + Sync> Observer for Reporter<F> {
 impl Session {
     /// Replaces the scene; the camera stays. If the scene could not be read or uploaded, shows a message and keeps
     /// the previous scene.
-    pub fn replace_scene(&mut self, gpu: &mut GpuSession, loaded: Result<LoadedScene, SceneError>) {
+    pub fn replace_scene(&mut self, gpu: &mut GpuSession, loaded: Result<LoadedScene, LoadError>) {
         let loaded = match loaded {
             Ok(loaded) => loaded,
             Err(error) => return self.show_error(Topic::Scene, &error.to_string()),
@@ -233,7 +234,7 @@ impl Session {
             Ok(()) => {
                 // The camera stays where it is in the file.
                 let moved = (self.loaded.scene().origin - loaded.scene().origin).as_vec3();
-                self.controller.set_scene(loaded.scene().camera, loaded.bounds(), moved);
+                self.controller.set_scene(loaded.scene().camera, loaded.built.bounds, moved);
                 self.loaded = loaded;
                 self.picked = None;
                 // The next picture is drawn small, so that it is shown at once.

@@ -91,7 +91,7 @@ impl Session {
         (print, saver): (fn(&str), Saver),
     ) -> Self {
         Self {
-            controller: Controller::new(loaded.scene().camera, loaded.bounds()),
+            controller: Controller::new(loaded.scene().camera, loaded.built.bounds),
             budgets: [(); N_BUDGETS].map(|()| Budget::new(settings.budget_ms)),
             drawing: PictureKind::of(&settings.options),
             loaded,

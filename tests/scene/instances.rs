@@ -100,7 +100,7 @@ fn what_does_not_fit_together_is_refused() {
     };
     assert_eq!(refusal(|scene| scene.instances[1].mesh_ix = 1), "instance 1 of the scene has no mesh");
     let vertex = refusal(|scene| scene.meshes[0].faces[1][2] = 4);
-    assert_eq!(vertex, "instance 0 of the scene: a face of its mesh has vertex 4 of 4");
+    assert_eq!(vertex, "instance 0 of the scene: its mesh has a face with vertex 4 of 4");
     let arrays = refusal(|scene| _ = scene.meshes[0].slots.pop());
     assert_eq!(arrays, "instance 0 of the scene: its mesh has 2 faces, 2 normals, 1 slots");
     let material = refusal(|scene| scene.instances[1].materials.clear());

@@ -12,10 +12,9 @@ use std::{
 
 use kdray::{
     cast::RayReader,
-    engine::{Engine, choices::Workload},
-    frame::RenderOptions,
+    engine::{Engine, LoadRequest, Opened, Work},
     merge::{MergeError, merge},
-    scene::{CameraPath, LoadOptions, Scene, pack_hash, packed_path, source_files},
+    scene::{CameraPath, PictureChoices, pack_hash, packed_path, source_files},
 };
 use packs::PackFile;
 use tempfile::TempDir;
@@ -179,17 +178,15 @@ pub fn check_error(line: &str, files: &[&Path]) {
 fn read_scene(path: &Path) -> Result<(), String> {
     // The viewer watches these files.
     let _ = source_files(path);
-    let options = LoadOptions { recentre: true, ..LoadOptions::default() };
-    let scene = Scene::load_with(path, &options).map_err(|error| error.to_string())?;
-    let n_pixels: usize = scene.images.iter().map(|image| image.pixels.len()).sum();
-    if scene.n_triangles() > MAX_RENDERED_TRIANGLES || n_pixels > MAX_RENDERED_PIXELS {
+    let choices = PictureChoices { size: Some((6, 5)), max_depth: Some(3), ..PictureChoices::default() };
+    let opened = Opened::read(path, &LoadRequest::pictures(choices)).map_err(|error| error.to_string())?;
+    let n_pixels: usize = opened.scene.images.iter().map(|image| image.pixels.len()).sum();
+    if opened.scene.n_triangles() > MAX_RENDERED_TRIANGLES || n_pixels > MAX_RENDERED_PIXELS {
         return Ok(());
     }
-    let options = RenderOptions { width: 6, height: 5, max_depth: 3, ..scene.defaults.options() };
-    let workload = Workload::of_pictures(&options, scene.lights.len(), 1);
     let engine = Engine::on_cpu();
-    let world = engine.build(scene, &workload).expect("a loaded scene has a tree").world;
-    engine.render(&world, &options).expect("a loaded scene is rendered");
+    let (loaded, _) = engine.build(opened, &Work::picture()).expect("a loaded scene has a tree");
+    engine.render(&loaded.world, &loaded.options).expect("a loaded scene is rendered");
     Ok(())
 }
 

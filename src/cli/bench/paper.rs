@@ -7,10 +7,13 @@ use kdray::{
         Spread,
         paper::{Report, Reported, Row, SCENES, SIZES, draw_on_cpu, draw_on_gpu, options},
     },
-    engine::choices::{Processor, TreeKind, traversal_by_rule},
+    engine::{
+        Builder, LoadError, LoadRequest, Opened, Work,
+        choices::{BuildPolicy, Processor, Request, traversal_by_rule},
+    },
     frame::RenderOptions,
-    gpu::{ContextOptions, Device, GpuError},
-    scene::{LoadOptions, Scene},
+    gpu::{ContextOptions, Device},
+    scene::LoadOptions,
     world::World,
 };
 
@@ -61,8 +64,9 @@ pub fn run(args: &PaperArgs) -> Result<(), CliError> {
 }
 
 fn load(path: &Path, processor: Processor) -> Result<World, CliError> {
-    let scene = Scene::load(path)?;
-    Ok(World::new(&scene, &TreeKind::Best.options(processor)).map_err(GpuError::from)?)
+    let choices = Request { build: BuildPolicy::Best, ..Request::default() };
+    let opened = Opened::read(path, &LoadRequest::rays(0)).map_err(LoadError::from)?;
+    Ok(Builder::new(processor, choices).build(opened, &Work::Rays(0))?.world)
 }
 
 fn measure(device: &Device, world: &World, options: &RenderOptions, report: &Report) -> Result<Row, CliError> {

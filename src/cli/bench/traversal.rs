@@ -8,7 +8,7 @@ use kdray::{
         traversal::{Report, SetResult, Tracers, VariantResult},
         variant::Variant,
     },
-    engine::choices::TreeKind,
+    engine::{Opened, choices::TreeKind},
     gpu::{ContextOptions, Device, GpuError},
     world::FlatScene,
 };
@@ -27,8 +27,9 @@ use crate::cli::{
 pub fn run(args: &TraversalArgs) -> Result<(), CliError> {
     args.files.check(&[&args.mesh], &args.load.options())?;
     let progress = Progress::new(false, 7);
-    let (scene, _) = progress.stage(&format!("loading {}", args.mesh.display()), || args.load.load(&args.mesh));
-    let scene = FlatScene::new(&scene?).map_err(GpuError::from)?;
+    let loading = format!("loading {}", args.mesh.display());
+    let (opened, _) = progress.stage(&loading, || Opened::read(&args.mesh, &args.load.rays()));
+    let scene = FlatScene::new(&opened?.scene).map_err(GpuError::from)?;
     let variants = variants(&args.variants);
     let options = ContextOptions::new(args.device.clone(), false);
     let device = if args.cpu { None } else { Some(open_device(&options, &progress)?) };

@@ -4,10 +4,10 @@
 use std::time::Instant;
 
 use kdray::{
-    engine::{Built, Engine, choices::Workload},
-    frame::{Denoise, Goal, Integrator, Picture, RenderOptions},
+    engine::{Engine, LoadRequest, Loaded},
+    frame::{Goal, Integrator, Picture, RenderOptions},
     gpu::GpuError,
-    scene::Scene,
+    scene::{DenoiseChoice, PictureChoices, Scene},
     world::World,
 };
 use serde::Serialize;
@@ -53,17 +53,17 @@ pub struct Passed {
 impl Sample {
     /// Draws the sample picture on the CPU.
     pub fn on_cpu() -> Self {
-        let options = RenderOptions {
-            width: 64,
-            height: 48,
-            integrator: Integrator::Path,
-            max_depth: 4,
-            denoise: Denoise::Off,
-            ..RenderOptions::default()
-        };
         let scene = Scene::of_text("cornell.toml", SCENE).expect("the scene of the program");
-        let workload = Workload::of_pictures(&options, scene.lights.len(), N_SAMPLES.into());
-        let Built { world, .. } = Engine::on_cpu().build(scene, &workload).expect("the scene of the program");
+        let choices = PictureChoices {
+            size: Some((64, 48)),
+            integrator: Some(Integrator::Path),
+            max_depth: Some(4),
+            exposure: Some(1.0),
+            denoise: Some(DenoiseChoice::Off),
+            ..PictureChoices::default()
+        };
+        let request = LoadRequest::pictures(choices);
+        let Loaded { world, options, .. } = Engine::on_cpu().load(scene, &request).expect("the scene of the program");
         let begin = Instant::now();
         let expected = draw(&Engine::on_cpu(), &world, &options);
         Self { expected, options, cpu_ms: begin.elapsed().as_secs_f64() * 1e3, world }

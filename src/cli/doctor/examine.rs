@@ -8,13 +8,11 @@ use kdray::{
     engine::{Engine, choices::Workload},
     frame::{Crop, Goal, Integrator, RenderOptions},
     gpu::{Device, GpuError},
-    scene::Scene,
     world::World,
 };
 use serde::Serialize;
 
 use super::findings::Problem;
-use crate::cli::render::check_memory;
 
 /// Width and height of the part of the picture that is drawn, pixels.
 const CROP: u32 = 32;
@@ -23,9 +21,9 @@ const MOST_SAMPLES: u32 = 4;
 
 /// The picture that a scene file asks for, with its own size, integrator and number of samples.
 pub struct ScenePicture {
-    options: RenderOptions,
-    n_samples: u32,
-    workload: Workload,
+    pub options: RenderOptions,
+    pub n_samples: u32,
+    pub workload: Workload,
 }
 
 /// What was found of the scene's picture on a processor.
@@ -39,24 +37,9 @@ pub struct Examined {
 }
 
 impl ScenePicture {
-    pub fn new(scene: &Scene) -> Self {
-        let options = scene.defaults.options();
-        let n_samples = scene.defaults.for_integrator(None).samples;
-        let workload = Workload::of_pictures(&options, scene.lights.len(), 1);
-        Self { options, n_samples, workload }
-    }
-
-    pub fn options(&self) -> &RenderOptions {
-        &self.options
-    }
-
-    pub fn workload(&self) -> &Workload {
-        &self.workload
-    }
-
     /// Checks that a whole picture fits into the memory, and draws a part of it.
     pub fn examine(&self, engine: &Engine, world: &World) -> Result<Examined, Problem> {
-        check_memory(&self.options, self.n_samples, engine.device().is_none(), 1)
+        (engine.builder().require_for_pictures(&self.options, self.n_samples, 1))
             .map_err(|error| Problem::of_memory(&error.to_string()))?;
         let methods = engine.methods(world, &self.workload).map_err(|error| Problem::of_device(&error))?;
         let options = methods.apply(&self.options);

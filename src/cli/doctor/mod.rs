@@ -17,11 +17,10 @@ mod host;
 use std::path::Path;
 
 use kdray::{
-    engine::{Built, Engine},
+    engine::{self, Engine, Loaded, Opened},
     gpu::{self, ContextOptions, Device, DeviceInfo, DeviceSelector, GpuError},
-    scene::{LoadOptions, Scene, pack_hash},
+    scene::pack_hash,
     util::progress::Work,
-    world::World,
 };
 
 use self::{
@@ -30,14 +29,7 @@ use self::{
     findings::{Findings, Problem, ProcessorFindings, SceneFindings, Verdict},
     host::Host,
 };
-use super::{
-    args::DoctorArgs,
-    build::{building, check_memory},
-    error::CliError,
-    load_args::LoadArgs,
-    print, print_raw,
-    progress::Progress,
-};
+use super::{args::DoctorArgs, error::CliError, load_args::LoadArgs, print, print_raw, progress::Progress};
 
 /// Examines the machine and, if the user names one, a scene. Prints what was found even if that is an error.
 pub fn run(args: &DoctorArgs) -> Result<(), CliError> {
@@ -114,18 +106,26 @@ fn examine_scene(
     processors: &mut [Processor],
     progress: &Progress,
 ) -> Result<SceneFindings, CliError> {
-    let (scene, load_ms) = load(path, load_args, progress)?;
+    let loading = format!("loading {}", path.display());
+    let observer = progress.observer(&loading, &[Work::Reading, Work::Images]);
+    let (opened, _) = progress.stage(&loading, || Opened::read(path, &load_args.scene(observer)));
+    let opened = opened?;
     let pack_hash = pack_hash(path)?;
-    let picture = ScenePicture::new(&scene);
     // The first processor that has passed its check may build the structure.
     let engine = processors.iter().find(|it| it.findings.is_ok()).and_then(|it| it.engine.clone());
-    let engine = engine.unwrap_or_else(Engine::on_cpu);
-    let (world, build_ms) = build(scene, &engine, &picture, progress)?;
+    let builder = engine.unwrap_or_else(Engine::on_cpu).builder();
+    let n_samples = opened.scene.defaults.for_integrator(None).samples;
+    let building = builder.describe(opened.scene.n_triangles());
+    // Whether the picture fits into the memory is a question of each processor.
+    let work = engine::Work::Window { n_samples: Some(1) };
+    let (loaded, _) = progress.stage(&building, || builder.build(opened, &work));
+    let Loaded { world, options, workload, load_ms, build_ms, .. } = loaded?;
+    let picture = ScenePicture { options, n_samples, workload };
     for processor in processors.iter_mut().filter(|it| it.findings.is_ok()) {
         let engine = processor.engine.as_ref().expect("a processor that has passed its check has an engine");
         processor.findings.examine(picture.examine(engine, &world));
     }
-    let (scene, options) = (world.scene(), picture.options());
+    let (scene, options) = (world.scene(), &picture.options);
     Ok(SceneFindings {
         name: scene.name.clone(),
         hash: scene.hash(),
@@ -137,23 +137,4 @@ fn examine_scene(
         load_ms,
         build_ms,
     })
-}
-
-/// Loads the scene. Returns it and the time in milliseconds.
-fn load(path: &Path, args: &LoadArgs, progress: &Progress) -> Result<(Scene, f64), CliError> {
-    let loading = format!("loading {}", path.display());
-    let observer = progress.observer(&loading, &[Work::Reading, Work::Images]);
-    let options = LoadOptions { progress: observer, ..args.options_of_pictures() };
-    let (scene, load_ms) = progress.stage(&loading, || Scene::load_with(path, &options));
-    Ok((scene?, load_ms))
-}
-
-/// Builds the structure of the scene. Returns the scene with its structure, and the time in milliseconds.
-fn build(scene: Scene, engine: &Engine, picture: &ScenePicture, progress: &Progress) -> Result<(World, f64), CliError> {
-    let n_triangles = scene.n_triangles();
-    let accel = engine.choose_accel(n_triangles, picture.workload());
-    check_memory(accel, n_triangles)?;
-    let (built, build_ms) = progress.stage(&building(accel, n_triangles), || engine.build(scene, picture.workload()));
-    let Built { world, .. } = built.map_err(GpuError::from)?;
-    Ok((world, build_ms))
 }

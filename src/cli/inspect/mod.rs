@@ -8,11 +8,12 @@ use glam::DVec3;
 use kdray::{
     accel::Statistics,
     buffers::{PathQueue, Pixels},
-    engine::choices::{BuildPolicy, Processor, Request, Workload},
-    gpu::GpuError,
+    engine::{
+        Builder, LoadError, Loaded, Opened, Work,
+        choices::{BuildPolicy, Processor, Request},
+    },
     layout::{LIGHT_DIRECTIONAL, LIGHT_SPOT, Light},
-    scene::Scene,
-    world::{Emitters, FlatScene, Mismatch, World},
+    world::{Emitters, FlatScene},
 };
 use serde::Serialize;
 
@@ -21,34 +22,29 @@ use self::{
     lighting::Lighting,
     text::{cut_table, shortened},
 };
-use super::{args::InspectArgs, build, error::CliError, print, print_raw, progress::Progress, table::table};
+use super::{args::InspectArgs, error::CliError, print, print_raw, progress::Progress, table::table};
 
 /// Loads the scene, builds its structure and describes both.
 pub fn run(args: &InspectArgs) -> Result<(), CliError> {
     let progress = Progress::new(false, 2);
-    let (scene, load_ms) = progress.stage(&format!("loading {}", args.scene.display()), || {
-        Scene::load_with(&args.scene, &args.load.options_of_pictures())
-    });
-    let scene = scene?;
-    let contents = Contents::from(&scene);
-    let lighting = Lighting::from(&scene);
-    let details: Vec<_> = scene.materials.iter().map(|material| MaterialDetails::new(material, &scene)).collect();
-    let flat = FlatScene::new(&scene).map_err(GpuError::from)?;
-    // The unflattened scene is freed here, because building the structure needs the memory.
-    drop(scene);
-    let scene = flat;
-    let n_triangles = scene.triangles.len();
-    let request = Request { accel: args.accel, build: BuildPolicy::Best, ..Request::default() };
-    let accel = request.choose_accel(Processor::Gpu, n_triangles, &Workload::of_rays(0));
-    build::check_memory(accel, n_triangles)?;
-    let options = accel.options(Processor::Gpu);
+    let request = args.load.scene(Default::default());
+    let (opened, _) =
+        progress.stage(&format!("loading {}", args.scene.display()), || Opened::read(&args.scene, &request));
+    let opened = opened?;
+    let scene = &opened.scene;
+    let contents = Contents::from(scene);
+    let lighting = Lighting::from(scene);
+    let details: Vec<_> = scene.materials.iter().map(|material| MaterialDetails::new(material, scene)).collect();
+    let n_triangles = scene.n_triangles();
+    let choices = Request { accel: args.accel, build: BuildPolicy::Best, ..Request::default() };
+    let builder = Builder::new(Processor::Gpu, choices);
     let build = || {
-        let world = World::with_accel(scene, &options)?;
-        let statistics = world.statistics(); // builds the structure if it is a grid
-        Ok::<_, Mismatch>((world, statistics))
+        let loaded = builder.build(opened, &Work::Rays(0))?;
+        let statistics = loaded.world.statistics(); // builds the structure if it is a grid
+        Ok::<_, LoadError>((loaded, statistics))
     };
-    let (built, build_ms) = progress.stage(&build::building(accel, n_triangles), build);
-    let (world, statistics) = built.map_err(GpuError::from)?;
+    let (built, build_ms) = progress.stage(&builder.describe(n_triangles), build);
+    let (Loaded { world, load_ms, .. }, statistics) = built?;
     let scene = world.scene();
     drop(progress);
 

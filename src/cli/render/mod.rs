@@ -2,7 +2,6 @@
 
 mod draw;
 mod files;
-mod memory;
 mod noise;
 mod views;
 
@@ -10,19 +9,17 @@ use std::time::Instant;
 
 use kdray::{
     engine::{
-        Built, Engine,
-        choices::{Choices, ChosenAccel, Workload},
+        Engine, Loaded, Opened, Work,
+        choices::{Choices, ChosenAccel},
     },
     frame::{Goal, Profile, RenderOptions, SampleRange},
-    gpu::{Device, DeviceInfo, GpuError},
+    gpu::{Device, DeviceInfo},
     output::{self, Record, WholeRecord},
-    scene::{LoadOptions, Scene},
-    util::progress::Work,
+    util::progress,
     world::World,
 };
 use tracing::info_span;
 
-pub(super) use self::memory::check_memory;
 use self::{
     draw::{Common, DrawnPictures, draw_and_write, draws_whole_frames},
     files::{check_outputs, roles},
@@ -30,7 +27,6 @@ use self::{
 };
 use super::{
     args::RenderArgs,
-    build,
     device_args::open_devices,
     error::CliError,
     print, print_line,
@@ -60,45 +56,39 @@ pub fn run(args: RenderArgs) -> Result<(), CliError> {
     if views.is_empty() {
         return Ok(());
     }
-    let (scene, load_ms) = load(args, &progress)?;
+    let mut opened = open(args, &progress)?;
     if let Some(path) = path {
-        let path = path.relative_to(scene.origin);
+        let path = path.relative_to(opened.scene.origin);
         for view in &mut views {
             view.camera = Some(path.camera_at(view.frame)?);
         }
     }
-    let options = args.options(&scene)?;
-    let n_samples = args.samples(&scene);
-    let some_samples = args.some_samples(&scene, &options)?;
-    let noise_goal = args.noise_goal(&scene, &options)?;
+    args.set_options(&mut opened.options)?;
+    let n_samples = args.samples(&opened.scene);
+    let some_samples = args.some_samples(&opened.scene, &opened.options)?;
+    let noise_goal = args.noise_goal(&opened.scene, &opened.options)?;
     let n_drawn = some_samples.map_or(n_samples, |range| range.len());
-    check_memory(&options, n_drawn, args.cpu, 1)?;
-    let open = || open_devices(args.device.as_ref(), args.validate, &progress);
-    let devices = if args.cpu { Vec::new() } else { info_span!("create device").in_scope(open)? };
+    let devices = || open_devices(args.device.as_ref(), args.validate, &progress);
+    let devices = if args.cpu { Vec::new() } else { info_span!("create device").in_scope(devices)? };
     args.check_devices(devices.len())?;
 
     let engine = if args.cpu { Engine::on_cpu() } else { Engine::on_devices(devices.clone()) };
     let engine = engine.with_request(args.picture.request());
     let whole_frames = draws_whole_frames(&engine, &views);
-    if whole_frames {
-        check_memory(&options, n_drawn, args.cpu, devices.len() as u64)?;
-    }
-    let n_triangles = scene.n_triangles();
+    let (n_triangles, load_ms) = (opened.scene.n_triangles(), opened.load_ms);
     // A part of a picture gets the structure that the whole picture gets.
-    let n_pictures = u64::from(n_samples) * views.len() as u64;
-    let camera = scene.camera;
-    let cameras = views.iter().map(|view| view.camera.as_ref().unwrap_or(&camera));
-    let workload = Workload::of_pictures(&options, scene.lights.len(), n_pictures).with_cameras(cameras);
-    let accel = engine.choose_accel(n_triangles, &workload);
-    build::check_memory(accel, n_triangles)?;
-    let building = build::building(accel, n_triangles);
-    let engine = engine.with_progress(progress.observer(&building, &[Work::Building]));
-    let build = || info_span!("build tree").in_scope(|| engine.build(scene, &workload));
-    let (built, build_ms) = progress.stage(&building, build);
-    let Built { world, accel } = built.map_err(GpuError::from)?;
-    let methods = engine.methods(&world, &workload)?;
-    let mut options = methods.apply(&options);
-    args.picture.meter(&world, &mut options).into_iter().for_each(|note| progress.note(&note));
+    let work = Work::Pictures {
+        cameras: views.iter().filter_map(|view| view.camera).collect(),
+        n_samples,
+        n_at_once: if whole_frames { devices.len() as u32 } else { 1 },
+    };
+    let building = engine.builder().describe(n_triangles);
+    let engine = engine.with_progress(progress.observer(&building, &[progress::Work::Building]));
+    let build = || info_span!("build tree").in_scope(|| engine.build(opened, &work));
+    let (built, _) = progress.stage(&building, build);
+    let (Loaded { world, options, accel, notes, build_ms, .. }, methods) = built?;
+    notes.iter().for_each(|note| progress.note(note));
+    let (options, camera) = (methods.apply(&options), world.scene().camera);
     let mut record = record(&engine, &world, &options, accel, (n_samples, some_samples));
     record.whole.noise = args.noise;
     let crop = record.crop;
@@ -176,18 +166,13 @@ fn record(
     }
 }
 
-/// Loads the scene. Returns it and the loading time in milliseconds. Warns if the scene has no light.
-fn load(args: &RenderArgs, progress: &Progress) -> Result<(Scene, f64), CliError> {
+/// Reads the scene.
+fn open(args: &RenderArgs, progress: &Progress) -> Result<Opened, CliError> {
     let loading = format!("loading {}", args.scene.display());
-    let observer = progress.observer(&loading, &[Work::Reading, Work::Images]);
-    let options = args.load.options_for(&args.picture, &args.look);
-    let options = LoadOptions { progress: observer, ..options };
-    let (scene, load_ms) =
-        progress.stage(&loading, || info_span!("load scene").in_scope(|| Scene::load_with(&args.scene, &options)));
-    let scene = scene?;
-    scene.warn_of_missing_light(&args.scene, args.picture.options(&scene.defaults).integrator);
-    args.look.note_up(&args.scene, &scene).into_iter().for_each(|note| progress.note(&note));
-    Ok((scene, load_ms))
+    let observer = progress.observer(&loading, &[progress::Work::Reading, progress::Work::Images]);
+    let request = args.load.pictures(&args.picture, &args.look, observer);
+    let read = || info_span!("load scene").in_scope(|| Opened::read(&args.scene, &request));
+    Ok(progress.stage(&loading, read).0?)
 }
 
 /// Sets the number of threads of rayon's global pool. Without a number, rayon chooses.

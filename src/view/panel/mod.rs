@@ -163,7 +163,7 @@ fn sections(ui: &mut Ui, edited: &mut Edited, facts: &Facts) {
     }
     section(ui, "Passes", true, |ui| graph::show(ui, facts.history, facts.profile));
     section(ui, "Picture", true, |ui| {
-        controls::show(ui, &mut edited.settings, &mut edited.projection, facts.loaded.world.accel().kind());
+        controls::show(ui, &mut edited.settings, &mut edited.projection, facts.loaded.built.world.accel().kind());
     });
     section(ui, "Rays", true, |ui| tables::rays(ui, facts.profile));
     section(ui, "Acceleration structure", false, |ui| tables::accel(ui, facts.loaded));

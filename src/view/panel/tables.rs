@@ -57,7 +57,7 @@ fn rate(n_rays: u64, ms: Option<f64>) -> String {
 pub fn accel(ui: &mut Ui, loaded: &LoadedScene) {
     let statistics = &loaded.statistics;
     let size = ("size", bytes(statistics.bytes()));
-    let built_in = ("built in", format!("{:.0} ms", loaded.build_ms));
+    let built_in = ("built in", format!("{:.0} ms", loaded.built.build_ms));
     let rows = statistics.rows().into_iter().chain([size, built_in]);
     grid(ui, "tree", rows.map(|(name, value)| [name.to_owned(), value]));
 }
