@@ -21,14 +21,11 @@ use std::{
     thread,
 };
 
-/// The kernels that find hits. Each is compiled for every search of [`SEARCHES`], and those that are marked here also
-/// with `WITH_ALPHA_TEST`. Casts know no materials, so they have no alpha test.
+/// The kernels that find hits. Each is compiled for every search of [`SEARCH_MODULES`], and those that are marked here
+/// also with `WITH_ALPHA_TEST`. Casts know no materials, so they have no alpha test.
 const SEARCHING: [(&str, bool); 4] = [("cast", false), ("path_trace", true), ("shadow", true), ("trace", true)];
 
-/// The ways to search for hits: the traversals of the kd-tree, and the grid. A module has the code of one search, which
-/// the macro `TRAVERSAL` selects, since drivers take seconds to compile the code of all of them.
-const SEARCHES: [&str; 9] =
-    ["mask", "mask_boxes", "restart", "backtrack", "short_stack", "ropes", "stack", "brute", "grid"];
+include!("src/accel/search_modules.rs");
 
 /// A module of SPIR-V: a shader, compiled with some macros.
 struct Module {
@@ -211,7 +208,7 @@ fn searching_modules(kernel: &str, has_alpha_test: bool, path: &Path) -> Vec<Mod
         let with_alpha_test = has_alpha_test.then(|| module("_alpha", macros));
         iter::once(module("", vec![traversal])).chain(with_alpha_test)
     };
-    SEARCHES.into_iter().flat_map(of_search).collect()
+    SEARCH_MODULES.into_iter().flat_map(of_search).collect()
 }
 
 /// Generates a Rust table of the modules of all kernels that find hits, each with its SPIR-V.

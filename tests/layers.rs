@@ -134,8 +134,8 @@ fn unsafe_code_is_in_the_vulkan_layer() {
     assert!(!found.is_empty() && found.iter().all(|path| path.starts_with("src/gpu")), "{found:?}");
 }
 
-/// What loading consists of, and the only files that may call it: `scene` itself aside. Packs are made of scene files as
-/// they are.
+/// What loading consists of, and the only files that may call it: `scene` itself aside. Packs are made of scene files
+/// as they are.
 const ONE_WAY_IN: &[(&str, &[&str])] = &[
     ("Scene::load", &["engine/load.rs", "pack/mod.rs"]),
     ("choose_accel(", &["engine/load.rs", "engine/choices/mod.rs"]),

@@ -5,6 +5,7 @@ mod bounds;
 pub mod grid;
 pub mod kdtree;
 mod query;
+mod search;
 mod statistics;
 pub mod wide_bvh;
 
@@ -14,7 +15,7 @@ use self::{
     grid::{GridLevels, GridOptions, LazyGrid},
     kdtree::{BuildOptions, KdTree},
 };
-pub use self::{query::Query, statistics::Statistics};
+pub use self::{query::Query, search::Search, statistics::Statistics};
 use crate::layout::Triangle;
 pub use crate::layout::{Hit, NO_TRIANGLE, Ray};
 use crate::util::progress::Progress;

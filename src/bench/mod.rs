@@ -23,7 +23,6 @@ pub mod rays;
 pub mod size;
 pub mod stage;
 pub mod traversal;
-pub mod variant;
 
 use std::time::{Duration, Instant};
 

@@ -61,7 +61,7 @@ pub fn ray_sets(stage: &Stage) -> [RaySet; 4] {
     let mut primary = vec![PathRay::zeroed(); (stage.frame.width * stage.frame.height) as usize];
     primary_rays(&stage.frame, 0, &mut primary);
     let mut hits = vec![Hit::zeroed(); primary.len()];
-    trace(&bindings, Traversal::Mask, &primary, &mut hits);
+    trace(&bindings, Traversal::Mask.into(), &primary, &mut hits);
 
     let triangles = bindings.triangles;
     let shadow = rays_from_hits(triangles, &primary, &hits, |ray, surface| {

@@ -13,10 +13,9 @@ use super::{
     rays::{RayKind, RaySet},
     stage::Stage,
     traversal::{SetResult, StepsARay, Tracers},
-    variant::Variant,
 };
 use crate::{
-    accel::{Accel, Statistics, kdtree::BuildOptions},
+    accel::{Accel, Search, Statistics, kdtree::BuildOptions},
     gpu::{Device, GpuError},
     scene::{
         Camera, Instance, Material, Projection, RenderDefaults, Scene, Transform,
@@ -97,7 +96,7 @@ impl KnotStage {
     pub fn measure(
         &self,
         device: Option<&Device>,
-        variant: Variant,
+        variant: Search,
         sets: &[RaySet],
         n_times: u16,
     ) -> Result<Row, GpuError> {
@@ -164,7 +163,7 @@ impl RayCost {
             n_rays: set.n_rays,
             ms: variant.ms,
             ns_a_ray,
-            steps_a_ray: variant.steps_a_ray,
+            steps_a_ray: variant.steps_a_ray.expect("steps of a search that devices have"),
             difference: variant.difference,
         }
     }

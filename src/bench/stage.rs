@@ -5,10 +5,9 @@ use std::time::Instant;
 
 use glam::{BVec3, Vec3};
 
-use super::variant::Variant;
 use crate::{
     accel::{
-        Accel, AccelOptions, Statistics,
+        Accel, AccelOptions, Search, Statistics,
         grid::GridOptions,
         kdtree::{self, BuildOptions, KdTree, TraversalLinks},
     },
@@ -89,18 +88,18 @@ impl Stage {
     }
 
     /// Returns the triangles with the structure that a variant searches.
-    pub fn geometry(&self, variant: Variant) -> Geometry<'_> {
+    pub fn geometry(&self, variant: Search) -> Geometry<'_> {
         let accel = match variant {
-            Variant::KdTree(_) => return self.world.geometry(),
-            Variant::Grid => &self.grids[0],
-            Variant::Grid2 => &self.grids[1],
+            Search::KdTree(_) | Search::Wide => return self.world.geometry(),
+            Search::Grid => &self.grids[0],
+            Search::Grid2 => &self.grids[1],
         };
         Geometry::new(&self.scene().triangles, accel).expect("a grid of these triangles")
     }
 
     /// Returns the statistics of the structure that a variant searches. If no device has built the grid, the host
     /// builds it.
-    pub fn statistics(&self, variant: Variant) -> Statistics {
+    pub fn statistics(&self, variant: Search) -> Statistics {
         match self.geometry(variant).accel() {
             Accel::KdTree(_) => self.world.statistics(),
             Accel::Grid(grid) => Statistics::Grid(grid.statistics(&self.scene().triangles)),
@@ -108,7 +107,7 @@ impl Stage {
     }
 
     /// Returns the inputs of a variant on the CPU.
-    pub fn inputs_of(&self, variant: Variant) -> KernelInputs<'_> {
+    pub fn inputs_of(&self, variant: Search) -> KernelInputs<'_> {
         KernelInputs::of_geometry(self.geometry(variant)).with_links(&self.links)
     }
 

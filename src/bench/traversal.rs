@@ -12,15 +12,14 @@ use super::{
     difference::Difference,
     rays::{RayKind, RaySet},
     stage::Stage,
-    variant::Variant,
 };
 use crate::{
     accel::{
-        Query,
+        Query, Search,
         kdtree::{Statistics, Traversal},
     },
     cast::{GpuCaster, Ray, cast_ray},
-    cpu,
+    cpu::{self, CpuSearch},
     gpu::{Device, GpuError, Statistic, StatisticValue},
     layout::{Hit, NO_TRIANGLE},
     reference::counting::steps::{Steps, count_steps},
@@ -32,7 +31,7 @@ pub const CASTS_PER_TURN: u16 = 5;
 /// The variants on one stage, ready for rays.
 pub struct Tracers<'a> {
     stage: &'a Stage,
-    variants: &'a [Variant],
+    variants: &'a [Search],
     /// One caster per variant; `None` if the CPU casts with all threads of the current rayon pool.
     casters: Option<Vec<GpuCaster>>,
 }
@@ -42,9 +41,9 @@ impl<'a> Tracers<'a> {
     ///
     /// # Errors
     /// Fails as [`GpuCaster::new`] does.
-    pub fn new(device: Option<&Device>, stage: &'a Stage, variants: &'a [Variant]) -> Result<Self, GpuError> {
+    pub fn new(device: Option<&Device>, stage: &'a Stage, variants: &'a [Search]) -> Result<Self, GpuError> {
         let caster =
-            |device: &Device, variant: Variant| GpuCaster::new(device, stage.geometry(variant), variant.traversal());
+            |device: &Device, variant: Search| GpuCaster::new(device, stage.geometry(variant), variant.traversal());
         let casters = device.map(|device| variants.iter().map(|&variant| caster(device, variant)).collect());
         Ok(Self { stage, variants, casters: casters.transpose()? })
     }
@@ -56,7 +55,7 @@ impl<'a> Tracers<'a> {
     pub fn measure(&mut self, set: &RaySet, n_times: u16) -> Result<SetResult, GpuError> {
         let rays: Vec<_> = set.rays.iter().map(cast_ray).collect();
         let query = query_of(set);
-        let expected = self.cast_on_cpu(Variant::KdTree(Traversal::Mask), &rays, query);
+        let expected = self.cast_on_cpu(Search::KdTree(Traversal::Mask), &rays, query);
         let mut results = vec![(Some(Vec::new()), Difference::default()); self.variants.len()];
         let n_warm_up = self.n_warm_up(set)?;
         for n_casts in turns(n_times) {
@@ -72,8 +71,8 @@ impl<'a> Tracers<'a> {
             let ms = ms.and_then(Spread::of);
             let mrays_per_s = ms.and_then(|ms| ms.mrays_per_s(rays.len() as u64));
             let inputs = self.stage.inputs_of(variant);
-            let steps = count_steps(&inputs, variant.traversal(), query, &set.rays);
-            let steps_a_ray = StepsARay::new(&steps, rays.len());
+            let steps = || count_steps(&inputs, variant.traversal(), query, &set.rays);
+            let steps_a_ray = (variant != Search::Wide).then(|| StepsARay::new(&steps(), rays.len()));
             let kernel = match &self.casters {
                 Some(casters) => casters[variant_ix].statistics(query)?,
                 None => Vec::new(),
@@ -130,9 +129,11 @@ impl<'a> Tracers<'a> {
         Ok((hits, Some(ms)))
     }
 
-    fn cast_on_cpu(&self, variant: Variant, rays: &[Ray], query: Query) -> Vec<Hit> {
+    fn cast_on_cpu(&self, variant: Search, rays: &[Ray], query: Query) -> Vec<Hit> {
         let mut hits = vec![Hit::zeroed(); rays.len()];
-        cpu::cast(&self.stage.inputs_of(variant), variant.traversal(), query, rays, &mut hits);
+        let wide = (variant == Search::Wide).then(|| self.stage.world.wide_bvh()).flatten();
+        let search = CpuSearch { traversal: variant.traversal(), wide };
+        cpu::cast(&self.stage.inputs_of(variant), search, query, rays, &mut hits);
         hits
     }
 }
@@ -170,8 +171,8 @@ pub struct VariantResult {
     /// Difference from the CPU's hits: the maximum of each number over all turns.
     #[serde(flatten)]
     pub difference: Difference,
-    /// Steps of the same search on the CPU.
-    pub steps_a_ray: StepsARay,
+    /// Steps of the same search on the CPU; none for the wide hierarchy, whose steps nobody counts.
+    pub steps_a_ray: Option<StepsARay>,
     /// The driver's statistics of the kernel; empty if it has none.
     pub kernel: Vec<Statistic>,
 }

@@ -12,9 +12,17 @@ mod recorded;
 mod rounds;
 mod write;
 
-use std::{mem, sync::Arc, time::Instant};
+use std::{
+    mem,
+    sync::{
+        Arc, OnceLock,
+        atomic::{AtomicUsize, Ordering},
+    },
+    time::Instant,
+};
 
 use bytemuck::Zeroable;
+use glam::Vec3;
 use rayon::prelude::*;
 
 pub(crate) use self::rounds::time_in_turn;
@@ -30,9 +38,10 @@ use crate::{
     accel::{
         Query,
         kdtree::{Traversal, TraversalLinks},
+        wide_bvh::WideBvh,
     },
     buffers::{AccelBuffers, CastResources, ResumePass, hidden_words},
-    cpu,
+    cpu::{self, CpuSearch},
     frame::{BadOptions, check::check},
     gpu::{Access, BindingLayout, CommandBuffer, Context, Device, GpuError, Limits, Statistic, Timer},
     layout::{PathRay, RAY_GROUP_SIZE},
@@ -235,6 +244,9 @@ pub struct CpuCaster<'a> {
     geometry: Geometry<'a>,
     traversal: Traversal,
     links: TraversalLinks,
+    /// The hierarchy for scattered rays, made after so many of them that it pays.
+    wide: OnceLock<WideBvh>,
+    n_scattered: AtomicUsize,
     /// For each triangle, `TRIANGLE_HIDDEN` or 0. None if no triangle is hidden.
     hidden: Option<Vec<u32>>,
 }
@@ -243,7 +255,7 @@ impl<'a> CpuCaster<'a> {
     /// Creates a caster, and computes the links (such as ropes) that the traversal reads in addition to the tree.
     pub fn new(geometry: Geometry<'a>, traversal: Traversal) -> Self {
         let links = TraversalLinks::of(geometry.accel(), traversal);
-        Self { geometry, traversal, links, hidden: None }
+        Self { geometry, traversal, links, wide: OnceLock::new(), n_scattered: AtomicUsize::new(0), hidden: None }
     }
 
     /// Makes rays pass through the triangles with these indices. A second call replaces the indices of the first.
@@ -264,9 +276,38 @@ impl<'a> CpuCaster<'a> {
             None => bindings,
         };
         let mut hits = vec![Hit::zeroed(); rays.len()];
-        cpu::cast(&bindings.with_links(&self.links), self.traversal, query, rays, &mut hits);
+        cpu::cast(&bindings.with_links(&self.links), self.search_for(rays), query, rays, &mut hits);
         hits
     }
+
+    /// Returns how the rays are traced: scattered rays through the wide hierarchy, if it exists or making it pays. The
+    /// hits are the same either way.
+    fn search_for(&self, rays: &[Ray]) -> CpuSearch<'_> {
+        let Self { geometry, traversal, .. } = *self;
+        let packets = CpuSearch::from(traversal);
+        let n_triangles = geometry.triangles().len();
+        let Some(tree) = geometry.accel().as_kdtree() else { return packets };
+        if !cpu::suits_scattered_rays(n_triangles, traversal) || !are_scattered(rays, geometry.accel().bounds()) {
+            return packets;
+        }
+        let n_scattered = self.n_scattered.fetch_add(rays.len(), Ordering::Relaxed) + rays.len();
+        // Two threads may both make it. `get_or_init` could make a thread of rayon wait for itself.
+        if self.wide.get().is_none() && n_scattered >= n_triangles.saturating_mul(RAYS_PER_TRIANGLE) {
+            drop(self.wide.set(WideBvh::new(tree, geometry.triangles())));
+        }
+        CpuSearch { wide: self.wide.get(), ..packets }
+    }
+}
+
+/// Number of scattered rays, as a multiple of the triangles, after which a wide hierarchy is made. It then pays within
+/// 1 to 23 such numbers of rays (docs/experiments.md).
+const RAYS_PER_TRIANGLE: usize = 4;
+
+/// Returns whether the hierarchy is for these rays. It knows the t of a ray by the length of its direction, which must
+/// not underflow.
+fn are_scattered(rays: &[Ray], bounds: [Vec3; 2]) -> bool {
+    let underflows = |ray: &Ray| ray.direction != Vec3::ZERO && ray.direction.length_squared() < f32::MIN_POSITIVE;
+    cpu::are_scattered(rays, bounds, |ray| (ray.origin, ray.direction)) && !rays.par_iter().any(underflows)
 }
 
 /// Casts rays by a [`CpuCaster`], and returns one hit for each. The hits are those that a [`GpuCaster`] finds.
@@ -277,4 +318,62 @@ pub fn cast_on_cpu(geometry: Geometry, traversal: Traversal, rays: &[Ray], query
 /// Converts a ray of the renderer to a ray to cast, with `t_min` = 0.
 pub(crate) fn cast_ray(ray: &PathRay) -> Ray {
     Ray { origin: ray.origin, t_min: 0.0, direction: ray.direction, t_max: ray.t_max }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        accel::{
+            Accel,
+            kdtree::{BuildOptions, KdTree},
+        },
+        layout::Triangle,
+    };
+
+    const N_TRIANGLES: u32 = 4096;
+
+    /// Small triangles at pseudo-random places of a cube.
+    fn soup() -> Vec<Triangle> {
+        let number = |i: u32| (i.wrapping_mul(2_654_435_761) >> 8) as f32 / (1 << 24) as f32;
+        let point = |i: u32| Vec3::new(number(3 * i), number(3 * i + 1), number(3 * i + 2));
+        let triangle = |i: u32| {
+            let at = point(i);
+            let [a, b] = [1, 2].map(|k| at + 0.1 * point(i + k * N_TRIANGLES));
+            Triangle { v0: at, v1: a, v2: b, ..Triangle::default() }
+        };
+        (0..N_TRIANGLES).map(triangle).collect()
+    }
+
+    /// Rays from the middle: all in about one direction, or each in another.
+    fn rays(is_scattered: bool) -> Vec<Ray> {
+        let direction = |i: u32| match is_scattered {
+            true => Vec3::new((i as f32).sin(), (1.7 * i as f32).cos(), (0.3 * i as f32).sin()),
+            false => Vec3::new(1.0, 1e-5 * i as f32, 0.0),
+        };
+        let ray = |i| Ray { origin: Vec3::splat(0.5), t_min: 0.0, direction: direction(i), t_max: f32::INFINITY };
+        (0..N_TRIANGLES * RAYS_PER_TRIANGLE as u32).map(ray).collect()
+    }
+
+    #[test]
+    fn scattered_rays_take_the_hierarchy_and_find_the_same_hits() {
+        let triangles = soup();
+        let accel = Accel::KdTree(KdTree::build(&triangles, &BuildOptions::default()));
+        let geometry = Geometry::new(&triangles, &accel).unwrap();
+        let caster = CpuCaster::new(geometry, Traversal::OF_CPU);
+        let takes_wide = |rays: &[Ray]| caster.search_for(rays).wide.is_some();
+        let (scattered, coherent) = (rays(true), rays(false));
+        assert!(!takes_wide(&coherent) && !takes_wide(&scattered[..5000]), "a hierarchy for few rays would not pay");
+        assert_eq!(takes_wide(&scattered), cpu::suits_scattered_rays(triangles.len(), Traversal::OF_CPU));
+        let mut tiny = scattered.clone();
+        tiny[7].direction *= 1e-25;
+        assert!(!takes_wide(&tiny) && !takes_wide(&coherent));
+        let by_mask = CpuCaster::new(geometry, Traversal::Mask);
+        assert!(by_mask.search_for(&scattered).wide.is_none(), "another algorithm was asked for");
+        for rays in [&scattered, &coherent, &tiny] {
+            let hits = caster.cast(rays, Query::Closest);
+            assert_eq!(hits, by_mask.cast(rays, Query::Closest));
+            assert!(hits.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count() > 1000);
+        }
+    }
 }

@@ -206,8 +206,8 @@ impl PictureArgs {
         }
     }
 
-    /// Returns what the user sets in place of the scene's options. Traversal and primary visibility depend on the device;
-    /// [`Self::request`] returns the user's choice of them.
+    /// Returns what the user sets in place of the scene's options. Traversal and primary visibility depend on the
+    /// device; [`Self::request`] returns the user's choice of them.
     pub fn choices(&self) -> PictureChoices {
         let paths = PathOptions::default();
         PictureChoices {

@@ -49,6 +49,8 @@ pub use self::{
     meter::metered_exposure,
     render::{Batching, CpuRenderer},
     trace::{cast, shadow, trace, visibility},
+    tracer::CpuSearch,
+    wide_traverser::{are_scattered, suits_scattered_rays},
 };
 use crate::{
     frame::{Picture, Profile, RenderOptions, Tonemap},

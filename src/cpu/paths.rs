@@ -8,11 +8,10 @@ use super::{
     path_begin::{PixelOfBatch, path_begin, pixels_of_batch},
     path_scatter::{BounceOfPaths, path_scatter},
     queue::Queue,
-    tracer::FastTracer,
-    wide_traverser::WideTraverser,
+    tracer::{CpuSearch, FastTracer},
 };
 use crate::{
-    accel::{kdtree::Traversal, wide_bvh::WideBvh},
+    accel::kdtree::Traversal,
     layout::{Batch, Bounce, Frame, Hit, PathRay, PathState, PixelAovs, SCAN_GROUP_SIZE, ShadowRay},
     reference::{
         counting::costs,
@@ -22,7 +21,6 @@ use crate::{
         path_scatter::PathBuffers,
         path_trace::{closest_hits_by, ray_of, shadow_rays_by},
         paths::sample_of_path,
-        traverser::Tracer,
     },
 };
 
@@ -64,19 +62,14 @@ impl Paths {
     }
 
     /// Finds the hits of the paths that are alive, and tests the shadow rays of the bounce before. Returns the numbers
-    /// of hits and of shadow rays. `wide_bvh`: the hierarchy through which all but camera rays are traced, if there is
-    /// one.
-    pub fn trace(
-        &mut self,
-        inputs: &KernelInputs,
-        (traversal, wide_bvh): (Traversal, Option<&WideBvh>),
-        depth: u32,
-        queue: &mut Queue,
-    ) -> (u32, u32) {
-        match wide_bvh.filter(|_| depth > 0) {
-            Some(bvh) => self.trace_by(inputs, || WideTraverser::new(bvh, Level::new()), depth, queue),
-            None => self.trace_by(inputs, || FastTracer::new(inputs, traversal), depth, queue),
-        }
+    /// of hits and of shadow rays.
+    pub fn trace(&mut self, inputs: &KernelInputs, search: CpuSearch, depth: u32, queue: &mut Queue) -> (u32, u32) {
+        let new_tracer = || FastTracer::new(inputs, search);
+        let Self { states, shadow_rays, live, with_shadow_ray, .. } = self;
+        let live = &live[depth as usize % 2];
+        let n_hits = closest_hits_by(inputs, new_tracer, live, &queue.rays, &mut queue.hits);
+        shadow_rays_by(inputs, new_tracer, with_shadow_ray, shadow_rays, states);
+        (n_hits, with_shadow_ray.len() as u32)
     }
 
     /// Adds the costs of the rays that [`Self::trace`] traces, of each pixel's first sample.
@@ -100,20 +93,6 @@ impl Paths {
         let inputs = &inputs.with_stochastic_alpha();
         costs::count_rays::<false>(inputs, traversal, &rays, pixel_aovs);
         costs::count_rays::<true>(inputs, traversal, &shadow_rays, pixel_aovs);
-    }
-
-    fn trace_by<T: Tracer>(
-        &mut self,
-        inputs: &KernelInputs,
-        new_tracer: impl Fn() -> T + Sync + Send,
-        depth: u32,
-        queue: &mut Queue,
-    ) -> (u32, u32) {
-        let Self { states, shadow_rays, live, with_shadow_ray, .. } = self;
-        let live = &live[depth as usize % 2];
-        let n_hits = closest_hits_by(inputs, &new_tracer, live, &queue.rays, &mut queue.hits);
-        shadow_rays_by(inputs, &new_tracer, with_shadow_ray, shadow_rays, states);
-        (n_hits, with_shadow_ray.len() as u32)
     }
 
     /// Adds the light at the hits, and replaces the rays by those with which the paths go on.

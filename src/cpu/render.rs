@@ -2,7 +2,12 @@
 
 use bytemuck::Zeroable;
 
-use super::{paths::Paths, queue::Queue, timing::Clock, wide_traverser::wide_bvh_for};
+use super::{
+    paths::Paths,
+    queue::Queue,
+    timing::Clock,
+    wide_traverser::{are_scattered, search_for},
+};
 use crate::{
     accel::kdtree::TraversalLinks,
     frame::{
@@ -43,6 +48,10 @@ impl Default for Batching {
         Self { n_pixels: 1 << 16, queue_capacity: 1 << 20 }
     }
 }
+
+/// The least number of triangles with which scattered rays of a whitted bounce go through the wide hierarchy. With
+/// fewer, packets of these rays are faster (docs/experiments.md).
+const LEAST_TRIANGLES_OF_BOUNCES: usize = 1 << 16;
 
 /// A renderer of one world on the CPU, which accumulates a picture sample by sample.
 pub struct CpuRenderer {
@@ -98,7 +107,7 @@ impl CpuRenderer {
         let n_layers = if options.has_light_layers() { LIGHT_LAYERS as usize } else { 0 };
         if options.integrator == Integrator::Path {
             // Makes the hierarchy now, so that the time of the first frame is that of drawing alone.
-            wide_bvh_for(world, options.traversal);
+            search_for(world, options.traversal, true);
         }
         Self {
             camera: world.scene().camera,
@@ -370,7 +379,8 @@ impl CpuRenderer {
         if self.options.pixel_aovs && self.n_samples == 0 {
             paths.note_costs(&inputs, traversal, depth, queue, &mut self.pixel_aovs);
         }
-        let trace = || paths.trace(&inputs, (traversal, wide_bvh_for(world, traversal)), depth, queue);
+        let search = search_for(world, traversal, depth > 0);
+        let trace = || paths.trace(&inputs, search, depth, queue);
         let (n_hits, n_shadow_rays) = self.clock.time(Pass::PathTrace, Some(depth), trace);
         if let Some(before) = self.batch_stats.last_mut() {
             before.n_shadow_rays = n_shadow_rays.into();
@@ -441,7 +451,7 @@ impl CpuRenderer {
     fn visibility(&mut self) {
         let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
         let (traversal, ids) = (self.options.traversal, &mut self.triangle_ids);
-        self.clock.time(Pass::Visibility, None, || super::visibility(&inputs, traversal, ids));
+        self.clock.time(Pass::Visibility, None, || super::visibility(&inputs, traversal.into(), ids));
     }
 
     /// Writes the primary rays to the queue. Their time counts as part of the first pass, because on a device that
@@ -461,10 +471,13 @@ impl CpuRenderer {
         hits.resize(rays.len(), Hit::zeroed());
         let places = bounces[depth as usize].rays();
         let (rays, hits) = (&rays[places.clone()], &mut hits[places]);
-        let (ids, traversal) = (&self.triangle_ids, self.options.traversal);
+        let is_scattered = depth > 0
+            && self.world.scene().triangles.len() >= LEAST_TRIANGLES_OF_BOUNCES
+            && are_scattered(rays, self.world.bounds(), |ray| (ray.origin, ray.direction));
+        let (ids, search) = (&self.triangle_ids, search_for(&self.world, self.options.traversal, is_scattered));
         let n_hits = self.clock.time(pass, Some(depth), || match pass {
             Pass::PrimaryHit => primary_hit::primary_hit(&inputs, ids, rays, hits),
-            _ => super::trace(&inputs, traversal, rays, hits),
+            _ => super::trace(&inputs, search, rays, hits),
         });
         self.batch_stats.push(BounceStats { n_rays: rays.len() as u64, n_hits: n_hits.into(), n_shadow_rays: 0 });
     }
@@ -538,11 +551,11 @@ impl CpuRenderer {
         self.frame.queue_capacity = self.queue.rays.len() as u32;
         let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
         let Queue { rays, bounces, hits, light_visibility, .. } = &mut self.queue;
-        let traversal = self.options.traversal;
         light_visibility.resize(rays.len() * inputs.lights.len(), 0);
+        let search = self.options.traversal.into();
         for (bounce, stats) in bounces.iter().zip(&mut self.batch_stats) {
             let of_bounce =
-                || super::shadow(&inputs, traversal, &bounce.rays(), (rays.as_slice(), hits), light_visibility);
+                || super::shadow(&inputs, search, &bounce.rays(), (rays.as_slice(), hits), light_visibility);
             stats.n_shadow_rays = self.clock.time(Pass::Shadow, None, of_bounce).into();
         }
     }

@@ -1,5 +1,5 @@
-//! The tracer of the CPU engine for all rays but those of a [wide traverser](super::wide_traverser). With
-//! [`Traversal::Stack`], rays of one class of directions ([`DirectionBins`]) go through a kd-tree as packets. With any
+//! The tracer of the CPU engine. With [`Traversal::Stack`], rays of one class of directions ([`DirectionBins`]) go
+//! through a kd-tree as packets, and rays that have little in common one by one through a wide hierarchy. With any
 //! other algorithm, or through a grid, rays are traced one after the other.
 
 use fearless_simd::Level;
@@ -7,9 +7,10 @@ use fearless_simd::Level;
 use super::{
     direction_bins::{Bin, DirectionBins},
     packet_traverser::PacketTraverser,
+    wide_traverser::WideTraverser,
 };
 use crate::{
-    accel::kdtree::Traversal,
+    accel::{kdtree::Traversal, wide_bvh::WideBvh},
     layout::Hit,
     reference::{
         counting::table::ReadCounter,
@@ -20,32 +21,52 @@ use crate::{
     },
 };
 
+/// How the CPU finds hits.
+#[derive(Clone, Copy)]
+pub struct CpuSearch<'a> {
+    /// The algorithm for the kd-tree. A grid ignores it.
+    pub traversal: Traversal,
+    /// The hierarchy through which rays go one by one, in place of the kd-tree.
+    pub wide: Option<&'a WideBvh>,
+}
+
+impl From<Traversal> for CpuSearch<'_> {
+    fn from(traversal: Traversal) -> Self {
+        Self { traversal, wide: None }
+    }
+}
+
 /// The tracer of one thread.
 #[expect(clippy::large_enum_variant, reason = "one a thread, on its stack")]
-pub enum FastTracer {
+pub enum FastTracer<'a> {
     /// Traces packets through a kd-tree by [`Traversal::Stack`].
     Packets(PacketTraverser),
+    /// Traces ray by ray through a wide hierarchy.
+    Wide(WideTraverser<'a>),
     /// Traces ray by ray, by any other algorithm or through a grid.
     Single(Traverser),
 }
 
-impl FastTracer {
+impl<'a> FastTracer<'a> {
     /// Creates a tracer that uses the best instructions that the machine has.
-    pub fn new(inputs: &KernelInputs<impl ReadCounter>, traversal: Traversal) -> Self {
-        Self::at_level(inputs, traversal, Level::new())
+    pub fn new(inputs: &KernelInputs<impl ReadCounter>, search: impl Into<CpuSearch<'a>>) -> Self {
+        Self::at_level(inputs, search, Level::new())
     }
 
     /// Creates a tracer that uses the instructions of `level`, which the machine must have. The hits are the same at
     /// every level, bit for bit.
-    pub fn at_level(inputs: &KernelInputs<impl ReadCounter>, traversal: Traversal, level: Level) -> Self {
-        match traversal {
-            Traversal::Stack if inputs.lattice.is_none() => Self::Packets(PacketTraverser::new(level)),
-            other => Self::Single(Traverser::new(inputs, other)),
+    pub fn at_level(inputs: &KernelInputs<impl ReadCounter>, search: impl Into<CpuSearch<'a>>, level: Level) -> Self {
+        match search.into() {
+            CpuSearch { wide: Some(bvh), .. } => Self::Wide(WideTraverser::new(bvh, level)),
+            CpuSearch { traversal: Traversal::Stack, .. } if inputs.lattice.is_none() => {
+                Self::Packets(PacketTraverser::new(level))
+            }
+            CpuSearch { traversal, .. } => Self::Single(Traverser::new(inputs, traversal)),
         }
     }
 }
 
-impl Tracer for FastTracer {
+impl Tracer for FastTracer<'_> {
     #[inline]
     fn traverse<const ANY_HIT: bool>(
         &mut self,
@@ -56,6 +77,7 @@ impl Tracer for FastTracer {
             Self::Packets(packets) => hit_from_near(inputs, search_ray, |near, best| {
                 packets.traverse_alone::<ANY_HIT>(inputs, &TraversalRay::new(inputs, near), best);
             }),
+            Self::Wide(traverser) => traverser.traverse::<ANY_HIT>(inputs, search_ray),
             Self::Single(traverser) => traverser.traverse::<ANY_HIT>(inputs, search_ray),
         }
     }
@@ -69,6 +91,7 @@ impl Tracer for FastTracer {
     ) {
         let packets = match self {
             Self::Packets(packets) => packets,
+            Self::Wide(traverser) => return traverser.trace_all::<ANY_HIT, Key>(inputs, search_rays, found),
             Self::Single(traverser) => return traverser.trace_all::<ANY_HIT, Key>(inputs, search_rays, found),
         };
         let mut bins = DirectionBins::default();

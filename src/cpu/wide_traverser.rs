@@ -3,8 +3,9 @@
 //! the length of a ray's direction underflows.
 
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
+use glam::Vec3;
 
-use super::{lanes::LaneMask, packet_triangle::Shears};
+use super::{lanes::LaneMask, packet_triangle::Shears, tracer::CpuSearch};
 use crate::{
     accel::{
         kdtree::Traversal,
@@ -38,17 +39,47 @@ fn vector_size<S: Simd>(_: S) -> usize {
     size_of::<S::f32s>() / size_of::<f32>()
 }
 
-/// Whether scattered rays of paths are traced one by one. `traversal`: the algorithm that the options name. Only the
-/// default one, by packets, leaves these rays to the hierarchy.
+/// Whether scattered rays are traced one by one. `traversal`: the algorithm that the options name. Only the default
+/// one, by packets, leaves these rays to the hierarchy.
 fn traces_one_by_one(n_triangles: usize, vector_size: usize, traversal: Traversal) -> bool {
     n_triangles >= LEAST_TRIANGLES && vector_size >= LEAST_VECTOR_SIZE && traversal == Traversal::OF_CPU
 }
 
-/// Returns the hierarchy through which scattered rays of paths are traced one by one. Returns none if they are traced
-/// in another way.
-pub fn wide_bvh_for(world: &World, traversal: Traversal) -> Option<&WideBvh> {
+/// Returns whether single rays through the hierarchy of a kd-tree are faster than packets if they are scattered.
+pub fn suits_scattered_rays(n_triangles: usize, traversal: Traversal) -> bool {
     let vector_size = dispatch!(Level::new(), simd => vector_size(simd));
-    if traces_one_by_one(world.scene().triangles.len(), vector_size, traversal) { world.wide_bvh() } else { None }
+    traces_one_by_one(n_triangles, vector_size, traversal)
+}
+
+/// Returns how rays of a frame find their hits. `is_scattered`: whether they have little in common.
+pub fn search_for(world: &World, traversal: Traversal, is_scattered: bool) -> CpuSearch<'_> {
+    let takes_wide = is_scattered && suits_scattered_rays(world.scene().triangles.len(), traversal);
+    CpuSearch { traversal, wide: if takes_wide { world.wide_bvh() } else { None } }
+}
+
+/// Number of rays of a packet, and number of packets in a list of rays that are looked at.
+const PACKET: usize = 16;
+const N_PACKETS: usize = 64;
+/// The rays of a packet have much in common if the cosine of the angle to the first ray's direction is at least this,
+/// and the distance from its origin at most this share of the diagonal of the box of all triangles.
+const LEAST_COSINE: f32 = 0.95;
+const MOST_DISTANCE: f32 = 1.0 / 32.0;
+
+/// Returns whether most rays have little in common with those beside them in the list. `of`: a ray's origin and
+/// direction.
+pub fn are_scattered<R>(rays: &[R], [min, max]: [Vec3; 2], of: impl Fn(&R) -> (Vec3, Vec3)) -> bool {
+    let nearby = MOST_DISTANCE * (max - min).length();
+    let is_alike = |packet: &&[R]| {
+        let (first, direction) = of(&packet[0]);
+        let direction = direction.normalize_or_zero();
+        packet.iter().map(&of).all(|(origin, other)| {
+            other.normalize_or_zero().dot(direction) >= LEAST_COSINE && origin.distance(first) <= nearby
+        })
+    };
+    let packets = rays.chunks_exact(PACKET);
+    let step = (packets.len() / N_PACKETS).max(1);
+    let (n_packets, n_alike) = (packets.len().div_ceil(step), packets.step_by(step).filter(is_alike).count());
+    2 * n_alike < n_packets
 }
 
 /// A pending subtree: one that the ray visits later.

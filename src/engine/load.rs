@@ -221,8 +221,8 @@ impl Builder {
         Self { processor, request, progress: Progress::default() }
     }
 
-    /// Chooses the structure for the work, checks that structure and pictures fit in memory, builds on the current rayon
-    /// pool, and meters the exposure if the scene's light has physical units and the user has set no exposure.
+    /// Chooses the structure for the work, checks that structure and pictures fit in memory, builds on the current
+    /// rayon pool, and meters the exposure if the scene's light has physical units and the user has set no exposure.
     ///
     /// # Errors
     /// The scene does not fit together, or the host has too little memory.
@@ -251,8 +251,8 @@ impl Builder {
 }
 
 impl Engine {
-    /// Loads a file, a scene or a mesh: reads it, chooses and builds its structure, meters its exposure, and chooses the
-    /// traversal and the primary visibility. The notes of the result are meant for people.
+    /// Loads a file, a scene or a mesh: reads it, chooses and builds its structure, meters its exposure, and chooses
+    /// the traversal and the primary visibility. The notes of the result are meant for people.
     ///
     /// # Errors
     /// The source cannot be read or does not fit together, the host has too little memory, or the device is lost.

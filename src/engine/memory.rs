@@ -24,8 +24,8 @@ const DISPLAY: u64 = size_of::<[u8; 4]>() as u64;
 const ENCODED: u64 = 6;
 
 impl Builder {
-    /// Refuses pictures that do not fit in the host's memory. `n_at_once`: number of pictures that are drawn at the same
-    /// time. The CPU renderer's buffers are counted if the CPU traces the rays.
+    /// Refuses pictures that do not fit in the host's memory. `n_at_once`: number of pictures that are drawn at the
+    /// same time. The CPU renderer's buffers are counted if the CPU traces the rays.
     ///
     /// # Errors
     /// The host has too little memory.

@@ -21,7 +21,7 @@
 use std::sync::Arc;
 
 use crate::{
-    accel::kdtree::Traversal,
+    accel::{AccelKind, Search, kdtree::Traversal},
     buffers::uses_graphics_pipeline,
     frame::{Primary, RenderOptions},
     gpu::{BindingLayout, ComputeDesc, ComputePipeline, Constant, Constants, Context, GpuError, Shader},
@@ -236,10 +236,12 @@ fn searching(
     traversal: Traversal,
     alpha_test: Option<Constant<bool>>,
 ) -> Shader {
-    let search = match bindings.value(constants::GRID_LEVELS) {
-        0 => traversal.to_string().replace('-', "_"),
-        _ => "grid".to_owned(),
+    let accel = match bindings.value(constants::GRID_LEVELS) {
+        0 => AccelKind::KdTree,
+        1 => AccelKind::Grid,
+        _ => AccelKind::Grid2,
     };
+    let search = Search::of(accel, traversal).module().expect("kernels have all searches of devices");
     let alpha = if alpha_test.is_some_and(|it| bindings.value(it) != 0) { "_alpha" } else { "" };
     let file = format!("{kernel}_{search}{alpha}.comp");
     *SEARCHING.iter().find(|module| module.file == file).unwrap_or_else(|| panic!("build.rs makes no {file}"))
@@ -294,8 +296,8 @@ mod tests {
         for (kernel, n_of_each) in [("cast", 1), ("path_trace", 2), ("shadow", 2), ("trace", 2)] {
             let modules: Vec<_> = modules_of(kernel).map(|module| module.file).collect();
             assert_eq!(modules.len(), n_of_each * (Traversal::ALL.len() + 1), "{kernel}: those of the grid, too");
-            for traversal in Traversal::ALL {
-                let file = format!("{kernel}_{traversal}.comp").replace('-', "_");
+            for search in Search::all(false) {
+                let file = format!("{kernel}_{}.comp", search.module().unwrap());
                 assert!(modules.contains(&&*file), "{file}");
             }
         }

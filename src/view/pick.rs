@@ -72,7 +72,7 @@ pub fn pick(world: &World, options: &RenderOptions, camera: &Camera, pixel: UVec
             break;
         }
         let mut hits = vec![Hit::default(); rays.len()];
-        trace(&bindings, options.traversal, &rays, &mut hits);
+        trace(&bindings, options.traversal.into(), &rays, &mut hits);
         for (ray, hit) in rays.iter().zip(&hits) {
             let steps = count_steps(&bindings, options.traversal, Query::Closest, &[*ray]);
             picked.rays.push(PickedRay { depth, throughput: ray.throughput, steps, hit: found(scene, ray, hit) });

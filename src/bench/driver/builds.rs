@@ -5,8 +5,11 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use crate::{
-    accel::grid::{BuildStage, GridOptions},
-    bench::{Spread, stage::Stage, variant::Variant, warm_up},
+    accel::{
+        Search,
+        grid::{BuildStage, GridOptions},
+    },
+    bench::{Spread, stage::Stage, warm_up},
     gpu::{Buffer, BufferUse, Context, DriverAccel, GpuError, Timer},
     passes::grid::GridBuilder,
 };
@@ -55,7 +58,7 @@ impl Builds {
             driver_accel = DriverAccel::new(context, triangles)?;
             bvh_ms.push(driver_accel.build_ms());
         }
-        let grids = [(Variant::Grid, GridOptions::uniform()), (Variant::Grid2, GridOptions::two_level())];
+        let grids = [(Search::Grid, GridOptions::uniform()), (Search::Grid2, GridOptions::two_level())];
         let builds = Self {
             tree_ms: stage.tree_build_ms,
             n_threads: rayon::current_num_threads(),
@@ -73,7 +76,7 @@ impl GridBuilds {
     fn measure(
         context: &Arc<Context>,
         stage: &Stage,
-        variant: Variant,
+        variant: Search,
         options: &GridOptions,
     ) -> Result<Self, GpuError> {
         let triangles = &stage.scene().triangles;

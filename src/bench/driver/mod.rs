@@ -27,10 +27,9 @@ use self::{
 use super::{
     rays::{RayKind, RaySet},
     stage::Stage,
-    variant::Variant,
 };
 use crate::{
-    accel::{AccelKind, Query, kdtree::Traversal},
+    accel::{AccelKind, Query, Search, kdtree::Traversal},
     buffers::{AccelBuffers, CastResources},
     cast::{Contender, Kernel, Ray, cast_ray},
     gpu::{BindingLayout, Context, Device, DriverAccel, GpuError},
@@ -38,12 +37,12 @@ use crate::{
 
 /// The searches of kdray that are measured. Three of them traverse the kd-tree: the first is the default one, the
 /// second keeps a stack in memory, and the third needs neither mask nor stack, but six words more per node.
-pub const VARIANTS: [Variant; 5] = [
-    Variant::KdTree(Traversal::Mask),
-    Variant::KdTree(Traversal::Stack),
-    Variant::KdTree(Traversal::Ropes),
-    Variant::Grid,
-    Variant::Grid2,
+pub const VARIANTS: [Search; 5] = [
+    Search::KdTree(Traversal::Mask),
+    Search::KdTree(Traversal::Stack),
+    Search::KdTree(Traversal::Ropes),
+    Search::Grid,
+    Search::Grid2,
 ];
 
 /// One of kdray's structures on the device, with all data that the searches of [`VARIANTS`] read.
@@ -60,7 +59,7 @@ struct Contenders {
 }
 
 impl Structure {
-    fn new(context: &Arc<Context>, stage: &Stage, variant: Variant) -> Result<Self, GpuError> {
+    fn new(context: &Arc<Context>, stage: &Stage, variant: Search) -> Result<Self, GpuError> {
         let geometry = stage.geometry(variant);
         let mut buffers = AccelBuffers::new(context, geometry)?;
         buffers.add_links(context, geometry.accel(), Traversal::Ropes)?;
@@ -101,7 +100,7 @@ impl DeviceStage {
     pub fn new(device: &Device, stage: &Stage) -> Result<Self, GpuError> {
         let context = device.inner();
         let (builds, driver_accel) = Builds::measure(context, stage)?;
-        let structures = [VARIANTS[0], Variant::Grid, Variant::Grid2];
+        let structures = [VARIANTS[0], Search::Grid, Search::Grid2];
         let structures = structures.map(|variant| Structure::new(context, stage, variant));
         Ok(Self {
             structures: structures.into_iter().collect::<Result<_, _>>()?,

@@ -4,11 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::{Subcommand, value_parser};
 use kdray::{
-    accel::{AccelKind, kdtree::Traversal},
-    bench::{
-        size::{MIN_TRIANGLES, MOST_TRIANGLES, SIZES},
-        variant::Variant,
-    },
+    accel::{AccelKind, Search, kdtree::Traversal},
+    bench::size::{MIN_TRIANGLES, MOST_TRIANGLES, SIZES},
     gpu::DeviceSelector,
     output,
     scene::LoadOptions,
@@ -85,14 +82,14 @@ pub struct TraversalArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     #[arg(help = format!(
         "Traversals of the kd-tree and grids, as mask,stack,grid: {} [default: all but brute]",
-        Variant::words()
+        Search::words()
     ))]
     #[arg(long_help = listed(
         "Traversals of the kd-tree and kinds of grids, separated by commas, for example mask,stack,grid",
         "all but brute",
-        &Variant::descriptions()
+        &Search::descriptions()
     ))]
-    pub variants: Vec<Variant>,
+    pub variants: Vec<Search>,
     /// Number of timed casts of each set of rays, 1 to 10000
     #[arg(long, value_name = "N", default_value_t = 25, value_parser = value_parser!(u16).range(1..=10_000))]
     pub repeat: u16,

@@ -1,11 +1,10 @@
 //! `kdray bench size`: build time and time per ray against the number of triangles.
 
 use kdray::{
-    accel::AccelKind,
+    accel::{AccelKind, Search},
     bench::{
         rays::ray_sets,
         size::{KnotStage, RayGrowth, Report, Row},
-        variant::Variant,
     },
     engine::choices::{Processor, TreeKind, traversal_by_rule},
     gpu::{ContextOptions, Device, GpuError},
@@ -62,18 +61,18 @@ pub fn run(args: &SizeArgs) -> Result<(), CliError> {
 
 /// Returns the user's acceleration structure. For a kd-tree, the traversal is the user's or the one that suits the
 /// processor.
-fn variant(args: &SizeArgs, processor: Processor) -> Variant {
+fn variant(args: &SizeArgs, processor: Processor) -> Search {
     match args.accel {
-        AccelKind::KdTree => Variant::KdTree(args.traversal.unwrap_or_else(|| traversal_by_rule(processor))),
-        AccelKind::Grid => Variant::Grid,
-        AccelKind::Grid2 => Variant::Grid2,
+        AccelKind::KdTree => Search::KdTree(args.traversal.unwrap_or_else(|| traversal_by_rule(processor))),
+        AccelKind::Grid => Search::Grid,
+        AccelKind::Grid2 => Search::Grid2,
     }
 }
 
 fn measure(
     args: &SizeArgs,
     device: Option<&Device>,
-    variant: Variant,
+    variant: Search,
     n_triangles: u32,
     progress: &Progress,
 ) -> Result<Row, GpuError> {

@@ -1,12 +1,11 @@
 //! `kdray bench traversal`: compares all search algorithms for kd-trees and grids.
 
 use kdray::{
-    accel::kdtree::BuildOptions,
+    accel::{Search, kdtree::BuildOptions},
     bench::{
         rays::ray_sets,
         stage::Stage,
-        traversal::{Report, SetResult, Tracers, VariantResult},
-        variant::Variant,
+        traversal::{Report, SetResult, StepsARay, Tracers, VariantResult},
     },
     engine::{Opened, choices::TreeKind},
     gpu::{ContextOptions, Device, GpuError},
@@ -26,11 +25,12 @@ use crate::cli::{
 /// Loads the mesh, makes the rays and casts each set of rays with each algorithm.
 pub fn run(args: &TraversalArgs) -> Result<(), CliError> {
     args.files.check(&[&args.mesh], &args.load.options())?;
+    let variants = variants(&args.variants, args.cpu)?;
     let progress = Progress::new(false, 7);
     let loading = format!("loading {}", args.mesh.display());
     let (opened, _) = progress.stage(&loading, || Opened::read(&args.mesh, &args.load.rays()));
     let scene = FlatScene::new(&opened?.scene).map_err(GpuError::from)?;
-    let variants = variants(&args.variants);
+
     let options = ContextOptions::new(args.device.clone(), false);
     let device = if args.cpu { None } else { Some(open_device(&options, &progress)?) };
     let build_options = TreeKind::Best.options(processor(device.as_ref()));
@@ -52,9 +52,12 @@ pub fn run(args: &TraversalArgs) -> Result<(), CliError> {
 }
 
 /// Returns the user's variants, each once. Without any, returns all but brute force.
-fn variants(asked: &[Variant]) -> Vec<Variant> {
+fn variants(asked: &[Search], on_cpu: bool) -> Result<Vec<Search>, CliError> {
     if asked.is_empty() {
-        return Variant::all();
+        return Ok(Search::all(on_cpu));
+    }
+    if asked.contains(&Search::Wide) && !on_cpu {
+        return Err(CliError::Usage(format!("--variants {}: only the CPU has it, with --cpu", Search::Wide)));
     }
     let mut variants = Vec::new();
     for variant in asked {
@@ -62,7 +65,7 @@ fn variants(asked: &[Variant]) -> Vec<Variant> {
             variants.push(*variant);
         }
     }
-    variants
+    Ok(variants)
 }
 
 fn stage(args: &TraversalArgs, scene: FlatScene, build_options: &BuildOptions) -> Stage {
@@ -123,16 +126,17 @@ fn text(report: &Report) -> String {
 }
 
 fn cells(set: &SetResult, variant: &VariantResult) -> [String; 12] {
+    let steps = |of: fn(&StepsARay) -> f64| decimal(variant.steps_a_ray.as_ref().map(of), 1);
     [
         set.rays.name().to_owned(),
         set.n_rays.to_string(),
         set.n_hits.to_string(),
         variant.traversal.clone(),
         decimal(variant.mrays_per_s.map(|rate| rate.median), 2),
-        decimal(Some(variant.steps_a_ray.nodes), 1),
-        decimal(Some(variant.steps_a_ray.links), 1),
-        decimal(Some(variant.steps_a_ray.boxes), 1),
-        decimal(Some(variant.steps_a_ray.triangles), 1),
+        steps(|steps| steps.nodes),
+        steps(|steps| steps.links),
+        steps(|steps| steps.boxes),
+        steps(|steps| steps.triangles),
         variant.registers().map_or_else(|| "-".to_owned(), |registers| registers.to_string()),
         variant.difference.n_differing.to_string(),
         variant.difference.n_grazing.to_string(),

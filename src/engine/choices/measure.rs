@@ -74,7 +74,7 @@ fn some_rays(world: &World, frame: &Frame) -> Vec<Ray> {
     let mut from_camera = vec![PathRay::zeroed(); (frame.width * frame.height) as usize];
     primary_rays(frame, 0, &mut from_camera);
     let mut hits = vec![Hit::zeroed(); from_camera.len()];
-    trace(&KernelInputs::new(world, frame), Traversal::OF_CPU, &from_camera, &mut hits);
+    trace(&KernelInputs::new(world, frame), Traversal::OF_CPU.into(), &from_camera, &mut hits);
     let bounced = diffuse_rays(&world.scene().triangles, &from_camera, &hits);
     from_camera.iter().chain(&bounced).map(cast_ray).collect()
 }
