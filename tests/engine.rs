@@ -14,7 +14,7 @@ use kdray::{
     engine::{Engine, LoadRequest, Loaded},
     frame::RenderOptions,
     gpu::ContextOptions,
-    scene::{Mesh, PictureChoices},
+    scene::{Mesh, PictureChoices, Scene},
 };
 use support::{scenes, world_of};
 use tempfile::TempDir;
@@ -101,6 +101,30 @@ fn physical_light_is_metered() {
     assert!([r, g, b].iter().all(|channel| (60..200).contains(channel)), "{r} {g} {b}");
     let (Loaded { options, notes, .. }, white) = middle(Some(1.0));
     assert_eq!((options.exposure, notes.len(), white), (1.0, 0, [255; 4]));
+}
+
+/// The lights of the file count, also those of which only paths know: more rays are worth a better tree.
+#[test]
+fn the_work_counts_lights_with_an_area() {
+    let text = r#"
+        [[mesh]]
+        generator = "plane"
+        size = [1.0, 1.0]
+        [[light]]
+        kind = "rectangle"
+        position = [0.0, 3.0, 0.0]
+        direction = [0.0, -1.0, 0.0]
+        up = [0.0, 0.0, -1.0]
+        width = 1.0
+        height = 1.0
+        radiance = [1.0, 1.0, 1.0]
+    "#;
+    let scene = Scene::of_text("lamp.toml", text);
+    let scene = scene.unwrap();
+    assert_eq!(scene.lights.len(), 1);
+    let loaded = Engine::on_cpu().load(scene, &LoadRequest::default()).unwrap();
+    let RenderOptions { width, height, max_depth, .. } = loaded.options;
+    assert_eq!(loaded.workload.n_rays, u64::from(width) * u64::from(height) * u64::from(max_depth.min(2)) * 2);
 }
 
 /// Triangles alone get a camera that sees them, and lights.

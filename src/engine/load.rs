@@ -117,7 +117,7 @@ impl Work {
     }
 
     /// Returns the estimate on which choices depend.
-    fn workload(&self, scene: &FlatScene, options: &RenderOptions) -> Workload {
+    fn workload(&self, scene: &Scene, options: &RenderOptions) -> Workload {
         let of_pictures = |n: u64| Workload::of_pictures(options, scene.lights.len(), n);
         match self {
             Self::Pictures { cameras, n_samples, .. } if cameras.is_empty() => {
@@ -232,10 +232,9 @@ impl Builder {
             self.require_for_pictures(&options, n_samples, n_at_once)?;
         }
         let flat = FlatScene::new(&scene)?;
-        let bounds = scene.shown_bounds();
+        let (bounds, workload) = (scene.shown_bounds(), work.workload(&scene, &options));
         // The memory of the scene is freed for the build of the structure.
         drop(scene);
-        let workload = work.workload(&flat, &options);
         let n_triangles = flat.triangles.len();
         let accel = self.request.choose_accel(self.processor, n_triangles, &workload);
         self.require_for_build(accel, n_triangles)?;
