@@ -299,8 +299,8 @@ impl<'a> CpuCaster<'a> {
     }
 }
 
-/// Number of scattered rays, as a multiple of the triangles, after which a wide hierarchy is made. It then pays within
-/// 1 to 23 such numbers of rays (docs/experiments.md).
+/// Number of scattered rays, as a multiple of the triangles, after which a wide hierarchy is made. The time of making
+/// it is won back by 2 to 23 rays a triangle (docs/experiments.md).
 const RAYS_PER_TRIANGLE: usize = 4;
 
 /// Returns whether the hierarchy is for these rays. It knows the t of a ray by the length of its direction, which must

@@ -4,7 +4,7 @@
 use std::time::Instant;
 
 use kdray::{
-    engine::{Engine, LoadRequest, Loaded},
+    engine::{Engine, LoadRequest, Loaded, Opened},
     frame::{Goal, Integrator, Picture, RenderOptions},
     gpu::GpuError,
     scene::{DenoiseChoice, PictureChoices, Scene},
@@ -63,7 +63,10 @@ impl Sample {
             ..PictureChoices::default()
         };
         let request = LoadRequest::pictures(choices);
-        let Loaded { world, options, .. } = Engine::on_cpu().load(scene, &request).expect("the scene of the program");
+        let opened = Opened::read(scene, &request).expect("the scene of the program");
+        // Devices draw it by the default methods, not by those of the CPU.
+        let built = Engine::on_cpu().builder().build(opened, &request.work);
+        let Loaded { world, options, .. } = built.expect("the scene of the program");
         let begin = Instant::now();
         let expected = draw(&Engine::on_cpu(), &world, &options);
         Self { expected, options, cpu_ms: begin.elapsed().as_secs_f64() * 1e3, world }
