@@ -335,7 +335,8 @@ mod tests {
 
     /// Small triangles at pseudo-random places of a cube.
     fn soup() -> Vec<Triangle> {
-        let number = |i: u32| (i.wrapping_mul(2_654_435_761) >> 8) as f32 / (1 << 24) as f32;
+        let mixed = |i: u32| (i ^ (i >> 15)).wrapping_mul(0x7feb_352d);
+        let number = |i: u32| (mixed(mixed(mixed(i + 1))) >> 8) as f32 / (1 << 24) as f32;
         let point = |i: u32| Vec3::new(number(3 * i), number(3 * i + 1), number(3 * i + 2));
         let triangle = |i: u32| {
             let at = point(i);
