@@ -73,7 +73,7 @@ impl Search {
         }
     }
 
-    /// Returns the name of the search in the names of SPIR-V modules; none if no kernel has it.
+    /// Returns the word for the search in names of SPIR-V modules, or none if no kernel has the search.
     pub(crate) fn module(self) -> Option<&'static str> {
         let name = match self {
             Self::KdTree(traversal) => traversal.to_string().replace('-', "_"),

@@ -20,7 +20,7 @@ pub struct LoadArgs {
 }
 
 impl LoadArgs {
-    /// Returns the request for a scene for rays of the user's, which count from the origin of its file.
+    /// Returns the request for a scene into which the user's rays are cast. Coordinates are those of its file.
     pub fn rays(&self) -> LoadRequest {
         LoadRequest { scene: self.options(), ..LoadRequest::rays(0) }
     }
@@ -31,7 +31,7 @@ impl LoadArgs {
         LoadRequest { scene, ..LoadRequest::pictures(picture.choices()) }
     }
 
-    /// Returns the request for a scene as it is.
+    /// Returns the request for a scene that is examined. It is placed as for pictures, and keeps its own options.
     pub fn scene(&self, progress: Progress) -> LoadRequest {
         LoadRequest { scene: LoadOptions { progress, ..self.options_of_pictures() }, ..LoadRequest::rays(0) }
     }

@@ -261,7 +261,7 @@ impl Engine {
         Ok(loaded)
     }
 
-    /// Does what [`Engine::load`] does after reading, and returns the chosen methods beside.
+    /// Does what [`Engine::load`] does after reading. Returns the chosen methods, which the options do not have yet.
     ///
     /// # Errors
     /// Fails as [`Builder::build`] does, or if the device is lost.

@@ -1,7 +1,7 @@
 //! `kdray bench size`: build time and time per ray against the number of triangles.
 
 use kdray::{
-    accel::{AccelKind, Search},
+    accel::Search,
     bench::{
         rays::ray_sets,
         size::{KnotStage, RayGrowth, Report, Row},
@@ -62,11 +62,7 @@ pub fn run(args: &SizeArgs) -> Result<(), CliError> {
 /// Returns the user's acceleration structure. For a kd-tree, the traversal is the user's or the one that suits the
 /// processor.
 fn variant(args: &SizeArgs, processor: Processor) -> Search {
-    match args.accel {
-        AccelKind::KdTree => Search::KdTree(args.traversal.unwrap_or_else(|| traversal_by_rule(processor))),
-        AccelKind::Grid => Search::Grid,
-        AccelKind::Grid2 => Search::Grid2,
-    }
+    Search::of(args.accel, args.traversal.unwrap_or_else(|| traversal_by_rule(processor)))
 }
 
 fn measure(
