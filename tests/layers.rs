@@ -14,15 +14,16 @@ struct Row {
     exceptions: Vec<String>,
 }
 
-/// Returns the rows of the table "The folders", from the top.
-fn rows(architecture: &str) -> Vec<Row> {
+/// Returns the rows of a table of the section "The folders", from the top. `head`: the first cell of its head.
+fn rows(architecture: &str, head: &str) -> Vec<Row> {
     let section = architecture.split("\n## ").find(|section| section.starts_with("The folders\n"));
-    let table = section.expect("a section").lines().filter_map(|line| {
+    let lines =
+        section.expect("a section").lines().skip_while(|line| !line.starts_with(&format!("| {head} |"))).skip(2);
+    let table = lines.map_while(|line| {
         let cells: Vec<_> = line.strip_prefix('|')?.strip_suffix('|')?.split('|').collect();
-        let [folders, _, exceptions] = cells[..] else { return None };
-        Some(Row { folders: quoted(folders), exceptions: quoted(exceptions) })
+        Some(Row { folders: quoted(cells[0]), exceptions: cells.get(2).map(|cell| quoted(cell)).unwrap_or_default() })
     });
-    table.filter(|row| !row.folders.is_empty()).collect()
+    table.collect()
 }
 
 /// Returns the words between backticks.
@@ -36,11 +37,12 @@ fn code_of(text: &str) -> String {
     code.lines().map(|line| line.split("//").next().unwrap_or_default()).collect::<Vec<_>>().join("\n")
 }
 
-/// Returns the names of the crate's modules that the code uses: `name` of `crate::name` and of `crate::{name, ..}`.
-fn used(code: &str) -> BTreeSet<String> {
+/// Returns the modules below `prefix` that the code uses: for `crate::`, `name` of `crate::name` and of
+/// `crate::{name, ..}`.
+fn used(code: &str, prefix: &str) -> BTreeSet<String> {
     let name = |text: &str| text.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>();
     let mut names = BTreeSet::new();
-    for rest in code.split("crate::").skip(1) {
+    for rest in code.split(prefix).skip(1) {
         let Some(group) = rest.strip_prefix('{') else {
             names.insert(name(rest));
             continue;
@@ -62,6 +64,8 @@ fn used(code: &str) -> BTreeSet<String> {
             }
         }
     }
+    // Modules have small letters.
+    names.retain(|name| name.starts_with(char::is_lowercase));
     names
 }
 
@@ -77,41 +81,62 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
     files.into_iter().filter(is_source).chain(inner).collect()
 }
 
-/// Returns what the table does not allow of what a file uses. `file`: its path below `src`.
-fn violations(rows: &[Row], file: &str, code: &str) -> Vec<String> {
+/// Returns what a table does not allow of what a file uses. `file`: its path below the folder of `prefix`.
+fn violations(rows: &[Row], prefix: &str, file: &str, code: &str) -> Vec<String> {
     let places: BTreeMap<&str, usize> =
         rows.iter().enumerate().flat_map(|(ix, row)| row.folders.iter().map(move |name| (&name[..], ix))).collect();
-    // lib.rs and main.rs are above all.
+    // Files beside the folders, as lib.rs, are above all.
     let Some((folder, _)) = file.split_once('/') else { return Vec::new() };
     let Some(&place) = places.get(folder) else { return vec![format!("{file}: the table has no `{folder}`")] };
     let is_refused = |name: &&String| match places.get(&name[..]) {
         Some(&other) => other > place && !rows[place].exceptions.contains(name),
         None => true,
     };
-    used(code).iter().filter(is_refused).map(|name| format!("{file} uses `{name}`")).collect()
+    used(code, prefix).iter().filter(is_refused).map(|name| format!("{file} uses `{name}`")).collect()
 }
 
-fn table() -> Vec<Row> {
-    rows(&fs::read_to_string("docs/architecture.md").unwrap())
+/// Returns the table of the folders of `src`, or of the rooms of one of them.
+fn table(head: &str) -> Vec<Row> {
+    let rows = rows(&fs::read_to_string("docs/architecture.md").unwrap(), head);
+    assert!(rows.len() > 5 && rows.iter().all(|row| !row.folders.is_empty()), "{head}");
+    rows
+}
+
+/// Returns what the tables do not allow in a folder, and how many uses there are.
+fn checked(rows: &[Row], prefix: &str, folder: &str) -> (Vec<String>, usize) {
+    let (mut found, mut n_uses) = (Vec::new(), 0);
+    for path in sources(Path::new(folder)) {
+        let code = code_of(&fs::read_to_string(&path).unwrap());
+        let file = path.strip_prefix(folder).unwrap().to_str().unwrap().to_owned();
+        n_uses += used(&code, prefix).len();
+        found.extend(violations(rows, prefix, &file, &code));
+    }
+    (found, n_uses)
 }
 
 #[test]
 fn folders_use_only_what_the_table_allows() {
-    let (rows, mut found, mut n_uses) = (table(), Vec::new(), 0);
-    for path in sources(Path::new("src")) {
-        let code = code_of(&fs::read_to_string(&path).unwrap());
-        let file = path.strip_prefix("src").unwrap().to_str().unwrap().to_owned();
-        n_uses += used(&code).len();
-        found.extend(violations(&rows, &file, &code));
-    }
+    let (found, n_uses) = checked(&table("folder"), "crate::", "src");
     assert!(n_uses > 500, "{n_uses} uses were found");
     assert!(found.is_empty(), "{found:#?}");
 }
 
 #[test]
+fn rooms_of_scenes_use_only_those_above_them() {
+    let rows = table("room of `scene`");
+    let (found, n_uses) = checked(&rows, "scene::", "src/scene");
+    assert!(n_uses > 150, "{n_uses} uses were found");
+    assert!(found.is_empty(), "{found:#?}");
+    let of = |file: &str, code: &str| violations(&rows, "scene::", file, code);
+    let upward = "use crate::{\n    scene::{\n        files::store,\n        guess::standard,\n    },\n};";
+    assert_eq!(of("formats/x.rs", upward), ["formats/x.rs uses `guess`"]);
+    assert_eq!(of("model/x.rs", "use crate::scene::{files::store, model::Mesh};"), ["model/x.rs uses `files`"]);
+}
+
+#[test]
 fn forbidden_uses_are_found() {
-    let rows = table();
-    let of = |file: &str, code: &str| violations(&rows, file, &code_of(code));
+    let rows = table("folder");
+    let of = |file: &str, code: &str| violations(&rows, "crate::", file, &code_of(code));
     assert_eq!(of("gpu/x.rs", "use crate::scene::Scene;"), ["gpu/x.rs uses `scene`"]);
     assert_eq!(
         of("world/x.rs", "use crate::{\n    layout::{A, B},\n    reference::texture,\n};"),

@@ -1,5 +1,5 @@
 //! Makes a pack: one file with everything that a scene is read from. What a pack is, and how it is read, is in
-//! `src/scene/pack`.
+//! `src/scene/files/pack`.
 
 use std::{
     fs::File,

@@ -1,0 +1,396 @@
+//! A glTF file with its buffers: `.gltf`, JSON beside files of data, and `.glb`, one file with both.
+
+use std::{
+    borrow::Cow,
+    cell::RefCell,
+    fmt::Display,
+    ops::Range,
+    path::{Path, PathBuf},
+    rc::Rc,
+};
+
+use gltf::json::{self, Index, Root, image};
+use hashbrown::HashMap;
+
+use super::{
+    deform::MorphTargets,
+    glb::split,
+    meshopt,
+    uri::{Uri, is_data},
+};
+use crate::{
+    scene::{
+        files::{
+            outside::{Access, NamedFile},
+            read::read_bytes,
+            store::{self, require_for_bytes},
+        },
+        model::error::Checked,
+    },
+    util::{memory::require, progress::Progress, text::one_line},
+};
+
+/// Extensions that are read. A file that requires another one is refused, unless the other one changes only how
+/// surfaces look, such as `KHR_materials_…`.
+const SUPPORTED: [&str; 18] = [
+    "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
+    "EXT_texture_webp",
+    "KHR_lights_punctual",
+    "KHR_materials_clearcoat",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_materials_volume",
+    "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
+    "KHR_texture_transform",
+    "KHR_xmp_json_ld",
+    "MSFT_texture_dds",
+];
+
+/// Extensions that are not read, but change no picture of a file that does not require them.
+const WITHOUT_EFFECT: [&str; 6] = [
+    "KHR_animation_pointer",
+    "KHR_draco_mesh_compression",
+    "KHR_materials_variants",
+    "KHR_texture_basisu",
+    "KHR_xmp",
+    "MSFT_packing_normalRoughnessMetallic",
+];
+
+/// The extension of files whose triangles are compressed by Draco.
+const DRACO: &str = "KHR_draco_mesh_compression";
+
+/// Returns whether a file that requires an extension can be shown without it, though some surfaces look different.
+fn changes_only_looks(extension: &str) -> bool {
+    ["KHR_materials_", "KHR_texture_"].iter().any(|start| extension.starts_with(start))
+}
+
+/// A glTF file, its buffers, and what is not shown of it.
+pub(super) struct Document {
+    /// The JSON. No index in it is checked.
+    pub root: Root,
+    /// The morph targets of the meshes.
+    pub morph_targets: MorphTargets,
+    path: PathBuf,
+    access: Access,
+    buffers: Vec<Buffer>,
+    /// Contents of the files that buffers name.
+    files: RefCell<HashMap<PathBuf, Rc<Vec<u8>>>>,
+    /// Indices of the elements that sparse accessors replace, by the accessor's index.
+    replaced: RefCell<HashMap<usize, Rc<[u32]>>>,
+    /// Contents of the compressed buffer views, by the view's index.
+    decoded: HashMap<usize, Vec<u8>>,
+    notes: RefCell<Vec<(&'static str, Vec<String>)>>,
+    /// Who is told of the progress of loading.
+    pub progress: Progress,
+}
+
+/// A part of a file or of the data in a URI. Several buffers can share a file.
+#[derive(Default)]
+struct Buffer {
+    content: Rc<Vec<u8>>,
+    part: Range<usize>,
+}
+
+/// Where the bytes of an image are.
+#[derive(Clone, PartialEq, Eq, Hash)]
+pub(super) enum ImageSource {
+    /// They are in the URI of the image at this index.
+    Uri(usize),
+    File(PathBuf),
+    View(usize),
+}
+
+/// The part of a buffer that a buffer view shows.
+#[derive(Clone, Copy)]
+pub(super) struct View<'a> {
+    pub bytes: &'a [u8],
+    /// Distance of elements in bytes, if the view has one.
+    pub stride: Option<usize>,
+}
+
+impl Document {
+    /// Reads a glTF file from its content, and its buffers.
+    pub fn read(path: &Path, bytes: Vec<u8>, access: Access) -> Checked<Self> {
+        let (json, chunk) = split(&bytes)?;
+        let json = &bytes[json];
+        let root = json::deserialize::from_slice(json);
+        let root: Root = root.map_err(|error| version_error(json).unwrap_or_else(|| format!("the JSON: {error}")))?;
+        let path = path.to_owned();
+        let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
+        let morph_targets = match primitives.flat_map(|primitive| &primitive.targets).next() {
+            Some(_) => json::deserialize::from_slice(json).map_err(|error| format!("the JSON: {error}"))?,
+            None => MorphTargets::default(),
+        };
+        let (buffers, files, replaced) = (Vec::new(), RefCell::default(), RefCell::default());
+        let (decoded, notes, progress) = (HashMap::new(), RefCell::default(), Progress::default());
+        let mut document =
+            Self { root, morph_targets, path, access, buffers, files, replaced, decoded, notes, progress };
+        document.check_version()?;
+        document.check_extensions()?;
+        let chunk = chunk.map(|part| Buffer { content: Rc::new(bytes), part });
+        for ix in 0..document.root.buffers.len() {
+            let buffer = document.buffer(ix, chunk.as_ref()).map_err(|what| format!("buffers[{ix}]: {what}"))?;
+            document.buffers.push(buffer);
+        }
+        document.decode_views()?;
+        Ok(document)
+    }
+
+    fn check_version(&self) -> Checked<()> {
+        let asset = &self.root.asset;
+        match asset.min_version.as_ref().unwrap_or(&asset.version) {
+            version if version.starts_with("2.") => Ok(()),
+            version => Err(refused_version(version)),
+        }
+    }
+
+    fn check_extensions(&self) -> Checked<()> {
+        let is_needed = |name: &&String| !SUPPORTED.contains(&name.as_str()) && !changes_only_looks(name);
+        let refused: Vec<_> = self.root.extensions_required.iter().filter(is_needed).collect();
+        if !refused.is_empty() {
+            let names: Vec<_> = refused.iter().map(|name| format!("`{name}`")).collect();
+            let remedy = match refused.iter().any(|name| *name == DRACO) {
+                true => ": its triangles are compressed by Draco. Blender, for example, reads it and saves it without",
+                false => "",
+            };
+            return Err(format!("extensionsRequired: the file needs {}, which is not read{remedy}", names.join(", ")));
+        }
+        let is_known = |name: &str| SUPPORTED.contains(&name) || WITHOUT_EFFECT.contains(&name);
+        for name in self.root.extensions_used.iter().filter(|name| !is_known(name)) {
+            self.note("extensions that are not read, so the picture may differ", name);
+        }
+        Ok(())
+    }
+
+    /// Returns the content of a buffer. Buffers that only stand in for compressed views are empty.
+    fn buffer(&self, ix: usize, chunk: Option<&Buffer>) -> Checked<Buffer> {
+        let buffer = &self.root.buffers[ix];
+        let extensions = buffer.extensions.as_ref();
+        if extensions.is_some_and(|extensions| meshopt::is_fallback(&extensions.others)) {
+            return Ok(Buffer::default());
+        }
+        let Buffer { content, part } = match (&buffer.uri, chunk) {
+            (Some(uri), _) => self.fetch(uri).map(|content| Buffer { part: 0..content.len(), content })?,
+            (None, Some(chunk)) if ix == 0 => Buffer { content: chunk.content.clone(), part: chunk.part.clone() },
+            (None, _) => return Err("has no uri, and there is no binary chunk for it".to_owned()),
+        };
+        let n_bytes = buffer.byte_length.0;
+        if (part.len() as u64) < n_bytes {
+            return Err(format!("has {} bytes, but byteLength = {n_bytes}", part.len()));
+        }
+        Ok(Buffer { content, part: part.start..part.start + n_bytes as usize })
+    }
+
+    /// Decodes the compressed buffer views.
+    fn decode_views(&mut self) -> Checked<()> {
+        let mut n_total = 0;
+        for (ix, view) in self.root.buffer_views.iter().enumerate() {
+            let Some(packed) = view.extensions.as_ref().and_then(|it| meshopt::packed(&it.others)) else { continue };
+            let failed = |what: String| format!("bufferViews[{ix}].extensions: meshopt_compression: {what}");
+            let packed = packed.map_err(failed)?;
+            n_total = packed.n_bytes().map_err(failed)?.saturating_add(n_total);
+            require("decoding the buffer views", n_total).map_err(|error| failed(error.to_string()))?;
+            let buffer = item(&self.buffers, "buffers", packed.buffer, &"buffer").map_err(failed)?;
+            let bytes = part(buffer.bytes(), packed.byte_offset, packed.byte_length).map_err(failed)?;
+            self.decoded.insert(ix, packed.decode(bytes).map_err(failed)?);
+        }
+        Ok(())
+    }
+
+    /// Returns what a buffer's URI stands for. A file that several buffers name is read once.
+    fn fetch(&self, uri: &str) -> Checked<Rc<Vec<u8>>> {
+        let name = match Uri::new(uri)? {
+            Uri::Data(bytes) => return Ok(Rc::new(bytes)),
+            Uri::File(name) => name,
+        };
+        let path = self.named(&name)?;
+        if let Some(content) = self.files.borrow().get(&path) {
+            return Ok(content.clone());
+        }
+        require_for_bytes(&path)?;
+        let content = Rc::new(read_bytes(&path).map_err(|error| error.to_string())?);
+        self.files.borrow_mut().insert(path, content.clone());
+        Ok(content)
+    }
+
+    /// Returns the path of a file that the document names. Notes a name whose case is that of no file.
+    fn named(&self, name: &str) -> Checked<PathBuf> {
+        let NamedFile { path, is_other_case } = self.access.beside(&self.path).exact_or_alike(name)?;
+        if is_other_case {
+            let taken = format!("`{name}` ({} is taken)", path.display());
+            self.note("names of files that differ from those on disk in the case of letters", taken);
+        }
+        Ok(path)
+    }
+
+    /// Returns the indices of the elements that the sparse accessor at an index replaces. `read` reads them at the
+    /// first call.
+    pub fn replaced(&self, accessor_ix: usize, read: impl FnOnce() -> Checked<Rc<[u32]>>) -> Checked<Rc<[u32]>> {
+        if let Some(known) = self.replaced.borrow().get(&accessor_ix) {
+            return Ok(known.clone());
+        }
+        let replaced = read()?;
+        self.replaced.borrow_mut().insert(accessor_ix, replaced.clone());
+        Ok(replaced)
+    }
+
+    /// Returns where the bytes of an image are. `from` is the JSON path that names the image.
+    pub fn image_source(&self, index: Index<image::Image>, from: &dyn Display) -> Checked<ImageSource> {
+        let image = item(&self.root.images, "images", index.value(), from)?;
+        let failed = |what: String| format!("images[{index}]: {what}");
+        match (&image.uri, image.buffer_view) {
+            (Some(uri), _) if is_data(uri) => Ok(ImageSource::Uri(index.value())),
+            (Some(uri), _) => match Uri::new(uri).map_err(failed)? {
+                Uri::Data(_) => unreachable!("data is another source"),
+                Uri::File(name) => self.named(&name).map(ImageSource::File).map_err(failed),
+            },
+            (None, Some(view)) => Ok(ImageSource::View(view.value())),
+            (None, None) => Err(failed("has neither uri nor bufferView".to_owned())),
+        }
+    }
+
+    /// Returns the bytes of the image at an index, or `None` with a note if its file cannot be read.
+    pub fn image(&self, ix: usize, source: &ImageSource) -> Checked<Option<Cow<'_, [u8]>>> {
+        let place = format!("images[{ix}]");
+        match source {
+            ImageSource::Uri(ix) => match Uri::new(self.root.images[*ix].uri.as_deref().unwrap_or_default()) {
+                Ok(Uri::Data(bytes)) => Ok(Some(bytes.into())),
+                Ok(Uri::File(_)) => unreachable!("files are another source"),
+                Err(what) => Err(format!("{place}: {what}")),
+            },
+            ImageSource::View(view) => Ok(Some(self.view(Index::new(*view as u32), &place)?.bytes.into())),
+            ImageSource::File(path) => {
+                require_for_bytes(path).map_err(|what| format!("{place}: {what}"))?;
+                match read_bytes(path) {
+                    Ok(bytes) => Ok(Some(bytes.into())),
+                    Err(_) if !store::exists(path) => {
+                        self.note("image files that do not exist, without which materials are shown", path.display());
+                        Ok(None)
+                    }
+                    Err(error) => {
+                        self.note("images that cannot be read, without which materials are shown", error);
+                        Ok(None)
+                    }
+                }
+            }
+        }
+    }
+
+    /// Returns the part of a buffer that a view shows. `from` is the JSON path that names the view.
+    pub fn view(&self, index: Index<json::buffer::View>, from: &dyn Display) -> Checked<View<'_>> {
+        let ix = index.value();
+        let view = item(&self.root.buffer_views, "bufferViews", ix, from)?;
+        let stride = view.byte_stride.map(|stride| stride.0);
+        if let Some(bytes) = self.decoded.get(&ix) {
+            return Ok(View { bytes, stride });
+        }
+        let place = format!("bufferViews[{ix}]");
+        let buffer = item(&self.buffers, "buffers", view.buffer.value(), &place)?;
+        let offset = view.byte_offset.unwrap_or_default().0;
+        let bytes = part(buffer.bytes(), offset, view.byte_length.0).map_err(|what| format!("{place}: {what}"))?;
+        Ok(View { bytes, stride })
+    }
+
+    /// Remembers that something is not shown. `kind` begins the warning, in which things of one kind are listed.
+    pub fn note(&self, kind: &'static str, what: impl Display) {
+        let mut notes = self.notes.borrow_mut();
+        match notes.iter_mut().find(|(other, _)| *other == kind) {
+            Some((_, list)) => list.push(what.to_string()),
+            None => notes.push((kind, vec![what.to_string()])),
+        }
+    }
+
+    /// Returns a warning for each kind of thing that is not shown.
+    pub fn warnings(&self, path: &Path) -> Vec<String> {
+        const MAX_LISTED: usize = 8;
+        let warning = |(kind, list): (&'static str, Vec<String>)| {
+            let mut listed = list[..list.len().min(MAX_LISTED)].join(", ");
+            if list.len() > MAX_LISTED {
+                listed += &format!(" and {} more", list.len() - MAX_LISTED);
+            }
+            format!("{}: {kind}: {}", path.display(), one_line(&listed))
+        };
+        self.notes.take().into_iter().map(warning).collect()
+    }
+}
+
+/// Returns what is wrong with JSON that is no glTF 2, if it is that of another version.
+fn version_error(json: &[u8]) -> Option<String> {
+    let root: json::Value = json::deserialize::from_slice(json).ok()?;
+    let version = root.get("asset")?.get("version")?.as_str()?;
+    (!version.starts_with("2.")).then(|| refused_version(version))
+}
+
+fn refused_version(version: &str) -> String {
+    format!("asset: this is glTF {version}, and only glTF 2 is read")
+}
+
+impl Buffer {
+    fn bytes(&self) -> &[u8] {
+        &self.content[self.part.clone()]
+    }
+}
+
+/// Returns an item of one of the document's lists, or an error that names the JSON path `from`.
+pub(super) fn item<'a, T>(list: &'a [T], name: &str, ix: usize, from: &dyn Display) -> Checked<&'a T> {
+    list.get(ix).ok_or_else(|| format!("{from}: there is no {name}[{ix}], but only {}", list.len()))
+}
+
+/// Returns a part of some bytes, or an error if they end before it does.
+pub(super) fn part(bytes: &[u8], offset: u64, n_bytes: u64) -> Checked<&[u8]> {
+    let end = offset.checked_add(n_bytes).filter(|end| *end <= bytes.len() as u64);
+    match end {
+        Some(end) => Ok(&bytes[offset as usize..end as usize]),
+        None => Err(format!("{n_bytes} bytes from byte {offset} on reach beyond the {} that there are", bytes.len())),
+    }
+}
+
+/// Returns the names of the files that a glTF file names: its buffers and images. What cannot be read names nothing.
+pub(crate) fn named_files(path: &Path, bytes: &[u8], access: Access) -> Vec<PathBuf> {
+    let json = split(bytes).map(|(json, _)| &bytes[json]).unwrap_or_default();
+    let root: json::Value = json::deserialize::from_slice(json).unwrap_or_default();
+    let items = ["buffers", "images"].into_iter().filter_map(|list| root.get(list)?.as_array()).flatten();
+    let uris = items.filter_map(|item| item.get("uri")?.as_str());
+    uris.filter_map(|uri| match Uri::new(uri) {
+        Ok(Uri::File(name)) => access.beside(path).exact_or_alike(&name).ok().map(|file| file.path),
+        _ => None,
+    })
+    .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    #[test]
+    fn a_file_of_several_buffers_is_read_once() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("a b.bin"), [7; 12]).unwrap();
+        let buffers = r#"[{ "uri": "a%20b.bin", "byteLength": 4 }, { "uri": "./a b.bin", "byteLength": 12 }]"#;
+        let json = format!(r#"{{ "asset": {{ "version": "2.0" }}, "buffers": {buffers} }}"#);
+        let path = folder.path().join("m.gltf");
+        let document = Document::read(&path, json.into_bytes(), Access::default()).unwrap();
+        let [a, b] = &document.buffers[..] else { panic!("two buffers") };
+        assert!(Rc::ptr_eq(&a.content, &b.content));
+        assert_eq!((a.bytes(), b.bytes()), (&[7; 4][..], &[7; 12][..]));
+    }
+
+    #[test]
+    fn the_indices_of_a_sparse_accessor_are_read_once() {
+        let json = br#"{ "asset": { "version": "2.0" } }"#;
+        let document = Document::read(Path::new("m.gltf"), json.to_vec(), Access::default()).unwrap();
+        let first = document.replaced(3, || Ok([1, 5].into())).unwrap();
+        let again = document.replaced(3, || Err("it is known".to_owned())).unwrap();
+        assert!(Rc::ptr_eq(&first, &again));
+        assert!(document.replaced(4, || Err("it is not known".to_owned())).is_err());
+    }
+}

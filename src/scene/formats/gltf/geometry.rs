@@ -1,0 +1,301 @@
+//! Meshes from primitives: triangles, strips and fans with their attributes.
+
+use glam::{Vec2, Vec3, Vec4};
+use gltf::{
+    Semantic,
+    json::{
+        Index,
+        accessor::Type,
+        mesh::{Mode, Primitive},
+        validation::Checked::Valid,
+    },
+};
+use rayon::prelude::*;
+
+use super::{
+    accessor::Accessor,
+    deform::{Added, Morph, Skin, Skinning, TargetAttributes},
+    document::Document,
+};
+use crate::scene::{
+    meshes::needs::{self, MeshSize, require_for_mesh},
+    model::{Mesh, error::Checked},
+};
+
+/// How the vertices of a mesh move away from the places that the file gives.
+#[derive(Clone, Copy)]
+pub(super) struct Pose<'a> {
+    /// Weights of the morph targets; missing ones are 0.
+    pub weights: &'a [f32],
+    pub skin: Option<&'a Skin>,
+    /// Whether the order of the faces' corners is reversed.
+    pub is_turned: bool,
+}
+
+/// The vertices of a primitive that its faces use.
+struct Vertices {
+    positions: Vec<Vec3>,
+    /// Unit normals, or zero; empty if the file has none.
+    normals: Vec<Vec3>,
+    /// Empty if the file has none.
+    tangents: Vec<Vec4>,
+}
+
+/// A primitive of a mesh.
+pub(super) struct Part<'a> {
+    pub primitive: &'a Primitive,
+    /// Its morph targets.
+    pub targets: &'a [TargetAttributes],
+    /// Its JSON path.
+    pub path: String,
+    /// The slot of its faces.
+    pub slot: u32,
+    /// What the faces of the whole mesh have.
+    pub whole: needs::Attributes,
+}
+
+/// Returns the attributes that some primitive of a mesh has.
+pub(super) fn attributes_of(primitives: &[Primitive]) -> needs::Attributes {
+    let some_has = |semantic| {
+        let semantic = Valid(semantic);
+        primitives.iter().any(|primitive| primitive.attributes.contains_key(&semantic))
+    };
+    needs::Attributes {
+        n_uv_sets: [0, 1].into_iter().filter(|set| some_has(Semantic::TexCoords(*set))).count() as u64,
+        has_colours: some_has(Semantic::Colors(0)),
+        has_tangents: some_has(Semantic::Tangents),
+    }
+}
+
+/// Returns the mesh of a primitive, or `None` for points and lines. `n_read` is the number of triangles that have been
+/// read already, and those of the primitive are added. The faces without area that join strips count: they are in no
+/// mesh, but a short file can state any number of them.
+pub(super) fn mesh(document: &Document, part: &Part, pose: Pose, n_read: &mut u64) -> Checked<Option<Mesh>> {
+    let &Part { primitive, targets, ref path, slot, .. } = part;
+    let mode = match primitive.mode {
+        Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) => mode,
+        Valid(_) => {
+            document.note("points and lines, which are not shown", path);
+            return Ok(None);
+        }
+        _ => return Err(format!("{path}: its mode is none of 0 to 6")),
+    };
+    let attributes = Attributes { document, primitive, targets, path };
+    let positions = attributes.find(Semantic::Positions, &[Type::Vec3], None)?;
+    let Some(positions) = positions else { return Err(format!("{path}.attributes: there is no POSITION")) };
+    let mut faces = attributes.faces(mode, positions.n, (part.whole, n_read))?;
+    let used = renumber(&mut faces);
+    let skin = pose.skin.map(|skin| skin.of(&attributes, positions.n)).transpose()?;
+    let vertices = attributes.vertices(&positions, &used, pose.weights, skin.as_ref())?;
+    if pose.is_turned {
+        faces.iter_mut().for_each(|face| face.swap(1, 2));
+    }
+    let mut mesh = Mesh { slots: vec![slot; faces.len()], ..Mesh::default() };
+    // Tangents without normals are ignored, as the specification says.
+    mesh.normals = corners(&faces, &vertices.normals).unwrap_or_else(|| vec![[Vec3::ZERO; 3]; faces.len()]);
+    mesh.tangents = corners(&faces, &vertices.tangents).unwrap_or_default();
+    for (set, uvs) in mesh.uvs.iter_mut().enumerate() {
+        let semantic = Semantic::TexCoords(set as u32);
+        let added = Added::new(&attributes, &semantic, &[Type::Vec2], (pose.weights, positions.n))?;
+        let Some(found) = attributes.find(semantic, &[Type::Vec2], Some(positions.n))? else { continue };
+        let found = read(&used, |ix| added.to(ix, found.numbers(ix, 0.0)?).map(Vec2::from_array))?;
+        *uvs = corners(&faces, &found).unwrap_or_default();
+    }
+    let (semantic, types) = (Semantic::Colors(0), [Type::Vec3, Type::Vec4]);
+    let added = Added::new(&attributes, &semantic, &types, (pose.weights, positions.n))?;
+    if let Some(found) = attributes.find(semantic, &types, Some(positions.n))? {
+        let found = read(&used, |ix| added.to_colour(ix, found.numbers(ix, 1.0)?).map(Vec4::from_array))?;
+        mesh.colours = corners(&faces, &found).unwrap_or_default();
+    }
+    (mesh.positions, mesh.faces) = (vertices.positions, faces);
+    Ok(Some(mesh))
+}
+
+/// The attributes of a primitive.
+pub(super) struct Attributes<'a> {
+    pub document: &'a Document,
+    pub primitive: &'a Primitive,
+    /// Morph targets of the primitive.
+    pub targets: &'a [TargetAttributes],
+    /// JSON path of the primitive.
+    pub path: &'a str,
+}
+
+impl<'a> Attributes<'a> {
+    /// Returns an attribute, if the primitive has it. `n`: the number of elements that it must have.
+    pub fn find(&self, semantic: Semantic, types: &[Type], n: Option<usize>) -> Checked<Option<Accessor<'a>>> {
+        let name = semantic.to_string();
+        let Some(index) = self.primitive.attributes.get(&Valid(semantic)) else { return Ok(None) };
+        self.accessor(*index, types, n, format!("{}.attributes.{name}", self.path)).map(Some)
+    }
+
+    /// Returns an accessor that has an element for each of `n` vertices.
+    pub fn accessor(
+        &self,
+        index: Index<gltf::json::Accessor>,
+        types: &[Type],
+        n: Option<usize>,
+        path: String,
+    ) -> Checked<Accessor<'a>> {
+        let accessor = Accessor::new(self.document, index, types, path)?;
+        match n {
+            Some(n) if accessor.n != n => {
+                Err(format!("{}: has {} elements, but there are {n} vertices", accessor.path, accessor.n))
+            }
+            _ => Ok(accessor),
+        }
+    }
+
+    /// Returns the faces as indices of vertices. `whole`: what the faces of the mesh have. `n_read`: see [`mesh`].
+    fn faces(
+        &self,
+        mode: Mode,
+        n_vertices: usize,
+        (whole, n_read): (needs::Attributes, &mut u64),
+    ) -> Checked<Vec<[u32; 3]>> {
+        let path = format!("{}.indices", self.path);
+        let indices = self.primitive.indices.map(|index| Accessor::new(self.document, index, &[Type::Scalar], path));
+        let indices = indices.transpose()?;
+        let n = indices.as_ref().map_or(n_vertices, |indices| indices.n);
+        let n_faces = if mode == Mode::Triangles { n / 3 } else { n.saturating_sub(2) };
+        let n_points = n_vertices.min(3 * n_faces) as u64;
+        require_for_mesh(*n_read, &MeshSize { n_triangles: n_faces as u64, n_points, attributes: whole })?;
+        *n_read = n_read.saturating_add(n_faces as u64);
+        let vertex = |at: usize| {
+            let Some(indices) = &indices else { return Ok(at as u32) };
+            let [ix] = indices.integers(at);
+            if (ix as usize) < n_vertices {
+                Ok(ix)
+            } else {
+                Err(format!("{}: element {at} is {ix}, but there are {n_vertices} vertices", indices.path))
+            }
+        };
+        let face = |ix: usize| -> Checked<[u32; 3]> {
+            let [a, b, c] = match mode {
+                Mode::TriangleStrip => [ix, ix + 1 + ix % 2, ix + 2 - ix % 2],
+                Mode::TriangleFan => [ix + 1, ix + 2, 0],
+                _ => [3 * ix, 3 * ix + 1, 3 * ix + 2],
+            };
+            Ok([vertex(a)?, vertex(b)?, vertex(c)?])
+        };
+        // Strips are joined by faces without area.
+        let is_stitch = |&[a, b, c]: &[u32; 3]| mode == Mode::TriangleStrip && (a == b || b == c || c == a);
+        (0..n_faces).map(face).filter(|face| !face.as_ref().is_ok_and(is_stitch)).collect()
+    }
+
+    /// Reads positions, normals and tangents in their pose. `used` are the indices of the vertices.
+    fn vertices(
+        &self,
+        positions: &Accessor,
+        used: &[u32],
+        weights: &[f32],
+        skin: Option<&Skinning>,
+    ) -> Checked<Vertices> {
+        let normals = self.find(Semantic::Normals, &[Type::Vec3], Some(positions.n))?;
+        let tangents = match &normals {
+            Some(_) => self.find(Semantic::Tangents, &[Type::Vec4], Some(positions.n))?,
+            None => None,
+        };
+        let mut vertices = Vertices {
+            positions: read(used, |ix| Ok(Vec3::from_array(positions.numbers(ix, 0.0)?)))?,
+            normals: Vec::new(),
+            tangents: Vec::new(),
+        };
+        if let Some(normals) = normals {
+            vertices.normals = read(used, |ix| Ok(Vec3::from_array(normals.numbers(ix, 0.0)?).normalize_or_zero()))?;
+        }
+        if let Some(tangents) = tangents {
+            vertices.tangents = read(used, |ix| Ok(unit_tangent(Vec4::from_array(tangents.numbers(ix, 0.0)?))))?;
+        }
+        if let Some(morph) = Morph::new(self, weights, positions.n)? {
+            vertices.change(used, |ix, vertex| morph.apply(ix, vertex))?;
+        }
+        if let Some(skin) = skin {
+            vertices.change(used, |ix, vertex| skin.apply(ix, vertex))?;
+            // The cross product of reflected vectors is the reverse of their reflected cross product.
+            for (tangent, ix) in vertices.tangents.iter_mut().zip(used) {
+                tangent.w = if skin.mirrors(*ix as usize)? { -tangent.w } else { tangent.w };
+            }
+        }
+        Ok(vertices)
+    }
+}
+
+impl Vertices {
+    /// Changes each vertex by a function that gets its index.
+    fn change(&mut self, used: &[u32], change: impl Fn(usize, [Vec3; 3]) -> Checked<[Vec3; 3]>) -> Checked<()> {
+        for (at, ix) in used.iter().enumerate() {
+            let normal = self.normals.get(at).copied().unwrap_or_default();
+            let tangent = self.tangents.get(at).copied().unwrap_or_default();
+            let [position, normal, along] = change(*ix as usize, [self.positions[at], normal, tangent.truncate()])?;
+            self.positions[at] = position;
+            if let Some(changed) = self.normals.get_mut(at) {
+                *changed = normal.normalize_or_zero();
+            }
+            if let Some(changed) = self.tangents.get_mut(at) {
+                *changed = unit_tangent(along.extend(tangent.w));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Returns a tangent of unit length whose w is 1 or -1, or zero if the tangent has no direction.
+fn unit_tangent(tangent: Vec4) -> Vec4 {
+    match tangent.truncate().try_normalize() {
+        Some(along) => along.extend(if tangent.w < 0.0 { -1.0 } else { 1.0 }),
+        None => Vec4::ZERO,
+    }
+}
+
+fn read<T>(used: &[u32], read: impl Fn(usize) -> Checked<T>) -> Checked<Vec<T>> {
+    used.iter().map(|ix| read(*ix as usize)).collect()
+}
+
+/// Returns the values at the corners of faces, or `None` without values.
+fn corners<T: Copy>(faces: &[[u32; 3]], values: &[T]) -> Option<Vec<[T; 3]>> {
+    (!values.is_empty()).then(|| faces.iter().map(|face| face.map(|ix| values[ix as usize])).collect())
+}
+
+/// Renumbers the vertices of faces so that none is left out. Returns the former index of each, ascending.
+fn renumber(faces: &mut [[u32; 3]]) -> Vec<u32> {
+    let mut used = faces.as_flattened().to_vec();
+    used.par_sort_unstable();
+    used.dedup();
+    let is_whole = used.last().is_none_or(|last| *last as usize + 1 == used.len());
+    if !is_whole {
+        faces.as_flattened_mut().par_iter_mut().for_each(|ix| {
+            *ix = used.binary_search(ix).expect("all vertices are listed") as u32;
+        });
+    }
+    used
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::scene::files::outside::Access;
+
+    /// The strip's indices take no bytes in the file, and none of its faces has an area.
+    #[test]
+    fn faces_that_join_strips_count() {
+        let json = br#"{ "asset": { "version": "2.0" }, "accessors": [
+            { "componentType": 5126, "count": 3, "type": "VEC3" },
+            { "componentType": 5125, "count": 1000, "type": "SCALAR" }
+        ], "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 }, "indices": 1, "mode": 5 }] }] }"#;
+        let document = Document::read(Path::new("x.gltf"), json.to_vec(), Access::default()).unwrap();
+        let primitive = &document.root.meshes[0].primitives[0];
+        let part = Part { primitive, targets: &[], path: String::new(), slot: 0, whole: Default::default() };
+        let mut n_read = 5;
+        for n in [1003, 2001] {
+            let found = mesh(&document, &part, Pose { weights: &[], skin: None, is_turned: false }, &mut n_read)
+                .unwrap()
+                .unwrap();
+            assert_eq!((found.faces.len(), n_read), (0, n));
+        }
+        n_read = u64::MAX;
+        assert!(mesh(&document, &part, Pose { weights: &[], skin: None, is_turned: false }, &mut n_read).is_err());
+    }
+}

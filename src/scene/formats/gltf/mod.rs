@@ -1,0 +1,356 @@
+//! glTF 2.0: `.gltf` and `.glb`.
+//!
+//! A glTF mesh becomes a mesh, each of its primitives one slot of it. A node with a mesh becomes an instance. Skins and
+//! morph targets are shown in the pose that the file gives; their vertices are moved here, so that such a mesh has a
+//! copy for each pose. Animations, points and lines are not shown.
+//!
+//! The crate `gltf` parses the JSON. All indices, sizes and offsets are checked here, since its own readers panic on
+//! files that are wrong. Errors name the JSON path.
+
+mod accessor;
+mod camera_start;
+mod cameras;
+mod deform;
+mod document;
+mod geometry;
+mod glb;
+mod glossiness;
+mod instancing;
+mod lights;
+mod materials;
+mod meshopt;
+mod nodes;
+mod textures;
+mod uri;
+
+use std::path::Path;
+
+use glam::{DVec3, Vec3};
+use gltf::json::{Node, mesh::Primitive};
+use hashbrown::{HashMap, HashSet};
+
+pub(crate) use self::document::named_files;
+use self::{
+    deform::Skin,
+    document::{Document, item},
+    geometry::{Part, Pose},
+    instancing::Places,
+    materials::Materials,
+    nodes::Nodes,
+};
+use super::image::MAX_PIXELS;
+use crate::{
+    scene::{
+        files::outside::Access,
+        meshes::{
+            coincident,
+            needs::{MeshSize, require_for_mesh},
+        },
+        model::{
+            Camera, Instance, Light, LoadOptions, MaterialChoice, Mesh, Scene, SceneError, Transform, Up,
+            error::Checked,
+            extent::{self, MeshOrigin},
+            lacks::{Lacks, SAMPLES},
+        },
+    },
+    util::{
+        progress::{Meter, Work},
+        text::one_line,
+    },
+};
+
+/// Loads a glTF file as a scene with its lights and cameras.
+pub(crate) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<(Scene, Lacks), SceneError> {
+    let failed = |what: String| SceneError::file(path, what);
+    let document = read(path, bytes, options)?;
+    let nodes = Nodes::new(&document, options.scene.as_deref()).map_err(failed)?;
+    let replaced = &options.look.materials[..];
+    let mut scene =
+        Loader::new(&document, &nodes, LoadedBefore::default(), Some(replaced)).load(path).map_err(failed)?;
+    if options.recentre {
+        extent::recentre(path, &mut scene);
+    }
+    let bounds = scene.bounds();
+    extent::check(path, bounds)?;
+    scene.lights = lights::lights(&document, &nodes, scene.origin).map_err(failed)?;
+    scene.cameras = cameras::cameras(&document, &nodes, (bounds, scene.origin)).map_err(failed)?;
+    let first = camera_that_sees(path, &scene, (bounds, options));
+    let lacks_camera = first.is_none();
+    scene.camera = first.unwrap_or(scene.camera);
+    // The light of emissive surfaces does not reach others. Some exporters write lights of intensity 0.
+    let lacks_light = scene.lights.iter().all(Light::is_black);
+    scene.defaults.is_metered = !lacks_light;
+    scene.defaults.samples = SAMPLES;
+    document.warnings(path).iter().for_each(|warning| tracing::warn!("{warning}"));
+    let lacks = Lacks {
+        camera: lacks_camera,
+        up: Up::Y,
+        description: true,
+        light: lacks_light,
+        background: lacks_light,
+        integrator: true,
+        exposure: true,
+    };
+    Ok((scene, lacks))
+}
+
+/// Returns the first camera whose picture can show something of the scene. A note tells of cameras before it.
+fn camera_that_sees(path: &Path, scene: &Scene, (bounds, options): ((Vec3, Vec3), &LoadOptions)) -> Option<Camera> {
+    let aspect = options.aspect.unwrap_or(scene.defaults.width as f32 / scene.defaults.height as f32);
+    let ix = scene.cameras.iter().position(|(_, camera)| camera.may_see(bounds, aspect));
+    if let (Some((name, _)), None | Some(1..)) = (scene.cameras.first(), ix) {
+        let (path, name) = (path.display(), one_line(name));
+        let taken =
+            ix.map_or("one is chosen".to_owned(), |ix| format!("`{}` is taken", one_line(&scene.cameras[ix].0)));
+        tracing::info!("{path}: the first camera, `{name}`, sees nothing of the scene: {taken}; --camera 0 keeps it");
+    }
+    ix.map(|ix| scene.cameras[ix].1)
+}
+
+/// What a scene has before a glTF file is loaded.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct LoadedBefore {
+    pub n_triangles: u64,
+    /// Number of pixels of all images.
+    pub n_pixels: u64,
+}
+
+impl LoadedBefore {
+    /// Whether the images of a scene are too many beside those that there are.
+    pub fn exceeds(&self, scene: &Scene) -> bool {
+        let n_pixels =
+            scene.images.iter().map(|image| image.pixels.len() as u64).fold(self.n_pixels, u64::saturating_add);
+        self.n_pixels > 0 && n_pixels > MAX_PIXELS
+    }
+}
+
+/// The meshes of a glTF file.
+pub(crate) struct Model {
+    /// Instances, materials and images, without lights and cameras.
+    pub scene: Scene,
+    /// What the user has to be told of the file.
+    pub warnings: Vec<String>,
+}
+
+/// Loads the meshes of a scene of a glTF file with their materials and images, without its lights and cameras. If
+/// `has_materials` is false, the materials and images are left out, and the instances' materials have no meaning.
+/// `options` name the scene.
+pub(crate) fn load_meshes(
+    path: &Path,
+    bytes: Vec<u8>,
+    options: &LoadOptions,
+    has_materials: bool,
+    before: LoadedBefore,
+) -> Result<Model, SceneError> {
+    let failed = |what: String| SceneError::file(path, what);
+    let document = read(path, bytes, options)?;
+    let nodes = Nodes::new(&document, options.scene.as_deref()).map_err(failed)?;
+    let replaced = has_materials.then_some(&options.look.materials[..]);
+    let scene = Loader::new(&document, &nodes, before, replaced).load(path).map_err(failed)?;
+    Ok(Model { scene, warnings: document.warnings(path) })
+}
+
+fn read(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<Document, SceneError> {
+    let mut document = Document::read(path, bytes, Access::of(options)).map_err(|what| SceneError::file(path, what))?;
+    document.progress = options.progress.clone();
+    for ix in 0..document.root.animations.len() {
+        let name = document.root.animations[ix].name.clone();
+        document.note("animations, which are not shown", name.unwrap_or_else(|| format!("animations[{ix}]")));
+    }
+    Ok(document)
+}
+
+/// What makes two instances share a mesh: the mesh's index, the skin's, whether its faces are turned, and the bits of
+/// the weights of morph targets.
+type MeshKey = (usize, Option<usize>, bool, Vec<u32>);
+
+/// A mesh that has been made.
+#[derive(Clone)]
+struct Known {
+    mesh_ix: usize,
+    materials: Vec<u32>,
+    /// The point of world space that is the origin of a mesh with a skin.
+    origin: DVec3,
+}
+
+/// Loads the meshes of a scene's nodes.
+struct Loader<'a> {
+    document: &'a Document,
+    nodes: &'a Nodes,
+    before: LoadedBefore,
+    /// Number of triangles of the meshes so far, and of those that were loaded before, with the faces without area that
+    /// join strips.
+    n_read: u64,
+    has_materials: bool,
+    materials: Materials<'a>,
+    meshes: Vec<Mesh>,
+    /// `None` for meshes without triangles.
+    known: HashMap<MeshKey, Option<Known>>,
+}
+
+impl<'a> Loader<'a> {
+    /// `replaced`: which materials are replaced, or `None` to read none of them.
+    fn new(
+        document: &'a Document,
+        nodes: &'a Nodes,
+        before: LoadedBefore,
+        replaced: Option<&'a [MaterialChoice]>,
+    ) -> Self {
+        let has_materials = replaced.is_some();
+        let materials = Materials::new(document, replaced.unwrap_or_default());
+        let (meshes, known, n_read) = (Vec::new(), HashMap::new(), before.n_triangles);
+        Self { document, nodes, before, n_read, has_materials, materials, meshes, known }
+    }
+
+    fn load(mut self, path: &Path) -> Checked<Scene> {
+        let mut scene = Scene::empty(path);
+        let mut n_placed = self.before.n_triangles;
+        let meter = self.document.progress.begin(Work::Reading, self.n_primitives());
+        for &ix in &self.nodes.shown {
+            let Some(instance) = self.instance(ix, &meter)? else { continue };
+            let mesh = &self.meshes[instance.mesh_ix];
+            let places = instancing::places(self.document, ix)?;
+            let n_faces = (mesh.faces.len() as u64).saturating_mul(places.as_ref().map_or(1, |places| places.n as u64));
+            n_placed = n_placed.saturating_add(n_faces);
+            require_for_mesh(n_placed, &MeshSize::default())?;
+            let transforms = match &places {
+                Some(places) => self.instanced(ix, places)?,
+                None => vec![instance.transform.clone()],
+            };
+            for transform in transforms {
+                mesh.placed(&transform).map_err(|what| format!("nodes[{ix}]: {what}"))?;
+                scene.instances.push(Instance { transform, ..instance.clone() });
+            }
+        }
+        if scene.instances.is_empty() {
+            return Err("has no triangles: points and lines are not shown".to_owned());
+        }
+        scene.meshes = self.meshes;
+        scene.materials = self.materials.materials;
+        scene.images = self.materials.textures.decode(&mut scene.materials, self.before.n_pixels);
+        Ok(scene)
+    }
+
+    /// Returns the transforms of the instances of a node. Those that flatten the mesh are left out.
+    fn instanced(&self, node_ix: usize, places: &Places) -> Checked<Vec<Transform>> {
+        let world_from_node = self.nodes.world_from_node(node_ix).unwrap_or_default();
+        let transform =
+            |ix: usize| places.node_from_instance(ix).map(|it| Transform::of_affine(world_from_node * it).ok());
+        (0..places.n).filter_map(|ix| transform(ix).transpose()).collect()
+    }
+
+    /// Returns the number of the primitives that are read if each mesh is read once.
+    fn n_primitives(&self) -> u64 {
+        let nodes = self.nodes.shown.iter().filter_map(|ix| self.document.root.nodes[*ix].mesh);
+        let meshes: HashSet<usize> = nodes.map(|mesh| mesh.value()).collect();
+        let json = |ix: usize| self.document.root.meshes.get(ix);
+        meshes.into_iter().filter_map(json).map(|mesh| mesh.primitives.len() as u64).sum()
+    }
+
+    /// Returns the instance that a node is, if it has a mesh with triangles. `meter` counts the primitives that are
+    /// read.
+    fn instance(&mut self, node_ix: usize, meter: &Meter) -> Checked<Option<Instance>> {
+        let document = self.document;
+        let node = &document.root.nodes[node_ix];
+        let Some(mesh) = node.mesh else { return Ok(None) };
+        let world_from_node = self.nodes.world_from_node(node_ix).unwrap_or_default();
+        // The joints of a skin place it. Its node does not, but as with every mesh, the node says which side of the
+        // faces is outside: Blender writes vertices that are mirrored already below a node that mirrors.
+        let is_turned = node.skin.is_some() && world_from_node.determinant() < 0.0;
+        let transform = match node.skin {
+            Some(_) => Transform::IDENTITY,
+            None => match Transform::of_affine(world_from_node) {
+                Ok(transform) => transform,
+                Err(_) => {
+                    document.note("meshes that their nodes flatten, which are left out", format!("nodes[{node_ix}]"));
+                    return Ok(None);
+                }
+            },
+        };
+        let json = item(&document.root.meshes, "meshes", mesh.value(), &format_args!("nodes[{node_ix}].mesh"))?;
+        let weights = node.weights.as_ref().or(json.weights.as_ref()).map(|weights| &weights[..]).unwrap_or_default();
+        let bits = weights.iter().map(|weight| weight.to_bits()).collect();
+        let key = (mesh.value(), node.skin.map(|skin| skin.value()), is_turned, bits);
+        let known = match self.known.get(&key) {
+            Some(known) => known.clone(),
+            None => {
+                let known = self.mesh((mesh.value(), meter), node, node_ix, (weights, is_turned))?;
+                self.known.insert(key, known.clone());
+                known
+            }
+        };
+        Ok(known.map(|Known { mesh_ix, materials, origin }| {
+            let transform = if origin == DVec3::ZERO { transform } else { transform.moved(origin) };
+            Instance { mesh_ix, transform, materials }
+        }))
+    }
+
+    /// Adds the mesh of a node in its pose, or returns `None` if it has no triangles. A mesh that its skin moves far
+    /// from the origin is made around a point near it, so that its vertices are not rounded at their far places.
+    fn mesh(
+        &mut self,
+        (mesh_ix, meter): (usize, &Meter),
+        node: &Node,
+        node_ix: usize,
+        (weights, is_turned): (&[f32], bool),
+    ) -> Checked<Option<Known>> {
+        let document = self.document;
+        let mut skin = node.skin.map(|skin| self.skin(skin.value(), node_ix)).transpose()?;
+        if weights.iter().any(|weight| !weight.is_finite()) {
+            return Err(format!("nodes[{node_ix}]: a weight of its morph targets is not finite"));
+        }
+        let pose = Pose { weights, skin: skin.as_ref(), is_turned };
+        let (mut whole, mut materials, mut parts) = (Mesh::default(), Vec::new(), Vec::new());
+        let primitives = &document.root.meshes[mesh_ix].primitives;
+        let attributes = geometry::attributes_of(primitives);
+        for (ix, primitive) in primitives.iter().enumerate() {
+            let path = format!("meshes[{mesh_ix}].primitives[{ix}]");
+            self.note_morphs(primitive, &path);
+            let material = if self.has_materials { self.materials.index(primitive.material, &path)? } else { 0 };
+            let targets = document.morph_targets.of(mesh_ix, ix);
+            let part = Part { primitive, targets, path, slot: materials.len() as u32, whole: attributes };
+            let mesh = geometry::mesh(document, &part, pose, &mut self.n_read)?;
+            meter.add(1);
+            let Some(mesh) = mesh else { continue };
+            materials.push(material);
+            whole.append(mesh);
+            parts.push(part);
+        }
+        if whole.faces.is_empty() {
+            return Ok(None);
+        }
+        let far = MeshOrigin::Near.second(&whole.positions);
+        let origin = far.filter(|_| skin.is_some()).unwrap_or_default();
+        if let (Some(skin), true) = (&mut skin, origin != DVec3::ZERO) {
+            skin.origin = origin;
+            let (pose, mut n_read) = (Pose { weights, skin: Some(skin), is_turned }, 0);
+            whole = Mesh::default();
+            for part in &parts {
+                geometry::mesh(document, part, pose, &mut n_read)?.into_iter().for_each(|mesh| whole.append(mesh));
+            }
+        }
+        coincident::separate(&mut whole);
+        whole.name = document.root.meshes[mesh_ix].name.clone().unwrap_or_default();
+        self.meshes.push(whole);
+        Ok(Some(Known { mesh_ix: self.meshes.len() - 1, materials, origin }))
+    }
+
+    /// Returns a skin in the pose of its joints.
+    fn skin(&self, skin_ix: usize, node_ix: usize) -> Checked<Skin> {
+        let skin = item(&self.document.root.skins, "skins", skin_ix, &format_args!("nodes[{node_ix}].skin"))?;
+        let joint = |(ix, joint): (usize, &gltf::json::Index<Node>)| {
+            let transform = self.nodes.world_from_node(joint.value());
+            transform.ok_or_else(|| format!("skins[{skin_ix}].joints[{ix}]: nodes[{joint}] is not in the scene"))
+        };
+        let joints = skin.joints.iter().enumerate().map(joint).collect::<Checked<_>>()?;
+        let name = skin.name.clone().unwrap_or_else(|| format!("skins[{skin_ix}]"));
+        self.document.note("skins, which are shown in their rest pose", name);
+        Skin::new(self.document, skin_ix, joints)
+    }
+
+    fn note_morphs(&self, primitive: &Primitive, path: &str) {
+        if primitive.targets.as_ref().is_some_and(|targets| !targets.is_empty()) {
+            self.document.note("morph targets, which are shown with their default weights", path);
+        }
+    }
+}

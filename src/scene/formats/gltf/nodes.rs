@@ -1,0 +1,122 @@
+//! The nodes of a scene, and where they stand in the world.
+
+use std::borrow::Cow;
+
+use glam::{DMat4, DQuat, DVec3, Mat4, Quat};
+use gltf::json::{self, Index, Node};
+
+use super::{
+    camera_start::camera_starts,
+    document::{Document, item},
+};
+use crate::scene::model::error::Checked;
+
+/// The nodes of a scene, each with its transform.
+pub(super) struct Nodes {
+    /// Indices of the scene's nodes, parents before their children.
+    pub shown: Vec<usize>,
+    /// World transforms of the document's nodes, by index. `None` for nodes that belong to nothing.
+    world_from_node: Vec<Option<DMat4>>,
+}
+
+impl Nodes {
+    /// Follows the nodes of a scene: the one that `name` says by its name or index, else the default one, else the
+    /// first. A document without scenes shows all nodes. Animated cameras are where their animations begin.
+    ///
+    /// # Errors
+    /// The scene or a node does not exist, or a node is reached twice: the nodes are not a tree.
+    pub fn new(document: &Document, name: Option<&str>) -> Checked<Self> {
+        let mut all = Cow::Borrowed(&document.root.nodes);
+        let starts = camera_starts(document);
+        if !starts.is_empty() {
+            starts.into_iter().for_each(|(ix, node)| all.to_mut()[ix] = node);
+        }
+        let all = &all[..];
+        let mut nodes = Self { shown: Vec::new(), world_from_node: vec![None; all.len()] };
+        let roots = match scene(document, name)? {
+            Some(ix) => indices(&document.root.scenes[ix].nodes),
+            None => parentless(all),
+        };
+        nodes.shown = nodes.walk(all, roots, "scenes")?;
+        // Joints of skins may hang on nodes that the scene does not show.
+        let others = parentless(all).into_iter().filter(|ix| nodes.world_from_node[*ix].is_none()).collect();
+        nodes.walk(all, others, "nodes")?;
+        Ok(nodes)
+    }
+
+    /// Returns a node's transform to world space, if a scene or a parentless node leads to it.
+    pub fn world_from_node(&self, ix: usize) -> Option<DMat4> {
+        self.world_from_node.get(ix).copied().flatten()
+    }
+
+    /// Visits nodes and all below them, and returns them in the order of the visits.
+    fn walk(&mut self, all: &[Node], roots: Vec<usize>, from: &str) -> Checked<Vec<usize>> {
+        let mut visited = Vec::new();
+        let mut pending: Vec<(usize, Option<usize>)> = roots.into_iter().rev().map(|root| (root, None)).collect();
+        while let Some((ix, parent)) = pending.pop() {
+            let from = parent.map_or(from.to_owned(), |parent| format!("nodes[{parent}].children"));
+            let node = item(all, "nodes", ix, &from)?;
+            if self.world_from_node[ix].is_some() {
+                return Err(format!("{from}: leads to nodes[{ix}] a second time, but nodes must be a tree"));
+            }
+            let world_from_parent = parent.and_then(|parent| self.world_from_node[parent]).unwrap_or_default();
+            self.world_from_node[ix] = Some(world_from_parent * parent_from_node(node, ix)?);
+            visited.push(ix);
+            let children = indices(node.children.as_deref().unwrap_or_default());
+            pending.extend(children.into_iter().rev().map(|child| (child, Some(ix))));
+        }
+        Ok(visited)
+    }
+}
+
+/// Returns the index of the scene to show, or `None` if the document has no scenes.
+fn scene(document: &Document, name: Option<&str>) -> Checked<Option<usize>> {
+    let scenes = &document.root.scenes;
+    if let Some(name) = name {
+        let named = scenes.iter().position(|scene| scene.name.as_deref() == Some(name));
+        let found = named.or_else(|| name.parse().ok().filter(|ix| *ix < scenes.len()));
+        return found.map(Some).ok_or_else(|| {
+            let names = scenes.iter().enumerate().map(|(ix, scene)| match &scene.name {
+                Some(name) => format!("{ix} `{name}`"),
+                None => ix.to_string(),
+            });
+            format!("there is no scene `{name}`, but {}", names.collect::<Vec<_>>().join(", "))
+        });
+    }
+    match document.root.scene {
+        Some(index) => item(scenes, "scenes", index.value(), &"scene").map(|_| Some(index.value())),
+        None => Ok((!scenes.is_empty()).then_some(0)),
+    }
+}
+
+fn indices(nodes: &[Index<Node>]) -> Vec<usize> {
+    nodes.iter().map(Index::value).collect()
+}
+
+/// Returns the nodes that are no node's child.
+fn parentless(all: &[Node]) -> Vec<usize> {
+    let mut is_child = vec![false; all.len()];
+    for child in all.iter().filter_map(|node| node.children.as_ref()).flatten() {
+        if let Some(is_child) = is_child.get_mut(child.value()) {
+            *is_child = true;
+        }
+    }
+    (0..all.len()).filter(|ix| !is_child[*ix]).collect()
+}
+
+fn parent_from_node(node: &Node, ix: usize) -> Checked<DMat4> {
+    let matrix = match node.matrix {
+        Some(matrix) => Mat4::from_cols_array(&matrix).as_dmat4(),
+        None => {
+            let vector = |vector: Option<[f32; 3]>, or: f64| {
+                vector.map_or(DVec3::splat(or), |vector| DVec3::from_array(vector.map(f64::from)))
+            };
+            let json::scene::UnitQuaternion(rotation) = node.rotation.unwrap_or_default();
+            let rotation = Quat::from_array(rotation).as_dquat();
+            // A quaternion of length 0 turns nothing.
+            let rotation = if rotation.length_squared() > 0.0 { rotation.normalize() } else { DQuat::IDENTITY };
+            DMat4::from_scale_rotation_translation(vector(node.scale, 1.0), rotation, vector(node.translation, 0.0))
+        }
+    };
+    if matrix.is_finite() { Ok(matrix) } else { Err(format!("nodes[{ix}]: its transform is not finite")) }
+}

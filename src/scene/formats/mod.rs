@@ -1,0 +1,12 @@
+//! Readers of foreign formats: glTF, OBJ with MTL, PLY, STL, and images. Each is given bytes.
+
+pub(crate) mod gltf;
+pub(crate) mod image;
+pub(crate) mod image_files;
+pub(crate) mod map_spec;
+pub(crate) mod material_spec;
+pub(crate) mod mesh_file;
+pub(crate) mod obj;
+pub(crate) mod ply;
+pub(crate) mod scan_colours;
+pub(crate) mod stl;

@@ -1,0 +1,77 @@
+//! Files that OBJ and MTL files name.
+
+use std::path::{Path, PathBuf};
+
+use super::{
+    clean::{split_keyword, statements},
+    maps::{MapKind, MapOptions},
+    tiles::files_of_tiles,
+};
+use crate::scene::{
+    files::{
+        outside::{Access, NamedFile, Reach},
+        read::read_lossy,
+        store,
+    },
+    model::error::Checked,
+};
+
+/// Returns the files that the `mtllib` statements of an OBJ file's text name, and the images that these name. Names
+/// that are refused are left out.
+pub fn named_files(obj: &Path, text: &str, access: Access) -> Vec<PathBuf> {
+    let reach = access.beside(obj);
+    let mut files = Vec::new();
+    for (_, statement) in statements(text) {
+        if let ("mtllib", rest) = split_keyword(&statement) {
+            files.extend(library_files(reach, rest).into_iter().flatten().map(|file| file.path));
+        }
+    }
+    let images: Vec<PathBuf> = files.iter().flat_map(|mtl| named_images(reach, mtl)).collect();
+    files.into_iter().chain(images).collect()
+}
+
+/// Returns the images that an MTL file names.
+fn named_images(reach: Reach, mtl: &Path) -> Vec<PathBuf> {
+    let text = read_lossy(mtl).unwrap_or_default();
+    let folder = mtl.parent().unwrap_or(Path::new(""));
+    let files = |statement: &str| match split_keyword(statement) {
+        (keyword, rest) if matches!(MapKind::of(keyword), MapKind::Shown(_)) => {
+            let Ok(MapOptions { name, .. }) = MapOptions::new(rest) else { return Vec::new() };
+            let tiles = files_of_tiles(reach, folder, &name);
+            match tiles.is_empty() {
+                true => map_file(reach, folder, &name).into_iter().map(|file| file.path).collect(),
+                false => tiles.into_iter().map(|(_, file)| file.path).collect(),
+            }
+        }
+        _ => Vec::new(),
+    };
+    statements(&text).flat_map(|(_, statement)| files(&statement)).collect()
+}
+
+/// Returns the files that a `mtllib` line names. The rest of the line is one name, possibly with spaces, if such a
+/// file exists; otherwise it is a list of names.
+pub fn library_files(reach: Reach, rest: &str) -> Vec<Checked<NamedFile>> {
+    let find = |name: &str| reach.find(reach.root, name.trim_matches('"'));
+    match find(rest) {
+        Ok(whole) if store::is_file(&whole.path) => vec![Ok(whole)],
+        _ => rest.split_whitespace().map(find).collect(),
+    }
+}
+
+/// Returns the file of a map. Writers often state absolute names of their own machine: where a name leaves the folder
+/// of the OBJ file, the file is taken whose name beside the MTL file has the most last parts in common with it. A
+/// comment may follow the name.
+pub fn map_file(reach: Reach, folder: &Path, name: &str) -> Checked<NamedFile> {
+    let exists = |file: &Checked<NamedFile>| file.as_ref().is_ok_and(|file| store::is_file(&file.path));
+    let whole = reach.find(folder, name);
+    if exists(&whole) {
+        return whole;
+    }
+    let name = name.split_once(" #").map_or(name, |(name, _)| name.trim_end().trim_end_matches('"'));
+    let without_comment = reach.find(folder, name);
+    if exists(&without_comment) || reach.within().find(folder, name).is_ok() {
+        return without_comment;
+    }
+    let ends = name.match_indices(['/', '\\']).map(|(at, _)| &name[at + 1..]).filter(|end| !end.is_empty());
+    ends.map(|end| reach.within().find(folder, end)).find(exists).unwrap_or(without_comment)
+}

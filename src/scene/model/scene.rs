@@ -1,0 +1,181 @@
+//! A scene: everything that a frame shows.
+
+use std::path::Path;
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::{
+    Camera, ChosenLight, Environment, Ground, Image, Light, Material, Mesh, Projection, RenderDefaults, Sky, Transform,
+};
+
+/// Name of the material of meshes and faces that name none.
+pub(crate) const DEFAULT_MATERIAL: &str = "(default)";
+/// Name of the material of the ground below a mesh.
+pub(crate) const GROUND: &str = "(ground)";
+
+/// Everything that a frame shows. World space is right-handed, +y up by default.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// The file's name without its folder and extension.
+    pub name: String,
+    /// The point of the file that is the origin of world space, in the file's coordinates. It is 0, unless the scene
+    /// was moved there ([`LoadOptions::recentre`]).
+    pub origin: DVec3,
+    /// Meshes, each of which may have several instances.
+    pub meshes: Vec<Mesh>,
+    /// Placed meshes. A loaded scene has at least one triangle, all triangles lie within `mesh::MAX_COORDINATE`, and
+    /// their bounding box has a side of [`MIN_EXTENT`] or more.
+    pub instances: Vec<Instance>,
+    /// Materials, to which the instances refer by index.
+    pub materials: Vec<Material>,
+    /// Images, to which the materials' textures refer by index.
+    pub images: Vec<Image>,
+    /// Lights, possibly none.
+    pub lights: Vec<Light>,
+    /// Which lights were chosen, if the file has none and the user has not chosen any.
+    pub chosen_light: Option<ChosenLight>,
+    /// The image of what is seen beyond the scene; without one, that is `background`. Only the path tracer knows it.
+    pub environment: Option<Environment>,
+    /// The sky and its sun. Paths: replaces `environment`. Whitted: only the sun is used.
+    pub sky: Option<Sky>,
+    /// Horizontal unit vector to the viewer of the built-in studio environment (a bright ceiling and three soft boxes),
+    /// which reflections see and camera rays do not; `None` for no studio.
+    pub studio: Option<Vec3>,
+    /// The camera that renders the scene unless another one is set.
+    pub camera: Camera,
+    /// The cameras of the scene's file with their names, possibly none.
+    pub cameras: Vec<(String, Camera)>,
+    /// Irradiance that every point receives, linear RGB. The material's `ka` weights it. If there is a `ground`, this
+    /// is the irradiance of surfaces that face up.
+    pub ambient: Vec3,
+    /// The ambient light from below, if it is not that of all sides.
+    pub ground: Option<Ground>,
+    /// Radiance of rays that leave the scene, linear RGB.
+    pub background: Vec3,
+    /// The options that the scene is rendered with unless others are set.
+    pub defaults: RenderDefaults,
+}
+
+/// A mesh that is placed in the world.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Instance {
+    /// Index into the scene's meshes.
+    pub mesh_ix: usize,
+    /// Transform from object space to world space.
+    pub transform: Transform,
+    /// Indices into the scene's materials, at least one. A face of slot i has the material at index
+    /// `i % materials.len()` of this list.
+    pub materials: Vec<u32>,
+}
+
+impl Scene {
+    /// Makes one of [`Scene::cameras`] the scene's camera: the first one of this name, or else the one of this index.
+    pub(crate) fn choose_camera(&mut self, name: &str) -> Result<(), String> {
+        let named = self.cameras.iter().find(|(other, _)| other == name);
+        let found = named.or_else(|| self.cameras.get(name.parse::<usize>().ok()?));
+        let Some((_, camera)) = found else {
+            let cameras = self.cameras.iter().enumerate().map(|(ix, (name, _))| format!("{ix} `{name}`"));
+            let cameras = cameras.collect::<Vec<_>>().join(", ");
+            return Err(match cameras.is_empty() {
+                true => format!("there is no camera `{name}`: the file names no cameras"),
+                false => format!("there is no camera `{name}`, but {cameras}"),
+            });
+        };
+        self.camera = *camera;
+        Ok(())
+    }
+
+    /// Returns the name of the scene in a file: the file's name without its folder and extension.
+    pub fn name_of(path: &Path) -> String {
+        path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
+    }
+
+    /// Returns the number of triangles of all instances.
+    pub fn n_triangles(&self) -> usize {
+        let mesh_of = |instance: &Instance| self.meshes.get(instance.mesh_ix);
+        self.instances.iter().filter_map(mesh_of).map(|mesh| mesh.faces.len()).sum()
+    }
+
+    /// Returns the smallest and the largest coordinates of all triangles, world space.
+    ///
+    /// # Panics
+    /// An index of a mesh or of a position is out of range.
+    pub fn bounds(&self) -> (Vec3, Vec3) {
+        self.bounds_of(&self.instances)
+    }
+
+    /// Returns the bounds of some instances.
+    pub(crate) fn bounds_of(&self, instances: &[Instance]) -> (Vec3, Vec3) {
+        // Instances share the list of their mesh's corners, in which each point is once.
+        let corners: Vec<Vec<Vec3>> = self.meshes.par_iter().map(Mesh::corners).collect();
+        let none = || (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        let joined = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
+        let of_instance = |Instance { mesh_ix, transform, .. }: &Instance| {
+            let world = corners[*mesh_ix].par_iter().map(|p| transform.point(*p));
+            world.map(|p| (p, p)).reduce(none, joined)
+        };
+        instances.par_iter().map(of_instance).reduce(none, joined)
+    }
+
+    /// Adds a mesh and one instance of it. `materials` becomes [`Instance::materials`].
+    ///
+    /// # Errors
+    /// The mesh reaches beyond `mesh::MAX_COORDINATE` in world space. The error is a message for people.
+    pub(crate) fn push_mesh(&mut self, mesh: Mesh, transform: Transform, materials: Vec<u32>) -> Result<(), String> {
+        mesh.placed(&transform)?;
+        self.instances.push(Instance { mesh_ix: self.meshes.len(), transform, materials });
+        self.meshes.push(mesh);
+        Ok(())
+    }
+
+    /// A scene without meshes, materials and lights. Its camera is a placeholder.
+    pub(crate) fn empty(path: &Path) -> Self {
+        Self {
+            name: Self::name_of(path),
+            origin: DVec3::ZERO,
+            meshes: Vec::new(),
+            instances: Vec::new(),
+            materials: Vec::new(),
+            images: Vec::new(),
+            lights: Vec::new(),
+            chosen_light: None,
+            camera: Camera {
+                eye: Vec3::ZERO,
+                target: Vec3::NEG_Z,
+                up: Vec3::Y,
+                projection: Projection::Perspective { vertical_fov_degrees: 45.0 },
+            },
+            cameras: Vec::new(),
+            ambient: Vec3::ZERO,
+            ground: None,
+            background: Vec3::ZERO,
+            environment: None,
+            sky: None,
+            studio: None,
+            defaults: RenderDefaults::default(),
+        }
+    }
+
+    /// Adds a material and returns its index.
+    pub(crate) fn push_material(&mut self, material: Material) -> u32 {
+        self.materials.push(material);
+        (self.materials.len() - 1) as u32
+    }
+
+    /// Returns the index of the default material, for meshes and faces that name none. Adds it at the first call.
+    pub(crate) fn default_material(&mut self) -> u32 {
+        if let Some(ix) = self.materials.iter().position(|material| material.name == DEFAULT_MATERIAL) {
+            return ix as u32;
+        }
+        self.push_material(Material { name: DEFAULT_MATERIAL.to_owned(), ..Material::default() })
+    }
+
+    /// Adds the materials of a mesh that came with them. Returns their indices for the slots of the mesh; the last one
+    /// is the default material, for faces without one.
+    pub(crate) fn push_materials(&mut self, materials: Vec<Material>) -> Vec<u32> {
+        let mut slots: Vec<u32> = materials.into_iter().map(|material| self.push_material(material)).collect();
+        slots.push(self.default_material());
+        slots
+    }
+}

@@ -1,0 +1,199 @@
+//! Transforms that place a mesh in the world.
+
+use std::fmt::Debug;
+
+use glam::{DMat3, DMat4, DQuat, DVec3, Vec3};
+use serde::Deserialize;
+
+use super::error::Checked;
+
+/// A transform as a scene file describes it: the mesh is scaled, then rotated, then translated.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct TransformSpec {
+    translate: Option<[f32; 3]>,
+    rotate: Option<RotationSpec>,
+    scale: Option<ScaleSpec>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(untagged, expecting = "expected [x, y, z] in degrees or { axis = [x, y, z], angle = degrees }")]
+enum RotationSpec {
+    /// Rotations about x, then y, then z, degrees.
+    Euler([f32; 3]),
+    AxisAngle(AxisAngle),
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AxisAngle {
+    axis: [f32; 3],
+    /// Angle of the rotation in degrees.
+    angle: f32,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(untagged, expecting = "expected a number or [x, y, z]")]
+enum ScaleSpec {
+    Uniform(f32),
+    Axes([f32; 3]),
+}
+
+/// A transform from object space to world space: an invertible linear map, then a translation.
+///
+/// It is applied in f64, so that the identity changes no coordinate.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Transform {
+    linear: DMat3,
+    translation: DVec3,
+    /// The inverse transpose of `linear`, up to a positive factor.
+    normals: DMat3,
+    /// Whether `linear` is a reflection.
+    mirrors: bool,
+}
+
+impl Transform {
+    /// The identity, which changes no coordinate.
+    pub const IDENTITY: Self =
+        Self { linear: DMat3::IDENTITY, translation: DVec3::ZERO, normals: DMat3::IDENTITY, mirrors: false };
+
+    /// Makes the transform that scales a mesh along its axes, then rotates it, then moves it. A negative factor of
+    /// `scale` reflects the mesh.
+    ///
+    /// # Errors
+    /// A factor of `scale` is 0, or a number is not finite. The error is a message for people.
+    pub fn new(scale: DVec3, rotation: DQuat, translation: DVec3) -> Result<Self, String> {
+        if !(scale.is_finite() && rotation.is_finite() && translation.is_finite()) {
+            return Err("the transform has a number that is not finite".to_owned());
+        }
+        if scale.abs().min_element() == 0.0 {
+            return Err(format!("scale = {:?} flattens the mesh: no factor may be 0", scale.to_array()));
+        }
+        let rotation = DMat3::from_quat(rotation);
+        // The inverse is multiplied by the smallest factor's size, so that it does not overflow for tiny scales.
+        let inverse_scale = scale.abs().min_element() / scale;
+        Ok(Self {
+            linear: rotation * DMat3::from_diagonal(scale),
+            translation,
+            normals: rotation * DMat3::from_diagonal(inverse_scale),
+            mirrors: scale.x * scale.y * scale.z < 0.0,
+        })
+    }
+
+    /// Makes the transform of an affine matrix, which may shear a mesh. The last row of the matrix is ignored.
+    ///
+    /// # Errors
+    /// The matrix flattens the mesh, or a number is not finite. The error is a message for people.
+    pub fn of_affine(world_from_object: DMat4) -> Result<Self, String> {
+        if !world_from_object.is_finite() {
+            return Err("the transform has a number that is not finite".to_owned());
+        }
+        let linear = DMat3::from_mat4(world_from_object);
+        // Each of the determinant's six products is rounded to 2^-53 of at most the product of the columns' lengths.
+        let DMat3 { x_axis, y_axis, z_axis } = scaled_to_one(linear);
+        let noise = 6.0 * f64::EPSILON * x_axis.length() * y_axis.length() * z_axis.length();
+        let determinant = scaled_to_one(linear).determinant();
+        if !(determinant.abs() > noise) {
+            return Err("the transform flattens the mesh".to_owned());
+        }
+        let translation = world_from_object.w_axis.truncate();
+        Ok(Self { linear, translation, normals: normals_of(linear), mirrors: determinant < 0.0 })
+    }
+
+    /// Returns the transform that applies `inner`, then this one.
+    pub(crate) fn after(&self, inner: &Self) -> Self {
+        // The identity must not even round the normals.
+        if *self == Self::IDENTITY {
+            return inner.clone();
+        }
+        Self {
+            linear: self.linear * inner.linear,
+            translation: self.linear * inner.translation + self.translation,
+            normals: scaled_to_one(self.normals * inner.normals),
+            mirrors: self.mirrors != inner.mirrors,
+        }
+    }
+
+    /// Returns the transform that is followed by a translation.
+    pub(crate) fn moved(&self, by: DVec3) -> Self {
+        Self { translation: self.translation + by, ..self.clone() }
+    }
+
+    /// Returns a point of object space in world space.
+    pub fn point(&self, p: Vec3) -> Vec3 {
+        (self.linear * p.as_dvec3() + self.translation).as_vec3()
+    }
+
+    /// Returns a vector and a number of which the height of a point of object space above another point of world space
+    /// is made: the dot product of the vector and the point, plus the number. `direction` says where up is, and its
+    /// length scales the height.
+    pub(crate) fn height_in_object_space(&self, direction: DVec3, above: DVec3) -> (DVec3, f64) {
+        (self.linear.transpose() * direction, direction.dot(self.translation - above))
+    }
+
+    /// Returns a surface normal of object space in world space: unit length, or zero if `n` is zero.
+    pub fn normal(&self, n: Vec3) -> Vec3 {
+        (self.normals * n.as_dvec3()).normalize_or_zero().as_vec3()
+    }
+
+    /// Returns a tangent of object space in world space: unit length, or zero if `t` is zero.
+    pub fn tangent(&self, t: Vec3) -> Vec3 {
+        (self.linear * t.as_dvec3()).normalize_or_zero().as_vec3()
+    }
+
+    /// Returns whether the transform is a reflection. A reflection reverses the winding of triangles, so two of a
+    /// triangle's corners must be swapped for its outside to stay outside.
+    pub fn mirrors(&self) -> bool {
+        self.mirrors
+    }
+}
+
+/// Returns a linear map divided by its largest coefficient's size, so that products of three coefficients neither
+/// overflow nor underflow.
+fn scaled_to_one(linear: DMat3) -> DMat3 {
+    let largest = linear.to_cols_array().into_iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
+    if largest > 0.0 { linear * largest.recip().min(f64::MAX) } else { linear }
+}
+
+/// Returns the inverse transpose of a linear map up to a positive factor. Unlike the inverse, it exists for all maps.
+pub(crate) fn normals_of(linear: DMat3) -> DMat3 {
+    let DMat3 { x_axis, y_axis, z_axis } = scaled_to_one(linear);
+    let cofactors = DMat3::from_cols(y_axis.cross(z_axis), z_axis.cross(x_axis), x_axis.cross(y_axis));
+    if linear.determinant() < 0.0 { -cofactors } else { cofactors }
+}
+
+impl TransformSpec {
+    /// Returns the transform, or an error if a number is not finite or the transform cannot be inverted.
+    pub fn transform(&self) -> Checked<Transform> {
+        let translation = finite("translate", self.translate.unwrap_or_default())?;
+        let scale = match self.scale {
+            None => [1.0; 3],
+            Some(ScaleSpec::Uniform(factor)) => [factor; 3],
+            Some(ScaleSpec::Axes(factors)) => factors,
+        };
+        let scale = finite("scale", scale)?;
+        Transform::new(scale, self.rotation()?, translation)
+    }
+
+    fn rotation(&self) -> Checked<DQuat> {
+        match &self.rotate {
+            None => Ok(DQuat::IDENTITY),
+            Some(RotationSpec::Euler(degrees)) => {
+                let [x, y, z] = finite("rotate", *degrees)?.to_array().map(f64::to_radians);
+                Ok(DQuat::from_rotation_z(z) * DQuat::from_rotation_y(y) * DQuat::from_rotation_x(x))
+            }
+            Some(RotationSpec::AxisAngle(AxisAngle { axis, angle })) => {
+                let direction = finite("rotate.axis", *axis)?.try_normalize();
+                let direction = direction.ok_or_else(|| format!("rotate.axis = {axis:?} has no direction"))?;
+                let angle = finite("rotate.angle", [*angle, 0.0, 0.0])?.x;
+                Ok(DQuat::from_axis_angle(direction, angle.to_radians()))
+            }
+        }
+    }
+}
+
+/// Checks that three numbers are finite.
+pub(crate) fn finite<T: Copy + Debug + Into<f64>>(name: &str, value: [T; 3]) -> Checked<DVec3> {
+    let vector = DVec3::from_array(value.map(Into::into));
+    if vector.is_finite() { Ok(vector) } else { Err(format!("{name} = {value:?} is not finite")) }
+}

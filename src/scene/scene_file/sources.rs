@@ -1,0 +1,115 @@
+//! The files that a scene is made from.
+
+use std::path::{Path, PathBuf};
+
+use toml::{Table, Value};
+
+use crate::scene::{
+    files::{
+        outside::Access,
+        pack::pack_of,
+        read::{lossy_text, read_bytes, read_utf8},
+    },
+    formats::{gltf, material_spec::MAP_KEYS, mesh_file::MeshFormat, obj::named_files, ply::named_images},
+    model::LoadOptions,
+};
+
+/// Returns the sorted paths of the scene file, the mesh files that it names, the material libraries and buffers that
+/// the mesh files name, and the images that any of them names. The files need not exist. A file that cannot be read
+/// contributes no names. Names that are refused when the scene is loaded are left out. The only source of a scene in a
+/// pack is the pack.
+pub fn source_files(path: &Path) -> Vec<PathBuf> {
+    source_files_with(path, &LoadOptions::default())
+}
+
+/// Returns the files as [`source_files`] does, of a scene that is loaded with options.
+pub fn source_files_with(path: &Path, options: &LoadOptions) -> Vec<PathBuf> {
+    if let Some(pack) = pack_of(path) {
+        return vec![pack.to_owned()];
+    }
+    let access = Access::of(options);
+    let (meshes, maps) = if is_scene_file(path) { named(path, access) } else { (vec![path.to_owned()], Vec::new()) };
+    let libraries: Vec<_> = meshes.iter().flat_map(|mesh| libraries(mesh, access)).collect();
+    let mut files = [vec![path.to_owned()], meshes, maps, libraries].concat();
+    files.sort();
+    files.dedup();
+    files
+}
+
+/// Returns the meshes and the images that a scene file names.
+fn named(scene: &Path, access: Access) -> (Vec<PathBuf>, Vec<PathBuf>) {
+    let table: Table = read_utf8(scene).ok().and_then(|text| text.parse().ok()).unwrap_or_default();
+    let path = |name: &str| access.beside(scene).exact(name).ok();
+    let meshes = table.get("mesh").and_then(Value::as_array).into_iter().flatten();
+    let meshes = meshes.filter_map(|mesh| path(mesh.get("file")?.as_str()?)).collect();
+    let materials = table.get("materials").and_then(Value::as_table).into_iter().flat_map(Table::values);
+    let maps = materials.flat_map(|material| MAP_KEYS.iter().filter_map(|key| material.get(key)));
+    let name = |map: &Value| path(map.as_str().or_else(|| map.get("file")?.as_str())?);
+    let environment = table.get("environment").and_then(|it| path(it.get("file")?.as_str()?));
+    (meshes, maps.filter_map(name).chain(environment).collect())
+}
+
+/// Returns whether a file's name is that of a scene file in TOML.
+pub(crate) fn is_scene_file(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
+}
+
+/// Returns the files that a mesh file names.
+fn libraries(mesh: &Path, access: Access) -> Vec<PathBuf> {
+    // Content that names no files need not be read.
+    if MeshFormat::of_name(mesh) == Some(MeshFormat::Stl) {
+        return Vec::new();
+    }
+    let bytes = read_bytes(mesh).unwrap_or_default();
+    match MeshFormat::of(mesh, &bytes) {
+        MeshFormat::Gltf => gltf::named_files(mesh, &bytes, access),
+        MeshFormat::Ply => named_images(mesh, &bytes, access),
+        MeshFormat::Stl => Vec::new(),
+        MeshFormat::Obj => named_files(mesh, &lossy_text(bytes), access),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use tempfile::TempDir;
+
+    use super::*;
+
+    /// Old programs write comments in the encoding of their system.
+    #[test]
+    fn images_of_ply_files_are_named_whatever_the_headers_encoding_is() {
+        let directory = TempDir::new().unwrap();
+        let path = |name: &str| directory.path().join(name);
+        for header in [&b"ply\nformat ascii 1.0\ncomment caf\xe9\n"[..], b"ply\rformat ascii 1.0\r"] {
+            let line_end = &header[3..4];
+            let lines = [&b"comment TextureFile a.png"[..], b"element vertex 0", b"property float x", b"end_header"];
+            let rest = lines.map(|line| [line, line_end].concat()).concat();
+            fs::write(path("m.ply"), [header, &rest].concat()).unwrap();
+            assert_eq!(source_files(&path("m.ply")), [path("a.png"), path("m.ply")]);
+        }
+    }
+
+    #[test]
+    fn a_scene_names_its_meshes_and_they_their_libraries() {
+        let directory = TempDir::new().unwrap();
+        let path = |name: &str| directory.path().join(name);
+        fs::create_dir(path("parts")).unwrap();
+        let scene =
+            "[[mesh]]\nfile = \"parts/a.obj\"\n[[mesh]]\nfile = \"none.obj\"\n[[mesh]]\ngenerator = \"plane\"\n";
+        fs::write(path("x.toml"), scene).unwrap();
+        fs::write(path("parts/a.obj"), "# a\nmtllib a.mtl\nv 0 0 0\n").unwrap();
+        let expected = [path("none.obj"), path("parts/a.mtl"), path("parts/a.obj"), path("x.toml")];
+        assert_eq!(source_files(&path("x.toml")), expected);
+        assert_eq!(source_files(&path("parts/a.obj")), [path("parts/a.mtl"), path("parts/a.obj")]);
+        // Statements as the loader reads them: tabs, several names, names with spaces, continued lines, backslashes.
+        fs::write(path("parts/with space.mtl"), "").unwrap();
+        let obj = "mtllib\tone.mtl two.mtl\nmtllib with space.mtl\nmtllib \\\n deep\\three.mtl\nmtllib ../out.mtl\n";
+        fs::write(path("parts/a.obj"), obj).unwrap();
+        let names = ["parts/a.obj", "parts/deep/three.mtl", "parts/one.mtl", "parts/two.mtl", "parts/with space.mtl"];
+        assert_eq!(source_files(&path("parts/a.obj")), names.map(path));
+        fs::write(path("x.toml"), "[[mesh\n").unwrap();
+        assert_eq!(source_files(&path("x.toml")), [path("x.toml")]);
+    }
+}
