@@ -8,8 +8,8 @@
 // the light by the albedo again and adds what the camera sees directly.
 // Reads pixel_aux; updates pixel_filtered: even steps read its second half and write the first one.
 #include "layout.glsl"
-#include "noise.glsl"
-#include "edge.glsl"
+#include "picture/noise.glsl"
+#include "picture/edge.glsl"
 
 layout(local_size_x = TILE_SIZE, local_size_y = TILE_SIZE) in;
 layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };

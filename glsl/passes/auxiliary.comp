@@ -5,10 +5,10 @@
 // many samples a frame draws. A sample that is drawn again is not added again. Reads hits, path_states after bounce 0,
 // and the scene; updates pixel_aux.
 #include "layout.glsl"
-#include "paths.glsl"
-#include "path_camera.glsl"
-#include "path_vertex.glsl"
-#include "noise.glsl"
+#include "rays/paths.glsl"
+#include "rays/path_camera.glsl"
+#include "shading/path_vertex.glsl"
+#include "picture/noise.glsl"
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hits[]; };

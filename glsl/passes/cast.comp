@@ -1,15 +1,15 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 // Cast: finds each ray's closest hit in (t_min, t_max], or with ANY_HIT one that need not be the closest. There are
-// 2^lanes_log2 invocations per ray, the first of which works (lanes.glsl).
+// 2^lanes_log2 invocations per ray, the first of which works (rays/lanes.glsl).
 // Reads cast_rays and the acceleration structure; updates cast_hits, in which a suspended ray leaves its mark
-// (suspended_rays.glsl).
+// (search/suspended_rays.glsl).
 #include "layout.glsl"
 
 const bool COUNT_COSTS = false;
 const bool TESTS_BLENDED = false;
-#include "accel.glsl"
-#include "lanes.glsl"
+#include "search/accel.glsl"
+#include "rays/lanes.glsl"
 
 layout(constant_id = CONSTANT_ANY_HIT) const bool ANY_HIT = false;
 

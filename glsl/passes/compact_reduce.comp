@@ -5,8 +5,8 @@
 // counts those of its SCAN_GROUP_SIZE rays.
 // Reads rays, hits, bounces and the scene; writes child_kinds and scan_blocks[workgroup].
 #include "layout.glsl"
-#include "rays.glsl"
-#include "children.glsl"
+#include "rays/rays.glsl"
+#include "shading/children.glsl"
 #include "scan.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;

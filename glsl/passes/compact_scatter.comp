@@ -7,10 +7,10 @@
 // Reads rays, hits, child_kinds, scan_blocks, bounces and the scene; writes first_children and the next bounce's
 // rays.
 #include "layout.glsl"
-#include "rays.glsl"
-#include "children.glsl"
+#include "rays/rays.glsl"
+#include "shading/children.glsl"
 #include "scan.glsl"
-#include "store.glsl"
+#include "rays/store.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hits[]; };

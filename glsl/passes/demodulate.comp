@@ -5,8 +5,8 @@
 // light's luminance from the samples, and from the pixels around.
 // Reads pixel_radiance and pixel_aux; writes the second half of pixel_filtered.
 #include "layout.glsl"
-#include "noise.glsl"
-#include "edge.glsl"
+#include "picture/noise.glsl"
+#include "picture/edge.glsl"
 
 layout(local_size_x = TILE_SIZE, local_size_y = TILE_SIZE) in;
 layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };

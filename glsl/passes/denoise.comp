@@ -5,7 +5,7 @@
 // of the five.
 // Reads pixel_radiance; writes pixel_filtered.
 #include "layout.glsl"
-#include "display.glsl"
+#include "picture/display.glsl"
 
 layout(local_size_x = TILE_SIZE, local_size_y = TILE_SIZE) in;
 layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };

@@ -4,7 +4,7 @@
 // place of its colour.
 // Reads pixel_aovs; writes pixel_display (R in the lowest byte).
 #include "layout.glsl"
-#include "false_color.glsl"
+#include "picture/false_color.glsl"
 
 layout(local_size_x = TILE_SIZE, local_size_y = TILE_SIZE) in;
 layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };

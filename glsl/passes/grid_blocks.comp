@@ -3,7 +3,7 @@
 // Grid, blocks: writes where each upper cell's block of lower cells begins, and the block's resolution. One workgroup
 // per GRID_BLOCK_SIZE upper cells; an invocation writes one cell per row.
 // Reads build, blocks, scan_blocks; writes cells.
-#include "grid_build.glsl"
+#include "grid/grid_build.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_GRID_BLOCKS) readonly buffer BlocksBlock { uvec2 blocks[]; };

@@ -4,7 +4,7 @@
 // Grid, bounds: one workgroup per block of GRID_BLOCK_SIZE triangles finds the bounds of the finite ones and counts
 // them. Atomics combine the blocks; a minimum, a maximum and a sum of integers are the same in every order.
 // Reads triangles and n_triangles of build; updates least, greatest and n_finite of build.
-#include "grid_build.glsl"
+#include "grid/grid_build.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_GRID_TRIANGLES) readonly buffer TrianglesBlock { Triangle triangles[]; };

@@ -6,7 +6,7 @@
 // pairs (grid_leaves.comp). All other cells have been cleared.
 // Atomics count the cells that have entries; the sum is the same in every order.
 // Reads build, pairs_from; writes cells and n_filled_* of build.
-#include "grid_build.glsl"
+#include "grid/grid_build.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_GRID_PAIRS_FROM) readonly buffer PairsFromBlock { uvec2 pairs_from[]; };

@@ -5,7 +5,7 @@
 // an invocation counts those of one item per row.
 // Reads build, triangles, and at the lower level upper_pairs, blocks and scan_blocks; writes first_columns and the
 // block's sum in scan_blocks.
-#include "grid_items.glsl"
+#include "grid/grid_items.glsl"
 #include "scan.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;

@@ -5,7 +5,7 @@
 // invocation tests the cells of one column per row.
 // Reads build, triangles, first_columns, scan_blocks, and at the lower level upper_pairs and blocks; writes
 // first_pairs and the block's sum in scan_blocks.
-#include "grid_columns.glsl"
+#include "grid/grid_columns.glsl"
 #include "scan.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;

@@ -3,7 +3,7 @@
 // Grid, descend: the only invocation makes the pairs of the upper level the items of the lower one and prepares the
 // first attempt.
 // Reads and writes build.
-#include "grid_attempt.glsl"
+#include "grid/grid_attempt.glsl"
 
 layout(local_size_x = 1) in;
 

@@ -4,7 +4,7 @@
 // per block of GRID_BLOCK_SIZE columns; an invocation writes the pairs of one column per row.
 // Reads build, triangles, first_columns, first_pairs, scan_blocks, and at the lower level upper_pairs and blocks;
 // writes pairs_to.
-#include "grid_columns.glsl"
+#include "grid/grid_columns.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_GRID_FIRST_PAIRS) readonly buffer FirstPairsBlock { uint first_pairs[]; };

@@ -4,7 +4,7 @@
 // prepares the first attempt.
 // Reads the bounds, n_finite, n_triangles and upper_density of build; writes build's lattice, margin,
 // largest_coordinate, n_items, counts and sizes of dispatches.
-#include "grid_attempt.glsl"
+#include "grid/grid_attempt.glsl"
 
 layout(local_size_x = 1) in;
 

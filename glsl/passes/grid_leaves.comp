@@ -4,7 +4,7 @@
 // workgroup per block of GRID_BLOCK_SIZE pairs; an invocation writes one entry per row. Twin of
 // src/accel/grid/planes.rs.
 // Reads build, pairs_from, triangles; writes leaf_triangles, leaf_planes.
-#include "grid_build.glsl"
+#include "grid/grid_build.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_GRID_TRIANGLES) readonly buffer TrianglesBlock { Triangle triangles[]; };

@@ -4,7 +4,7 @@
 // Grid, resolutions: determines into how many lower cells each upper cell is cut along each axis. One workgroup per
 // block of GRID_BLOCK_SIZE upper cells; an invocation takes one cell per row.
 // Reads build, cells; writes blocks and, in scan_blocks, the number of lower cells of the block.
-#include "grid_build.glsl"
+#include "grid/grid_build.glsl"
 #include "scan.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;

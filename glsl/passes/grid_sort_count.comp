@@ -6,8 +6,8 @@
 // sort is a least-significant-digit radix sort (Satish, Harris, Garland, "Designing efficient sorting algorithms for
 // manycore GPUs", 2009).
 // Reads build, pairs_from; writes scan_blocks[digit * workgroups + workgroup].
-#include "grid_build.glsl"
-#include "grid_digits.glsl"
+#include "grid/grid_build.glsl"
+#include "grid/grid_digits.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_GRID_PAIRS_FROM) readonly buffer PairsFromBlock { uvec2 pairs_from[]; };

@@ -6,8 +6,8 @@
 // its place in the order of the digit. Pairs of the same digit keep their order. A tile is sorted in shared memory
 // first, so that neighbouring invocations write to neighbouring addresses.
 // Reads build, pairs_from, scan_blocks; writes pairs_to.
-#include "grid_build.glsl"
-#include "grid_digits.glsl"
+#include "grid/grid_build.glsl"
+#include "grid/grid_digits.glsl"
 #include "scan.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;

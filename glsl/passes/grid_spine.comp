@@ -4,7 +4,7 @@
 // Grid, spine: the only workgroup turns the sums of blocks into exclusive prefix sums. Each invocation scans a
 // contiguous part of the sums. Except in the sort, the total decides how the attempt continues.
 // Reads and writes scan_blocks and build.
-#include "grid_attempt.glsl"
+#include "grid/grid_attempt.glsl"
 #include "scan.glsl"
 
 // What is summed: lower cells, columns, pairs, or pairs by the digit that the sort takes.

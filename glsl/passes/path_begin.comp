@@ -3,9 +3,9 @@
 // Path begin: one invocation per path of the batch makes its camera ray.
 // Writes rays, path_states, shadow rays (none), live_paths (all paths, the list of bounce 0).
 #include "layout.glsl"
-#include "paths.glsl"
-#include "path_camera.glsl"
-#include "store.glsl"
+#include "rays/paths.glsl"
+#include "rays/path_camera.glsl"
+#include "rays/store.glsl"
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_LIVE_PATHS) writeonly buffer LivePathsBlock { uint live_paths[]; };

@@ -6,7 +6,7 @@
 // child_kinds (whether the path at a place of the bounce's list goes on and has a shadow ray), scan_blocks, bounces;
 // updates live_paths.
 #include "layout.glsl"
-#include "paths.glsl"
+#include "rays/paths.glsl"
 #include "scan.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;

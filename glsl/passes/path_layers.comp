@@ -6,8 +6,8 @@
 // is what the radiance of a path has gained since the layer before, and a snapshot of the radiance is kept for that.
 // Reads path_states; updates path_snapshots; writes the layer's part of pixel_radiance.
 #include "layout.glsl"
-#include "paths.glsl"
-#include "sample_sums.glsl"
+#include "rays/paths.glsl"
+#include "picture/sample_sums.glsl"
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_PATH_STATES) readonly buffer PathStatesBlock { vec4 path_states[]; };

@@ -4,9 +4,9 @@
 // luminance.
 // Reads path_states; writes pixel_radiance.
 #include "layout.glsl"
-#include "paths.glsl"
-#include "noise.glsl"
-#include "sample_sums.glsl"
+#include "rays/paths.glsl"
+#include "picture/noise.glsl"
+#include "picture/sample_sums.glsl"
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_PATH_STATES) readonly buffer PathStatesBlock { vec4 path_states[]; };

@@ -7,10 +7,10 @@
 // that have a shadow ray. Reads hits, live_paths, bounces and the scene; updates rays and path_states; writes shadow
 // rays, child_kinds (whether the path at a place of the list goes on and has a shadow ray) and scan_blocks[workgroup].
 #include "layout.glsl"
-#include "paths.glsl"
+#include "rays/paths.glsl"
 #include "scan.glsl"
-#include "store.glsl"
-#include "path_vertex.glsl"
+#include "rays/store.glsl"
+#include "shading/path_vertex.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_LIVE_PATHS) readonly buffer LivePathsBlock { uint live_paths[]; };

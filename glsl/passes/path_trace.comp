@@ -3,10 +3,10 @@
 #extension GL_KHR_shader_subgroup_arithmetic : require
 // Path trace: finds the closest hits of the paths that are alive, and tests the shadow rays to lights of the bounce
 // before. One dispatch does both: it lasts as long as its longest ray, and so waits for such a ray once a bounce, not
-// twice. There are 2^trace_lanes_log2 invocations per ray and shadow ray, the first of which works (lanes.glsl). The
-// shadow rays follow the rays. Rays pass through blended surfaces at random (alpha_test.glsl). Reads rays,
+// twice. There are 2^trace_lanes_log2 invocations per ray and shadow ray, the first of which works (rays/lanes.glsl).
+// The shadow rays follow the rays. Rays pass through blended surfaces at random (shading/alpha_test.glsl). Reads rays,
 // live_paths, bounces and the acceleration structure; updates hits and shadow rays, in which suspended rays and shadow
-// rays leave their mark (suspended_rays.glsl), path_states (light that arrives is added), counters and, with
+// rays leave their mark (search/suspended_rays.glsl), path_states (light that arrives is added), counters and, with
 // COUNT_COSTS, n_rays and n_steps of pixel_aovs, which are about the first sample of the frame.
 #include "layout.glsl"
 
@@ -14,10 +14,10 @@
 layout(constant_id = CONSTANT_COUNT_COSTS) const bool COUNT_COSTS = false;
 const bool TESTS_BLENDED = true;
 #define STOCHASTIC_ALPHA
-#include "accel.glsl"
-#include "paths.glsl"
-#include "lanes.glsl"
-#include "store.glsl"
+#include "search/accel.glsl"
+#include "rays/paths.glsl"
+#include "rays/lanes.glsl"
+#include "rays/store.glsl"
 #include "counters.glsl"
 
 // Whether hits and shadow rays are counted.

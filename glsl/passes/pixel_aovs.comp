@@ -4,11 +4,11 @@
 // albedo, depth and the indices of the triangle and its material.
 // Reads hits and the scene; writes pixel_aovs, except n_rays and n_steps.
 #include "layout.glsl"
-#include "rays.glsl"
+#include "rays/rays.glsl"
 #include "scene.glsl"
-#include "surface.glsl"
-#include "material.glsl"
-#include "maps.glsl"
+#include "shading/surface.glsl"
+#include "shading/material.glsl"
+#include "shading/maps.glsl"
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hits[]; };

@@ -7,10 +7,10 @@
 // pixel_aovs; updates counters (n_hits).
 #include "layout.glsl"
 #include "scene.glsl"
-#include "rays.glsl"
-#include "store.glsl"
+#include "rays/rays.glsl"
+#include "rays/store.glsl"
 #include "counters.glsl"
-#include "triangle.glsl"
+#include "search/triangle.glsl"
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(set = 0, binding = BIND_TRIANGLE_IDS, r32ui) readonly uniform uimage2D triangle_ids;

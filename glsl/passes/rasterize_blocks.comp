@@ -4,8 +4,8 @@
 // bounding rectangle; if there are more blocks than workgroups, each workgroup takes several.
 // Reads triangles and the buffer of raster_groups; updates pixel_nearest.
 #include "layout.glsl"
-#include "rasterize.glsl"
-#include "footprint.glsl"
+#include "rasterize/rasterize.glsl"
+#include "rasterize/footprint.glsl"
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 

@@ -4,9 +4,9 @@
 // workgroup share the tests of all pixels of its small triangles; large triangles are left to rasterize_blocks.comp.
 // Reads triangles; updates pixel_nearest, raster_groups, raster_count; writes large_triangles.
 #include "layout.glsl"
-#include "rasterize.glsl"
-#include "footprint.glsl"
-#include "covered.glsl"
+#include "rasterize/rasterize.glsl"
+#include "rasterize/footprint.glsl"
+#include "rasterize/covered.glsl"
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 
@@ -22,7 +22,7 @@ shared uint n_tests;
 shared uint first_pixels[RAY_GROUP_SIZE];
 
 // The pixels of one invocation's triangle that are still to be tested. covered: one bit per pixel of the rectangle
-// (covered.glsl). place: the index of the first of these pixels' tests among all tests of the workgroup.
+// (rasterize/covered.glsl). place: the index of the first of these pixels' tests among all tests of the workgroup.
 struct PixelTests {
     Rectangle rectangle;
     uvec2 covered;

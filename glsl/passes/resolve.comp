@@ -5,7 +5,7 @@
 // bounce by first_children. Each pixel has one writer, which always sums in the same order.
 // Reads ray_radiance, first_children, bounces; writes pixel_radiance.
 #include "layout.glsl"
-#include "rays.glsl"
+#include "rays/rays.glsl"
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_RAY_RADIANCE) readonly buffer RayRadianceBlock { vec4 ray_radiance[]; };

@@ -6,14 +6,14 @@
 // Reads rays, hits, light_visibility, bounces and the scene; writes ray_radiance (weighted by throughput); updates
 // counters (n_shadow_rays).
 #include "layout.glsl"
-#include "rays.glsl"
+#include "rays/rays.glsl"
 #include "scene.glsl"
-#include "surface.glsl"
-#include "light.glsl"
-#include "material.glsl"
-#include "maps.glsl"
+#include "shading/surface.glsl"
+#include "shading/light.glsl"
+#include "shading/material.glsl"
+#include "shading/maps.glsl"
 #include "counters.glsl"
-#include "studio.glsl"
+#include "shading/studio.glsl"
 
 // Whether shadow rays are counted.
 layout(constant_id = CONSTANT_COUNTS) const bool COUNTS = true;

@@ -2,22 +2,22 @@
 #extension GL_GOOGLE_include_directive : require
 // Shadow (the paper's section 2.1): tests the shadow rays. They go from the hits of all rays of the batch, in all
 // bounces, to each light that the surface could show. A light is hidden if its shadow ray hits anything.
-// There are 2^shadow_lanes_log2 invocations per ray and light, the first of which works (lanes.glsl).
+// There are 2^shadow_lanes_log2 invocations per ray and light, the first of which works (rays/lanes.glsl).
 // Reads rays, hits, bounces and the scene; updates light_visibility[light * queue_capacity + ray], in which a suspended
-// shadow ray leaves its mark (suspended_rays.glsl), and, with COUNT_COSTS, n_rays and n_steps of pixel_aovs.
+// shadow ray leaves its mark (search/suspended_rays.glsl), and, with COUNT_COSTS, n_rays and n_steps of pixel_aovs.
 #include "layout.glsl"
 
 // Whether the shadow rays' cost is added to pixel_aovs.
 layout(constant_id = CONSTANT_COUNT_COSTS) const bool COUNT_COSTS = false;
 const bool TESTS_BLENDED = true;
-#include "accel.glsl"
-#include "rays.glsl"
-#include "lanes.glsl"
-#include "surface.glsl"
-#include "light.glsl"
-#include "material.glsl"
-#include "maps.glsl"
-#include "lit_point.glsl"
+#include "search/accel.glsl"
+#include "rays/rays.glsl"
+#include "rays/lanes.glsl"
+#include "shading/surface.glsl"
+#include "shading/light.glsl"
+#include "shading/material.glsl"
+#include "shading/maps.glsl"
+#include "shading/lit_point.glsl"
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_LIGHTS) readonly buffer LightsBlock { Light lights[]; };

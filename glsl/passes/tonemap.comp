@@ -4,8 +4,8 @@
 // result as sRGB with 8 bits per channel.
 // Reads pixel_filtered; writes pixel_display (R in the lowest byte).
 #include "layout.glsl"
-#include "display.glsl"
-#include "tone_curves.glsl"
+#include "picture/display.glsl"
+#include "picture/tone_curves.glsl"
 
 layout(local_size_x = TILE_SIZE, local_size_y = TILE_SIZE) in;
 layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };

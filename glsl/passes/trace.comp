@@ -2,18 +2,18 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 // Trace (the paper's section 2.3): finds the closest hit of each ray of the bounce. There are 2^trace_lanes_log2
-// invocations per ray, the first of which works (lanes.glsl).
+// invocations per ray, the first of which works (rays/lanes.glsl).
 // Reads rays, bounces and the acceleration structure; updates hits, in which a suspended ray leaves its mark
-// (suspended_rays.glsl), counters (n_hits) and, with COUNT_COSTS, n_rays and n_steps of pixel_aovs.
+// (search/suspended_rays.glsl), counters (n_hits) and, with COUNT_COSTS, n_rays and n_steps of pixel_aovs.
 #include "layout.glsl"
 
 // Whether the rays' cost is added to pixel_aovs.
 layout(constant_id = CONSTANT_COUNT_COSTS) const bool COUNT_COSTS = false;
 const bool TESTS_BLENDED = false;
-#include "accel.glsl"
-#include "rays.glsl"
-#include "lanes.glsl"
-#include "store.glsl"
+#include "search/accel.glsl"
+#include "rays/rays.glsl"
+#include "rays/lanes.glsl"
+#include "rays/store.glsl"
 #include "counters.glsl"
 
 // Whether hits are counted.

@@ -6,9 +6,9 @@
 // triangle_materials and texture_words.
 #include "layout.glsl"
 #include "scene.glsl"
-#include "camera.glsl"
-#include "triangle.glsl"
-#include "alpha_test.glsl"
+#include "rays/camera.glsl"
+#include "search/triangle.glsl"
+#include "shading/alpha_test.glsl"
 
 layout(location = 0) flat in uint triangle_ix;
 layout(location = 0) out uint triangle_id;

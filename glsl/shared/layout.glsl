@@ -135,7 +135,7 @@
 #define MATERIAL_REFRACT 4u
 // `Material.flags`: the share of reflected light follows Fresnel's equations.
 #define MATERIAL_FRESNEL 8u
-// `Material.flags`: the material reflects by microfacets (microfacet.glsl), not by Phong's model.
+// `Material.flags`: the material reflects by microfacets (shading/microfacet.glsl), not by Phong's model.
 #define MATERIAL_MICROFACET 16u
 // `Material.flags`, with microfacets: the surface is the boundary of a solid, which refracts and absorbs light. Without
 // this flag it is a thin sheet.
@@ -346,7 +346,7 @@ struct GridCell {
 // - `ke`: emitted radiance.
 // - `flags`: bits of `MATERIAL_SPECULAR` and its like.
 // - `tf`: weight of refracted light by colour.
-// - `transmission`, `metallic`, `roughness`: of microfacets (microfacet.glsl), 0..1.
+// - `transmission`, `metallic`, `roughness`: of microfacets (shading/microfacet.glsl), 0..1.
 // - `absorption`: of light in the solid behind the surface, by colour (per world unit).
 // - `clearcoat`: share of the surface that a clear layer covers, 0..1. `clearcoat_roughness`: of this layer, 0..1.
 // - `sheen_colour`, `sheen_roughness`: reflectance and roughness (0..1) of the sheen of cloth.
@@ -657,7 +657,7 @@ struct ShadowRay {
 #define NOISE_TILE_SIZE 16u
 // The most noise tiles that are drawn together. Their words fill the smallest uniform buffer that a device may have.
 #define MOST_NOISE_TILES 4096u
-// `Frame.window_x` if the window is a column of noise tiles (noise_tiles.glsl).
+// `Frame.window_x` if the window is a column of noise tiles (rays/noise_tiles.glsl).
 #define WINDOW_OF_TILES 0xffffffffu
 // The least pdf, per steradian, with which a lobe samples a direction in which it sees the studio. That of diffuse
 // surfaces is at most 1 / pi.
@@ -723,8 +723,8 @@ struct Hit {
 //   `aperture`: radius of the lens (world units; 0: everything is sharp). `focus`: distance of what is sharp from the
 //   eye, along `forward` (world units). `focuses_on_target`: 1 if that is the distance of the camera's target.
 //   `samples_reciprocal`: 1 / `n_samples`. The host divides, because devices round quotients in different ways.
-// - `has_studio`: 1 if metals and glass mirror a studio (studio.glsl). `to_viewer`: horizontal unit vector towards the
-//   viewer for whom it was set up, world space.
+// - `has_studio`: 1 if metals and glass mirror a studio (shading/studio.glsl). `to_viewer`: horizontal unit vector
+//   towards the viewer for whom it was set up, world space.
 struct Frame {
     mat4 clip_from_world;
     vec3 eye;
@@ -1001,7 +1001,7 @@ struct AccelConstants {
 #define CONSTANT_TEXTURED 24u
 // Whether the scene has materials of microfacets.
 #define CONSTANT_MICROFACETS 25u
-// Whether rays of all kinds are alpha-tested: whether there are masked materials (alpha_test.glsl).
+// Whether rays of all kinds are alpha-tested: whether there are masked materials (shading/alpha_test.glsl).
 #define CONSTANT_ALPHA_MASKS 26u
 // Whether some triangles have normals at their corners.
 #define CONSTANT_SMOOTH 22u
@@ -1122,7 +1122,7 @@ struct DriverCast {
     uint accel_address_high;
 };
 
-// The build of a grid (src/passes/grid). grid_build.glsl defines its terms: pair, item, column and block.
+// The build of a grid (src/passes/grid). grid/grid_build.glsl defines its terms: pair, item, column and block.
 
 // The most attempts to build a level of cells within the limit of references. The last one has the largest cells.
 #define GRID_MAX_ATTEMPTS 4u
@@ -1295,7 +1295,7 @@ struct GridSort {
 #define BIND_PIXEL_NEAREST 28u
 // One `RasterGroups`, counts, and one `LargeTriangle` for each triangle of the scene.
 #define BIND_RASTER_GROUPS 29u
-// A row of counts, then `SUSPENDED_RAY_ROWS` rows of four words for each slot (suspended_rays.glsl).
+// A row of counts, then `SUSPENDED_RAY_ROWS` rows of four words for each slot (search/suspended_rays.glsl).
 #define BIND_SUSPENDED_RAYS 32u
 
 // Bindings that only frames of paths have. `rays`, `hits`, `path_states`, `shadow_rays` and `path_snapshots` have an
@@ -1314,7 +1314,7 @@ struct GridSort {
 // A vec4 for each path: its radiance when the last layer of light was complete. Empty unless the picture has layers of
 // light.
 #define BIND_PATH_SNAPSHOTS 37u
-// A word for each of `MOST_NOISE_TILES` noise tiles (noise_tiles.glsl).
+// A word for each of `MOST_NOISE_TILES` noise tiles (rays/noise_tiles.glsl).
 #define BIND_NOISE_TILES 38u
 
 // The scene's arrays as texels: the binding of each is this plus its own. All other bindings are below it.

@@ -16,7 +16,7 @@ ARRAY(triangles, Triangle, vec4, 1u)
 ARRAY(triangle_materials, uint, uint, 2u)
 
 // Everything that textures need, as words, or none if the scene has neither textures nor colours at the corners of
-// triangles (texture_words.glsl).
+// triangles (shading/texture_words.glsl).
 ARRAY(texture_words, uint, uint, 31u)
 
 // The nodes of the kd-tree.

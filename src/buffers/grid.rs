@@ -200,7 +200,7 @@ impl GridBuffers {
     }
 }
 
-/// Arrays that only kernels access. grid_build.glsl defines the terms: item, column, pair and block.
+/// Arrays that only kernels access. grid/grid_build.glsl defines the terms: item, column, pair and block.
 struct Arrays {
     triangles: Buffer<Triangle>,
     /// The index of each item's first column, counted from the first column of the item's scan block.

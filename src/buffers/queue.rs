@@ -67,7 +67,7 @@ impl PathQueue {
 pub struct Queue {
     /// The rays, bounce after bounce. There are `queue_capacity` elements, as in all buffers here but the last two.
     /// The camera's rays come first and are never stored: kernels compute them from their indices
-    /// (glsl/shared/rays.glsl).
+    /// (glsl/shared/rays/rays.glsl).
     pub rays: Buffer<PathRay>,
     pub hits: Buffer<Hit>,
     /// Bits that say which rays continue from each hit: a reflected one, a transmitted one (layout.glsl).

@@ -1,5 +1,5 @@
 //! Suspended rays: rays that stop on their way through the acceleration structure, and go on in further dispatches
-//! (glsl/shared/suspended_rays.glsl).
+//! (glsl/shared/search/suspended_rays.glsl).
 //!
 //! Some drivers silently end a shader after a number of loop iterations. On such a device, a ray that has spent its
 //! iterations stores its state and leaves a mark in place of its result. The host repeats the dispatch until no ray is

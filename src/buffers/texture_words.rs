@@ -1,5 +1,5 @@
 //! The array `texture_words`: everything that textures and emitters need, one part after the other
-//! (glsl/shared/texture_words.glsl).
+//! (glsl/shared/shading/texture_words.glsl).
 
 use bytemuck::cast_slice;
 

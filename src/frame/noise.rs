@@ -1,4 +1,4 @@
-//! Measures of noise. Twin of `noise.glsl`.
+//! Measures of noise. Twin of `picture/noise.glsl`.
 
 use glam::Vec3;
 

@@ -20,7 +20,7 @@ pub struct TileSamples {
 /// Tiles that are drawn together.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NoiseTiles {
-    /// The tiles as the kernels read them (glsl/shared/noise_tiles.glsl).
+    /// The tiles as the kernels read them (glsl/shared/rays/noise_tiles.glsl).
     words: Arc<[u32]>,
     /// The first sample of all, and the number of samples of each tile.
     first_sample: u32,

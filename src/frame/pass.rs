@@ -410,7 +410,7 @@ impl Pass {
     }
 
     /// Returns the resources that its kernel declares as writable. Most kernels write only parts of them, and
-    /// `rasterize_blocks` writes only `PixelNearest`: it includes the others with `rasterize.glsl`.
+    /// `rasterize_blocks` writes only `PixelNearest`: it includes the others with `rasterize/rasterize.glsl`.
     pub fn writes(self) -> &'static [Resource] {
         self.info().writes
     }

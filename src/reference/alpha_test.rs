@@ -1,4 +1,4 @@
-//! The alpha test: a hit counts only where the surface's opacity is high enough. Twin of `alpha_test.glsl`.
+//! The alpha test: a hit counts only where the surface's opacity is high enough. Twin of `shading/alpha_test.glsl`.
 
 use super::{
     sampler::{mixed, unit_number},

@@ -1,4 +1,5 @@
-//! The closest hit over all triangles, without a tree. The traversal must find the same hit. Twin of `brute.glsl`.
+//! The closest hit over all triangles, without a tree. The traversal must find the same hit. Twin of
+//! `search/brute.glsl`.
 
 use super::{search_ray::SearchRay, triangle::Shear};
 use crate::layout::{Hit, NO_TRIANGLE, Triangle};

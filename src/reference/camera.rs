@@ -1,4 +1,5 @@
-//! The order of pixels in the ray queue, and the origins and directions of the camera's rays. Twin of `camera.glsl`.
+//! The order of pixels in the ray queue, and the origins and directions of the camera's rays. Twin of
+//! `rays/camera.glsl`.
 
 use glam::{UVec2, Vec2, Vec3, uvec2, vec2};
 

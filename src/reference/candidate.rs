@@ -1,5 +1,5 @@
 //! Candidates, which are the triangles that a search comes to, and their test against the nearest hit so far. Twin of
-//! `candidate.glsl`.
+//! `search/candidate.glsl`.
 
 use super::{counting::table::ReadCounter, inputs::KernelInputs, search_ray::SearchRay, triangle::Shear};
 use crate::layout::Hit;

@@ -1,4 +1,4 @@
-//! The child rays that start at a hit: reflected, transmitted, both or none. Twin of `children.glsl`.
+//! The child rays that start at a hit: reflected, transmitted, both or none. Twin of `shading/children.glsl`.
 
 use glam::Vec3;
 

@@ -1,4 +1,4 @@
-//! Conversions from radiance to display values. Twin of `display.glsl`.
+//! Conversions from radiance to display values. Twin of `picture/display.glsl`.
 
 use glam::Vec3;
 

@@ -1,4 +1,4 @@
-//! What the passes of the noise filter `edge` have in common. Twin of `edge.glsl`.
+//! What the passes of the noise filter `edge` have in common. Twin of `picture/edge.glsl`.
 
 use glam::Vec3;
 

@@ -1,4 +1,4 @@
-//! Reflection and refraction at the smooth boundary of a dielectric. Twin of `fresnel.glsl`.
+//! Reflection and refraction at the smooth boundary of a dielectric. Twin of `shading/fresnel.glsl`.
 
 use glam::Vec3;
 

@@ -1,5 +1,5 @@
 //! The search through a grid, from cell to cell along the ray (a 3D-DDA: Amanatides and Woo, "A fast voxel traversal
-//! algorithm for ray tracing", 1987). Twin of `grid.glsl`.
+//! algorithm for ray tracing", 1987). Twin of `grid/grid.glsl`.
 //!
 //! The t at which the ray meets a plane between cells is computed from the plane itself, by the operations of the
 //! kd-tree's traversal, not summed up from cell to cell. So the ray visits the cells that it would visit in a kd-tree

@@ -1,4 +1,4 @@
-//! The cells of nodes as boxes, for traversals that use them. Twin of `kd_boxes.glsl`.
+//! The cells of nodes as boxes, for traversals that use them. Twin of `kdtree/kd_boxes.glsl`.
 
 use super::{
     counting::table::ReadCounter,

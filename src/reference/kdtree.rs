@@ -1,5 +1,5 @@
-//! Depth-first traversal of the kd-tree (the paper's section 2.3, Algorithm 2). Twin of `kdtree.glsl`, which defines
-//! cells, first and second children, and pending subtrees.
+//! Depth-first traversal of the kd-tree (the paper's section 2.3, Algorithm 2). Twin of `kdtree/kdtree.glsl`, which
+//! defines cells, first and second children, and pending subtrees.
 
 use super::{
     counting::table::ReadCounter,

@@ -1,5 +1,5 @@
 //! Tests of a leaf's triangles. A ray is tested only against those whose planes it meets within the leaf. Twin of
-//! `leaf.glsl`.
+//! `search/leaf.glsl`.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! Point, spot and directional lights, as seen from a point of a surface. Twin of `light.glsl`.
+//! Point, spot and directional lights, as seen from a point of a surface. Twin of `shading/light.glsl`.
 
 use glam::Vec3;
 

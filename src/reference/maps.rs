@@ -1,4 +1,4 @@
-//! The surface and the material at a hit, with the material's textures applied. Twin of `maps.glsl`.
+//! The surface and the material at a hit, with the material's textures applied. Twin of `shading/maps.glsl`.
 
 use std::cell::OnceCell;
 

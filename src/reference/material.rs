@@ -1,5 +1,5 @@
 //! Materials: local light by Phong, mirrors, glass and transparency as in Wavefront MTL, and microfacets. Twin of
-//! `material.glsl`.
+//! `shading/material.glsl`.
 
 use glam::Vec3;
 

@@ -1,5 +1,5 @@
-//! Reflection by microfacets: metals and dielectrics, after glTF 2.0, Appendix B. Twin of `microfacet.glsl`, which
-//! names the sources.
+//! Reflection by microfacets: metals and dielectrics, after glTF 2.0, Appendix B. Twin of `shading/microfacet.glsl`,
+//! which names the sources.
 
 use glam::{Vec3, Vec4};
 

@@ -1,4 +1,4 @@
-//! The picture's pixels and samples that paths belong to. Twin of `noise_tiles.glsl`.
+//! The picture's pixels and samples that paths belong to. Twin of `rays/noise_tiles.glsl`.
 
 use glam::{UVec2, uvec2};
 

@@ -1,4 +1,4 @@
-//! The camera rays of paths. Twin of `path_camera.glsl`.
+//! The camera rays of paths. Twin of `rays/path_camera.glsl`.
 
 use glam::{UVec2, Vec2, Vec3, vec2};
 

@@ -1,4 +1,4 @@
-//! One step of a path: the light at its hit, and the way on. Twin of `path_vertex.glsl`.
+//! One step of a path: the light at its hit, and the way on. Twin of `shading/path_vertex.glsl`.
 
 use glam::{Vec2, Vec3, vec3};
 

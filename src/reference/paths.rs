@@ -1,4 +1,4 @@
-//! The paths of a batch. Twin of `paths.glsl`.
+//! The paths of a batch. Twin of `rays/paths.glsl`.
 
 use glam::UVec2;
 

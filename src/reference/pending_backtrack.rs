@@ -1,4 +1,4 @@
-//! Pending subtrees without any memory, found by the ancestors' boxes. Twin of `pending_backtrack.glsl`.
+//! Pending subtrees without any memory, found by the ancestors' boxes. Twin of `kdtree/pending_backtrack.glsl`.
 
 use super::{
     counting::table::ReadCounter,

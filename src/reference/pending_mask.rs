@@ -1,4 +1,4 @@
-//! Pending subtrees by the paper's bit mask, which has one bit for each level. Twin of `pending_mask.glsl`.
+//! Pending subtrees by the paper's bit mask, which has one bit for each level. Twin of `kdtree/pending_mask.glsl`.
 
 use super::{
     counting::table::ReadCounter,

@@ -1,4 +1,4 @@
-//! Pending subtrees by the paper's mask, and by tests of the siblings' boxes. Twin of `pending_mask_boxes.glsl`.
+//! Pending subtrees by the paper's mask, and by tests of the siblings' boxes. Twin of `kdtree/pending_mask_boxes.glsl`.
 
 use super::{
     counting::table::ReadCounter,

@@ -1,4 +1,5 @@
-//! Pending subtrees by restarts from the root, along the trail that the mask stores. Twin of `pending_restart.glsl`.
+//! Pending subtrees by restarts from the root, along the trail that the mask stores. Twin of
+//! `kdtree/pending_restart.glsl`.
 
 use super::{
     counting::table::ReadCounter,

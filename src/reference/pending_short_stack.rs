@@ -1,5 +1,5 @@
 //! Pending subtrees on a short stack: a ring keeps the newest ones, and the mask leads to older ones. Twin of
-//! `pending_short_stack.glsl`.
+//! `kdtree/pending_short_stack.glsl`.
 
 use super::{
     counting::table::ReadCounter,

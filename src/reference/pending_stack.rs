@@ -1,4 +1,4 @@
-//! Pending subtrees on a stack, without bits and without climbing. Twin of `pending_stack.glsl`.
+//! Pending subtrees on a stack, without bits and without climbing. Twin of `kdtree/pending_stack.glsl`.
 
 use super::{
     counting::table::ReadCounter,

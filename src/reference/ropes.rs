@@ -1,4 +1,4 @@
-//! Traversal from leaf to leaf by ropes, without a stack. Twin of `ropes.glsl`.
+//! Traversal from leaf to leaf by ropes, without a stack. Twin of `kdtree/ropes.glsl`.
 
 use super::{
     counting::table::ReadCounter,

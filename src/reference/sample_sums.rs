@@ -1,4 +1,4 @@
-//! The sum of a pixel's samples of a frame, as a binary tree. Twin of `sample_sums.glsl`.
+//! The sum of a pixel's samples of a frame, as a binary tree. Twin of `picture/sample_sums.glsl`.
 
 use glam::Vec4;
 

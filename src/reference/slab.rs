@@ -1,5 +1,5 @@
-//! Tests whether a ray keeps clear of the slab around a node's surface. Twin of `slab.glsl`. `leaf.rs` has the test
-//! for the planes of triangles, and `src/cpu/packet.rs` the test of slabs for sixteen rays.
+//! Tests whether a ray keeps clear of the slab around a node's surface. Twin of `kdtree/slab.glsl`. `leaf.rs` has the
+//! test for the planes of triangles, and `src/cpu/packet.rs` the test of slabs for sixteen rays.
 
 use super::{counting::table::ReadCounter, inputs::KernelInputs, traversal_ray::TraversalRay};
 use crate::layout::{KD_HAS_SLAB, KdNode, Slab};

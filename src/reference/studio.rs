@@ -1,4 +1,4 @@
-//! The studio that metals and glass mirror. Twin of `studio.glsl`, which describes it.
+//! The studio that metals and glass mirror. Twin of `shading/studio.glsl`, which describes it.
 
 use glam::{Vec2, Vec3, Vec4, vec2, vec3, vec4};
 

@@ -1,4 +1,4 @@
-//! The surface at a hit, and the rays that leave it. Twin of `surface.glsl`.
+//! The surface at a hit, and the rays that leave it. Twin of `shading/surface.glsl`.
 
 use glam::{Vec2, Vec3};
 

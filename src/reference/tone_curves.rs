@@ -1,5 +1,5 @@
-//! Tone curves: from exposed radiance to a display's 0..1, both linear. Twin of `tone_curves.glsl`, which names the
-//! sources.
+//! Tone curves: from exposed radiance to a display's 0..1, both linear. Twin of `picture/tone_curves.glsl`, which names
+//! the sources.
 
 use glam::{Mat3, Vec3};
 

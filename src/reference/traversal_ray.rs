@@ -1,5 +1,5 @@
 //! A ray in the form that searches through an acceleration structure use, and its interval in the structure's box.
-//! Twin of `traversal_ray.glsl`. Here all t are the ray's own; there they are halves.
+//! Twin of `search/traversal_ray.glsl`. Here all t are the ray's own; there they are halves.
 
 use glam::{Vec3, Vec3A};
 

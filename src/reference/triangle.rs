@@ -1,4 +1,4 @@
-//! The watertight test of a ray against one triangle. Twin of `triangle.glsl`.
+//! The watertight test of a ray against one triangle. Twin of `search/triangle.glsl`.
 //!
 //! # Bounds of a hit's error
 //!

@@ -200,7 +200,7 @@ mod tests {
         let copy = edited("glsl/passes/trace.comp", |text| text.replace("void main() {", "void main() { oops();"));
         let error = compile(copy.path()).unwrap_err();
         assert!(error.starts_with(&format!("glsl/passes/trace.comp:{}: error: 'oops'", line_of(text))), "{error}");
-        for shared in ["glsl/shared/kdtree.glsl", "glsl/shared/bsdf/bsdf.glsl"] {
+        for shared in ["glsl/shared/kdtree/kdtree.glsl", "glsl/shared/bsdf/bsdf.glsl"] {
             let copy = edited(shared, |text| format!("oops\n{text}"));
             let error = compile(copy.path()).unwrap_err();
             assert!(error.contains(&format!("{shared}:")), "{error}");

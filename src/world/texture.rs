@@ -1,5 +1,5 @@
 //! Lookups in textures, whose texels are words of the array `texels`. Positions within an image and weights of texels
-//! are multiples of 1/256, so all devices blend alike. Twin of `texture.glsl`.
+//! are multiples of 1/256, so all devices blend alike. Twin of `shading/texture.glsl`.
 
 use glam::{IVec2, Vec2, Vec4};
 use half::f16;

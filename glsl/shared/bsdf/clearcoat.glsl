@@ -4,7 +4,7 @@
 #ifndef KDRAY_BSDF_CLEARCOAT
 #define KDRAY_BSDF_CLEARCOAT
 
-#include "microfacet.glsl"
+#include "shading/microfacet.glsl"
 #include "bsdf/albedo.glsl"
 
 // Reflectance along the normal, of the index 1.5.

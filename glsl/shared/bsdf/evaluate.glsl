@@ -4,7 +4,7 @@
 #define KDRAY_BSDF_EVALUATE
 
 #include "layout.glsl"
-#include "surface.glsl"
+#include "shading/surface.glsl"
 #include "bsdf/albedo.glsl"
 #include "bsdf/clearcoat.glsl"
 #include "bsdf/lambert.glsl"

@@ -6,7 +6,7 @@
 #define KDRAY_BSDF_LOBES
 
 #include "layout.glsl"
-#include "microfacet.glsl"
+#include "shading/microfacet.glsl"
 #include "bsdf/conductor.glsl"
 
 layout(constant_id = CONSTANT_LOBES) const uint LOBES = 0xffffffffu;

@@ -3,8 +3,8 @@
 #define KDRAY_BSDF_SAMPLE
 
 #include "layout.glsl"
-#include "surface.glsl"
-#include "fresnel.glsl"
+#include "shading/surface.glsl"
+#include "shading/fresnel.glsl"
 #include "bsdf/clearcoat.glsl"
 #include "bsdf/evaluate.glsl"
 #include "bsdf/ggx.glsl"

@@ -4,9 +4,9 @@
 #define KDRAY_BSDF_TERMS
 
 #include "layout.glsl"
-#include "surface.glsl"
-#include "microfacet.glsl"
-#include "fresnel.glsl"
+#include "shading/surface.glsl"
+#include "shading/microfacet.glsl"
+#include "shading/fresnel.glsl"
 #include "bsdf/albedo.glsl"
 #include "bsdf/clearcoat.glsl"
 #include "bsdf/lobes.glsl"

@@ -8,7 +8,7 @@
 #ifndef KDRAY_BSDF_TRANSMISSION
 #define KDRAY_BSDF_TRANSMISSION
 
-#include "fresnel.glsl"
+#include "shading/fresnel.glsl"
 #include "bsdf/ggx.glsl"
 
 // The direction that a microfacet of this normal refracts to the viewer. There must be no total reflection.

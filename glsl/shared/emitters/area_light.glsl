@@ -1,12 +1,12 @@
 // Rectangles, disks and spheres, which are no part of the acceleration structure. Twin of
 // src/reference/emitters/area_light.rs.
 //
-// Needs the words of textures (texture_words.glsl).
+// Needs the words of textures (shading/texture_words.glsl).
 #ifndef KDRAY_AREA_LIGHT
 #define KDRAY_AREA_LIGHT
 
 #include "layout.glsl"
-#include "texture_words.glsl"
+#include "shading/texture_words.glsl"
 #include "emitters/kinds.glsl"
 #include "emitters/light_sample.glsl"
 #include "emitters/rectangle.glsl"

@@ -2,13 +2,13 @@
 // probability by its power or, where there are many, by what it may send to the point. Then a direction towards it is
 // sampled. Twin of src/reference/emitters/mod.rs.
 //
-// Needs the bindings `lights` and `materials` (material.glsl), and the words of textures.
+// Needs the bindings `lights` and `materials` (shading/material.glsl), and the words of textures.
 #ifndef KDRAY_EMITTERS
 #define KDRAY_EMITTERS
 
 #include "layout.glsl"
 #include "scene.glsl"
-#include "texture_words.glsl"
+#include "shading/texture_words.glsl"
 #include "emitters/alias.glsl"
 #include "emitters/area_light.glsl"
 #include "emitters/environment.glsl"

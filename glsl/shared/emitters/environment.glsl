@@ -9,13 +9,13 @@
 // sampled first, and then a texel of the row, each by an alias table, and at last a place below the texel's tent. The
 // pdf in the map is therefore bilinear, too. Per steradian, it is divided by the sine of the polar angle.
 //
-// Needs the words of textures (texture_words.glsl).
+// Needs the words of textures (shading/texture_words.glsl).
 #ifndef KDRAY_ENVIRONMENT
 #define KDRAY_ENVIRONMENT
 
 #include "layout.glsl"
 #include "tent.glsl"
-#include "texture_words.glsl"
+#include "shading/texture_words.glsl"
 #include "emitters/alias.glsl"
 #include "emitters/kinds.glsl"
 #include "emitters/light_sample.glsl"

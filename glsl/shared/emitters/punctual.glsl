@@ -5,7 +5,7 @@
 #define KDRAY_PUNCTUAL
 
 #include "layout.glsl"
-#include "light.glsl"
+#include "shading/light.glsl"
 #include "emitters/light_sample.glsl"
 
 // probability: with which this light is sampled.

@@ -1,6 +1,6 @@
 // Directional lights that are seen as disks: parts of the environment. Twin of src/reference/emitters/sun.rs.
 //
-// Needs the words of textures (texture_words.glsl).
+// Needs the words of textures (shading/texture_words.glsl).
 #ifndef KDRAY_SUN
 #define KDRAY_SUN
 

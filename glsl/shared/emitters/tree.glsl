@@ -2,12 +2,12 @@
 // Sampling of Many Lights with Adaptive Tree Splitting, HPG 2018). The host builds it (src/world/light_tree.rs). Twin
 // of src/reference/emitters/tree.rs.
 //
-// Needs the words of textures (texture_words.glsl).
+// Needs the words of textures (shading/texture_words.glsl).
 #ifndef KDRAY_LIGHT_TREE
 #define KDRAY_LIGHT_TREE
 
 #include "layout.glsl"
-#include "texture_words.glsl"
+#include "shading/texture_words.glsl"
 #include "emitters/alias.glsl"
 
 // The least squared distance from a light, square world units, which bounds what lights without a size send.

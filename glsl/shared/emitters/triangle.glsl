@@ -1,15 +1,15 @@
 // Triangles whose material emits light, to both sides. A point is sampled uniformly on the area. Twin of
 // src/reference/emitters/triangle.rs.
 //
-// Needs the binding `materials` (material.glsl) and the words of textures.
+// Needs the binding `materials` (shading/material.glsl) and the words of textures.
 #ifndef KDRAY_EMITTING_TRIANGLE
 #define KDRAY_EMITTING_TRIANGLE
 
 #include "layout.glsl"
 #include "scene.glsl"
-#include "texture_words.glsl"
-#include "texture.glsl"
-#include "material.glsl"
+#include "shading/texture_words.glsl"
+#include "shading/texture.glsl"
+#include "shading/material.glsl"
 #include "emitters/light_sample.glsl"
 
 // The radiance that a triangle emits at barycentric weights of its second and third corner, by the largest level of

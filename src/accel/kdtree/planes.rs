@@ -14,7 +14,7 @@
 //! the slope (the change of height per t), times t               26
 //! the middle of the t interval                                   9
 //! half of the t interval                                         9
-//! middle * slope + height, and half * |slope|                4 + 4   (`is_clear` in glsl/shared/slab.glsl)
+//! middle * slope + height, and half * |slope|                4 + 4   (`is_clear` in glsl/shared/kdtree/slab.glsl)
 //! sum                                                          235   of 256
 //! ```
 

@@ -1,0 +1,59 @@
+// Candidates, which are the triangles that a search comes to, and their test against the nearest hit so far. A part
+// of accel.glsl.
+//
+// Needs scene.glsl, triangle.glsl, traversal_ray.glsl, local_memory.glsl and TESTS_BLENDED, whether the rays are shadow
+// rays, which test blended materials. Provides `Nearest`, `intersect`, `is_better`, `has_alpha_test`, `is_accepted`,
+// `is_done`.
+
+#include "shading/alpha_test.glsl"
+
+// Whether rays pass through triangles that are marked TRIANGLE_HIDDEN in `triangle_materials`.
+layout(constant_id = CONSTANT_SKIPS_HIDDEN) const bool SKIPS_HIDDEN = false;
+
+// The nearest hit so far, with the traversal's t. Its barycentric weights are in local memory (WEIGHTS_SLOT).
+struct Nearest {
+    float t;
+    uint triangle_ix;
+};
+
+// Whether a hit is in the ray's interval, not on its source triangle, and nearer than the best one. Of two hits at
+// the same t, the one with the lower triangle index wins, so the order of tests does not matter. The first `best` is
+// at the ray's t_max with NO_TRIANGLE, the highest index, so a hit at t_max counts.
+bool is_better(TraversalRay ray, float t, uint triangle_ix, Nearest best) {
+    bool nearer = t < best.t || (t == best.t && triangle_ix < best.triangle_ix);
+    return t > ray.t_min && nearer && triangle_ix != ray.source_triangle;
+}
+
+// Whether the rays pass through parts of triangles. Only modules that are compiled with WITH_ALPHA_TEST have the code
+// for it (build.rs).
+bool has_alpha_test() {
+#ifdef WITH_ALPHA_TEST
+    if (TESTS_BLENDED) return SHADOW_ALPHA_TEST;
+    return ALPHA_MASKS;
+#else
+    return false;
+#endif
+}
+
+// Whether a hit counts. Without SKIPS_HIDDEN and alpha test every hit does, and nothing is read. u, v: barycentric
+// weights of the hit.
+bool is_accepted(uint triangle_ix, float u, float v) {
+    if (has_alpha_test()) return !fails_alpha_test(triangle_ix, u, v, TESTS_BLENDED);
+    if (SKIPS_HIDDEN) return (load_triangle_materials(triangle_ix) & TRIANGLE_HIDDEN) == 0u;
+    return true;
+}
+
+// Tests a triangle against the ray, and keeps the hit in `best` if it is nearer.
+void intersect(TraversalRay ray, Triangle triangle, uint triangle_ix, inout Nearest best) {
+    Hit hit;
+    if (!intersect_triangle(ray.shear, triangle, triangle_ix, hit)) return;
+    if (is_better(ray, hit.t, triangle_ix, best) && is_accepted(triangle_ix, hit.u, hit.v)) {
+        best = Nearest(hit.t, triangle_ix);
+        spill_pair(WEIGHTS_SLOT, hit.u, hit.v);
+    }
+}
+
+// Whether the search can end because it needs only one hit and has one.
+bool is_done(bool any_hit, Nearest best) {
+    return any_hit && best.triangle_ix != NO_TRIANGLE;
+}
