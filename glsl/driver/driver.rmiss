@@ -3,9 +3,10 @@
 #extension GL_EXT_ray_tracing : require
 // Driver: one invocation per ray that hits nothing stores a miss in the payload of driver.rgen.
 #include "layout.glsl"
+#include "constants.glsl"
 
 layout(location = 0) rayPayloadInEXT Hit hit;
 
 void main() {
-    hit = Hit(uintBitsToFloat(0x7f800000u), NO_TRIANGLE, 0.0, 0.0);
+    hit = Hit(INFINITY, NO_TRIANGLE, 0.0, 0.0);
 }

@@ -24,7 +24,7 @@ void main() {
     pixel_aovs[pixel_ix].triangle_ix = hit.triangle_ix;
     if (hit.triangle_ix == NO_TRIANGLE) {
         pixel_aovs[pixel_ix].material_ix = NO_TRIANGLE;
-        pixel_aovs[pixel_ix].depth = uintBitsToFloat(0x7f800000u);
+        pixel_aovs[pixel_ix].depth = INFINITY;
         return; // the vectors were cleared at the frame's start
     }
     Surface surface;

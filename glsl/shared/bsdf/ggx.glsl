@@ -12,7 +12,7 @@
 #ifndef KDRAY_BSDF_GGX
 #define KDRAY_BSDF_GGX
 
-#include "pi.glsl"
+#include "constants.glsl"
 
 // Pdf of normals, per steradian and area of the surface. half_vector.z is at least 0.
 float ggx_distribution(vec3 half_vector, float width) {

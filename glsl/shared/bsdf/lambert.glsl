@@ -3,7 +3,7 @@
 #ifndef KDRAY_BSDF_LAMBERT
 #define KDRAY_BSDF_LAMBERT
 
-#include "pi.glsl"
+#include "constants.glsl"
 
 // A direction with a pdf in proportion to its cosine: a uniform point of the disk, raised to the hemisphere
 // (Malley's method; Pharr et al.: Physically Based Rendering, 4th edition, A.5.3).

@@ -5,7 +5,7 @@
 #ifndef KDRAY_BSDF_SHEEN
 #define KDRAY_BSDF_SHEEN
 
-#include "pi.glsl"
+#include "constants.glsl"
 #include "bsdf/albedo.glsl"
 
 // Pdf of the fibres' normals. width: of the distribution.

@@ -41,7 +41,7 @@ float hit_area_light(AreaLight light, vec3 origin, vec3 direction) {
     if (has_shapes(AREA_RECTANGLE) && light.kind == AREA_RECTANGLE) return hit_rectangle(light, origin, direction);
     if (has_shapes(AREA_DISK) && light.kind == AREA_DISK) return hit_disk(light, origin, direction);
     if (has_shapes(AREA_SPHERE)) return hit_sphere(light, origin, direction);
-    return uintBitsToFloat(0x7f800000u);
+    return INFINITY;
 }
 
 // The pdf with which a sample of the light gives the direction in which it is hit at a distance, per steradian.
@@ -56,7 +56,7 @@ float shape_pdf(AreaLight light, vec3 origin, vec3 direction, float distance) {
 // The nearest rectangle, disk or sphere that the ray meets between 0 and t_max. direction: a unit vector. The backs of
 // rectangles and disks and the insides of spheres are not seen.
 SeenLight seen_light(vec3 origin, vec3 direction, float t_max) {
-    float nearest = uintBitsToFloat(0x7f800000u);
+    float nearest = INFINITY;
     if (!has_emitters(EMITTER_AREA)) return SeenLight(nearest, vec3(0.0), 0.0);
     uint nearest_ix = 0u;
     for (uint light_ix = 0u; light_ix < accel.n_area_lights; ++light_ix) {

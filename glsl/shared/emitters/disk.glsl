@@ -10,7 +10,7 @@
 float hit_disk(AreaLight light, vec3 origin, vec3 direction) {
     float t = hit_plane(light, origin, direction);
     vec3 from_centre = origin + t * direction - light.position;
-    return dot(from_centre, from_centre) <= light.radius * light.radius ? t : uintBitsToFloat(0x7f800000u);
+    return dot(from_centre, from_centre) <= light.radius * light.radius ? t : INFINITY;
 }
 
 // A point of the unit disk, uniform on its area (Shirley, Chiu: A Low Distortion Map Between Disk and Square, 1997).
@@ -19,7 +19,7 @@ vec2 disk_point(vec2 u) {
     if (at.x == 0.0 && at.y == 0.0) return vec2(0.0);
     bool is_wide = abs(at.x) > abs(at.y);
     float radius = is_wide ? at.x : at.y;
-    float eighth = 0.25 * EMITTER_PI * (is_wide ? at.y / at.x : at.x / at.y);
+    float eighth = 0.25 * PI * (is_wide ? at.y / at.x : at.x / at.y);
     return is_wide ? radius * vec2(cos(eighth), sin(eighth)) : radius * vec2(sin(eighth), cos(eighth));
 }
 

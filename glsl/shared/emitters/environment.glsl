@@ -34,8 +34,8 @@ vec4 environment_texel(uint x, uint y) {
 // Where a direction is in the map, texels to the right and down from the middle of the first one.
 // aside: the sine of the polar angle.
 vec2 environment_place(vec3 direction, float aside) {
-    float turns = atan(direction.x, -direction.z) / (2.0 * EMITTER_PI) + 0.5 + accel.environment_turn;
-    vec2 place = vec2(turns - floor(turns), atan(aside, direction.y) / EMITTER_PI);
+    float turns = atan(direction.x, -direction.z) / (2.0 * PI) + 0.5 + accel.environment_turn;
+    vec2 place = vec2(turns - floor(turns), atan(aside, direction.y) / PI);
     return place * vec2(accel.environment_width, accel.environment_height) - 0.5;
 }
 
@@ -79,7 +79,7 @@ SeenEnvironment with_suns(MapValue value, vec3 direction) {
 
 // What a ray in this direction meets beyond the scene.
 SeenEnvironment seen_environment(vec3 direction) {
-    MapValue value = MapValue(accel.background, 1.0 / (4.0 * EMITTER_PI));
+    MapValue value = MapValue(accel.background, 1.0 / (4.0 * PI));
     if (HAS_ENVIRONMENT_MAP) {
         float aside = sqrt(direction.x * direction.x + direction.z * direction.z);
         value = map_value(environment_place(direction, aside), aside);
@@ -111,11 +111,11 @@ MapSample sample_map_direction(vec2 u) {
     float right = float(column.ix) + tent(column.rest);
     // The polar angle is taken from the nearer pole, where sines are exact.
     bool is_upper = down + 0.5 < 0.5 * float(n_rows);
-    float half_sine = sin(0.5 * EMITTER_PI / float(n_rows) * (is_upper ? down + 0.5 : float(n_rows) - 0.5 - down));
+    float half_sine = sin(0.5 * PI / float(n_rows) * (is_upper ? down + 0.5 : float(n_rows) - 0.5 - down));
     float versine = 2.0 * half_sine * half_sine;
     float aside = sqrt(max(versine * (2.0 - versine), 0.0));
     float turns = (right + 0.5) / float(n_columns) - 0.5 - accel.environment_turn;
-    float azimuth = 2.0 * EMITTER_PI * turns;
+    float azimuth = 2.0 * PI * turns;
     vec3 direction = vec3(aside * sin(azimuth), is_upper ? 1.0 - versine : versine - 1.0, -aside * cos(azimuth));
     return MapSample(direction, map_value(vec2(right, down), aside));
 }
@@ -124,14 +124,14 @@ MapSample sample_map_direction(vec2 u) {
 MapSample sample_any_direction(vec2 u) {
     float up = 1.0 - 2.0 * u.x;
     float sine = 2.0 * sqrt(max(u.x * (1.0 - u.x), 0.0));
-    float azimuth = 2.0 * EMITTER_PI * u.y;
+    float azimuth = 2.0 * PI * u.y;
     vec3 direction = vec3(sine * sin(azimuth), up, -sine * cos(azimuth));
-    return MapSample(direction, MapValue(accel.background, 1.0 / (4.0 * EMITTER_PI)));
+    return MapSample(direction, MapValue(accel.background, 1.0 / (4.0 * PI)));
 }
 
 // The sample of a direction beyond the scene.
 LightSample sample_beyond(vec3 direction, SeenEnvironment seen) {
-    Towards way = Towards(direction, uintBitsToFloat(0x7f800000u));
+    Towards way = Towards(direction, INFINITY);
     return sample_of_point(way, seen.radiance + ambient_radiance(direction), seen.pdf);
 }
 

@@ -3,8 +3,8 @@
 #define KDRAY_PICK
 
 #include "layout.glsl"
+#include "constants.glsl"
 
-const float EMITTER_PI = 3.14159265;
 // A number beyond which a pdf or a weight counts as infinite.
 const float MOST_LIGHT = 1.0e30;
 
@@ -49,7 +49,7 @@ LightSample sample_of_point(Towards way, vec3 radiance, float pdf) {
 // orthonormal. Drivers may compute sines and cosines with errors of 2^-11. They are scaled so that the vector has unit
 // length nevertheless: distances along it are compared to 1e-4.
 vec3 around(vec3 axis, vec3 aside_u, vec3 aside_v, vec3 cosine_sine_turns) {
-    float azimuth = 2.0 * EMITTER_PI * cosine_sine_turns.z;
+    float azimuth = 2.0 * PI * cosine_sine_turns.z;
     vec2 aside = normalize(vec2(cos(azimuth), sin(azimuth)));
     return cosine_sine_turns.x * axis + cosine_sine_turns.y * (aside.x * aside_u + aside.y * aside_v);
 }

@@ -13,7 +13,7 @@ LightSample sample_punctual(Light light, vec3 point_world, float probability) {
     IncidentLight arriving = incident_light(light, point_world);
     // Not `<=`: at the light itself, there are NaNs.
     if (!(arriving.distance > 0.0)) return no_sample();
-    return LightSample(arriving.direction, arriving.distance, arriving.irradiance * (EMITTER_PI / probability), 0.0);
+    return LightSample(arriving.direction, arriving.distance, arriving.irradiance * (PI / probability), 0.0);
 }
 
 #endif

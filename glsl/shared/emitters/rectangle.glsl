@@ -9,7 +9,7 @@
 float hit_plane(AreaLight light, vec3 origin, vec3 direction) {
     float cosine = dot(light.axis, direction);
     float t = dot(light.position - origin, light.axis) / cosine;
-    return cosine < 0.0 && t > 0.0 ? t : uintBitsToFloat(0x7f800000u);
+    return cosine < 0.0 && t > 0.0 ? t : INFINITY;
 }
 
 // Distance at which a ray meets the rectangle's front, in lengths of its direction; infinity if it does not.
@@ -18,7 +18,7 @@ float hit_rectangle(AreaLight light, vec3 origin, vec3 direction) {
     vec3 from_centre = origin + t * direction - light.position;
     float u = dot(from_centre, light.edge_u) / dot(light.edge_u, light.edge_u);
     float v = dot(from_centre, light.edge_v) / dot(light.edge_v, light.edge_v);
-    return abs(u) <= 1.0 && abs(v) <= 1.0 ? t : uintBitsToFloat(0x7f800000u);
+    return abs(u) <= 1.0 && abs(v) <= 1.0 ? t : INFINITY;
 }
 
 // Pdf per steradian of a direction in which a flat light is seen at a distance, if its points are sampled uniformly.

@@ -15,7 +15,7 @@ float hit_sphere(AreaLight light, vec3 origin, vec3 direction) {
     vec3 aside = to_centre - along * direction;
     float squared = light.radius * light.radius - dot(aside, aside);
     bool is_outside = dot(to_centre, to_centre) > light.radius * light.radius;
-    return is_outside && along > 0.0 && squared >= 0.0 ? along - sqrt(squared) : uintBitsToFloat(0x7f800000u);
+    return is_outside && along > 0.0 && squared >= 0.0 ? along - sqrt(squared) : INFINITY;
 }
 
 // 1 less the cosine of the angle between the centre of the sphere and its edge, seen from a point; 0 from inside.
@@ -28,7 +28,7 @@ float sphere_versine(AreaLight light, vec3 to_centre) {
 // Pdf per steradian of the directions in which the sphere is seen; 0 from inside.
 float sphere_pdf(AreaLight light, vec3 point_world) {
     float versine = sphere_versine(light, light.position - point_world);
-    return versine > 0.0 ? 1.0 / (2.0 * EMITTER_PI * versine) : 0.0;
+    return versine > 0.0 ? 1.0 / (2.0 * PI * versine) : 0.0;
 }
 
 LightSample sample_sphere(AreaLight light, vec3 point_world, vec2 u) {

@@ -11,6 +11,7 @@
 // cell. So the kd-tree's proof holds: rounding moves the ray by no more than the margin, and a cell has all triangles
 // that come within the margin (src/accel/bounds.rs).
 
+#include "constants.glsl"
 #include "grid/lattice.glsl"
 
 // The number of levels of cells in the scene's grid, 1 or 2. It is 0 if the scene has a kd-tree.
@@ -69,7 +70,7 @@ vec3 exits_of(Lattice lattice, TraversalRay ray, uvec3 cube) {
     precise vec3 t = fma(planes, ray.inv_direction, ray.bias);
     if (GRID_LEVELS == 1u) return t;
     bvec3 are_inner = lessThan(faces - 1u, lattice.n_cells - 1u); // a face of 0 wraps around
-    return mix(vec3(uintBitsToFloat(0x7f800000u)), t, are_inner);
+    return mix(vec3(INFINITY), t, are_inner);
 }
 
 // The ray's step on each axis: +1 if the direction's component is positive or almost 0, else -1.

@@ -2,6 +2,8 @@
 #ifndef KDRAY_NOISE
 #define KDRAY_NOISE
 
+#include "constants.glsl"
+
 // The luminance up to which a sample counts in variances. The sum of squares of all samples is then finite.
 #define MOST_SQUARED_LUMINANCE 1.0e15
 
@@ -21,7 +23,7 @@ float squared_luminance(vec3 radiance) {
 // The variance of a pixel's mean luminance. mean: of the radiance of its samples, and in w of their squared luminance.
 // It is infinite for a single sample, whose noise is unknown.
 float variance_of_mean(vec4 mean, uint n_samples) {
-    if (n_samples < 2u) return uintBitsToFloat(0x7f800000u);
+    if (n_samples < 2u) return INFINITY;
     float luminance = luminance_of(mean.xyz);
     return max(mean.w - luminance * luminance, 0.0) / float(n_samples - 1u);
 }

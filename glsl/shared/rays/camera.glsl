@@ -4,6 +4,7 @@
 #define KDRAY_CAMERA
 
 #include "layout.glsl"
+#include "constants.glsl"
 #include "frame.glsl"
 
 // Moves bits 0, 2 and 4 of a number below 64 to bits 0, 1 and 2.
@@ -80,9 +81,8 @@ uint pixel_ix_of(uvec2 pixel) {
 
 // The camera ray through the pixel's sample.
 PathRay camera_ray(uvec2 pixel) {
-    float infinity = uintBitsToFloat(0x7f800000u);
     vec3 direction = camera_direction(pixel);
-    return PathRay(camera_origin(pixel), pixel_ix_of(pixel), direction, NO_TRIANGLE, vec3(1.0), infinity);
+    return PathRay(camera_origin(pixel), pixel_ix_of(pixel), direction, NO_TRIANGLE, vec3(1.0), INFINITY);
 }
 
 #endif

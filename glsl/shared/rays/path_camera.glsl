@@ -52,8 +52,7 @@ PathRay path_camera_ray(uvec2 pixel, vec2 in_pixel, vec2 in_lens) {
         direction = frame.focus * direction - aside;
         origin += aside;
     }
-    float infinity = uintBitsToFloat(0x7f800000u);
-    return PathRay(origin, pixel_ix_of(pixel), normalize(direction), NO_TRIANGLE, vec3(1.0), infinity);
+    return PathRay(origin, pixel_ix_of(pixel), normalize(direction), NO_TRIANGLE, vec3(1.0), INFINITY);
 }
 
 #endif

@@ -3,6 +3,7 @@
 #define KDRAY_LIGHT
 
 #include "layout.glsl"
+#include "constants.glsl"
 
 // What arrives from a light at a point.
 struct IncidentLight {
@@ -23,7 +24,7 @@ float spot_share(Light light, vec3 direction) {
 // Returns what arrives from a light at a point.
 IncidentLight incident_light(Light light, vec3 point_world) {
     if (light.kind == LIGHT_DIRECTIONAL) {
-        return IncidentLight(light.position, uintBitsToFloat(0x7f800000u), light.intensity);
+        return IncidentLight(light.position, INFINITY, light.intensity);
     }
     vec3 to_light = light.position - point_world;
     float squared = dot(to_light, to_light);

@@ -101,9 +101,8 @@ bool step_path(
 ) {
     shadow_ray.state = SHADOW_RAY_NONE;
     bool is_miss = hit.triangle_ix == NO_TRIANGLE;
-    float infinity = uintBitsToFloat(0x7f800000u);
-    SeenLight seen = seen_light(ray.origin, ray.direction, is_miss ? infinity : hit.t);
-    if (seen.t < infinity) {
+    SeenLight seen = seen_light(ray.origin, ray.direction, is_miss ? INFINITY : hit.t);
+    if (seen.t < INFINITY) {
         vec3 light = seen.radiance * mis_weight(state, seen.pdf);
         state.radiance += added_light(ray.throughput * light, depth);
         return false;
