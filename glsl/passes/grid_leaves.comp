@@ -21,11 +21,6 @@ const float MAX_ERROR = 16.0;
 // The smallest positive number that is not denormal.
 const float LEAST_NORMAL = 1.17549435e-38;
 
-float sum_of_magnitudes(vec3 v) {
-    precise float sum = abs(v.x) + abs(v.y) + abs(v.z);
-    return sum;
-}
-
 // Returns the plane of a triangle: a normal, and in w the normal's dot product with the plane's points. The normal is
 // scaled by a power of two, so that its longest component is in [1/4, 1/2). Returns zeros if rounding may put the
 // plane too far off.

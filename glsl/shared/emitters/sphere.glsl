@@ -4,6 +4,7 @@
 #define KDRAY_SPHERE
 
 #include "layout.glsl"
+#include "bsdf/local_frame.glsl"
 #include "emitters/light_sample.glsl"
 
 // Distance at which a ray meets the sphere from outside, in lengths of its direction, a unit vector; infinity if it
@@ -35,14 +36,8 @@ LightSample sample_sphere(AreaLight light, vec3 point_world, vec2 u) {
     Towards to_centre = towards(point_world, light.position);
     float versine = u.x * sphere_versine(light, light.position - point_world);
     float sine = sqrt(versine * (2.0 - versine));
-    // Two axes that complete the first one (Duff et al.: Building an Orthonormal Basis, Revisited, JCGT 2017).
-    vec3 axis = to_centre.direction;
-    float side = axis.z >= 0.0 ? 1.0 : -1.0;
-    float a = -1.0 / (side + axis.z);
-    float b = axis.x * axis.y * a;
-    vec3 aside_u = vec3(1.0 + side * axis.x * axis.x * a, side * b, -side * axis.x);
-    vec3 aside_v = vec3(b, side + axis.y * axis.y * a, -axis.y);
-    vec3 direction = around(axis, aside_u, aside_v, vec3(1.0 - versine, sine, u.y));
+    LocalFrame axes = frame_around(to_centre.direction);
+    vec3 direction = around(axes.normal, axes.tangent, axes.bitangent, vec3(1.0 - versine, sine, u.y));
     float aside = to_centre.distance * sine;
     float half_chord = sqrt(max(light.radius * light.radius - aside * aside, 0.0));
     float distance = max(to_centre.distance * (1.0 - versine) - half_chord, 0.0);

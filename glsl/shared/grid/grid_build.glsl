@@ -47,4 +47,10 @@ bool is_finite(Triangle triangle) {
     return is_finite(triangle.v0) && is_finite(triangle.v1) && is_finite(triangle.v2);
 }
 
+// The sum of the components' magnitudes, which is no less than the length.
+float sum_of_magnitudes(vec3 v) {
+    precise float sum = abs(v.x) + abs(v.y) + abs(v.z);
+    return sum;
+}
+
 #endif

@@ -9,7 +9,8 @@
 #ifndef KDRAY_GRID_OVERLAP
 #define KDRAY_GRID_OVERLAP
 
-#include "grid/lattice.glsl"
+#include "grid/grid_build.glsl"
+#include "search/triangle.glsl"
 
 // A factor on the margin, which covers the rounding of the cubes' middles and half edges.
 const float MARGIN_FACTOR = 1.0625;
@@ -35,10 +36,6 @@ struct Columns {
 };
 
 // v rotated cyclically so that component `axis` is last.
-vec3 axis_last(vec3 v, uint axis) {
-    return axis == 2u ? v : (axis == 0u ? v.yzx : v.zxy);
-}
-
 uvec3 axis_last(uvec3 v, uint axis) {
     return axis == 2u ? v : (axis == 0u ? v.yzx : v.zxy);
 }
@@ -46,12 +43,6 @@ uvec3 axis_last(uvec3 v, uint axis) {
 // The inverse of axis_last.
 uvec3 axis_back(uvec3 v, uint axis) {
     return axis == 2u ? v : (axis == 0u ? v.zxy : v.yzx);
-}
-
-// The sum of the components' magnitudes, which is no less than the length.
-float sum_of_magnitudes(vec3 v) {
-    precise float sum = abs(v.x) + abs(v.y) + abs(v.z);
-    return sum;
 }
 
 // The index, on each axis, of the first cube whose upper face is at or above `least`, or of the lattice's last cube

@@ -8,7 +8,7 @@ mod evaluate;
 mod ggx;
 mod lambert;
 mod lobes;
-mod local_frame;
+pub(super) mod local_frame;
 mod multiple_scattering;
 mod reflection;
 mod sample;

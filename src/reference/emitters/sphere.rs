@@ -2,10 +2,10 @@
 
 use std::f32::consts::PI;
 
-use glam::{Vec2, Vec3, vec3};
+use glam::{Vec2, Vec3};
 
 use super::light_sample::{LightSample, Towards, around, sample_of_point, towards};
-use crate::layout::AreaLight;
+use crate::{layout::AreaLight, reference::bsdf::local_frame::frame_around};
 
 /// Distance at which a ray meets the sphere from outside, in lengths of its direction, a unit vector; infinity if it
 /// does not.
@@ -34,14 +34,8 @@ pub(super) fn sample_sphere(light: &AreaLight, point_world: Vec3, u: Vec2) -> Li
     let to_centre = towards(point_world, light.position);
     let versine = u.x * sphere_versine(light, light.position - point_world);
     let sine = (versine * (2.0 - versine)).sqrt();
-    // Two axes that complete the first one.
-    let axis = to_centre.direction;
-    let side = if axis.z >= 0.0 { 1.0 } else { -1.0 };
-    let a = -1.0 / (side + axis.z);
-    let b = axis.x * axis.y * a;
-    let aside_u = vec3(1.0 + side * axis.x * axis.x * a, side * b, -side * axis.x);
-    let aside_v = vec3(b, side + axis.y * axis.y * a, -axis.y);
-    let direction = around([axis, aside_u, aside_v], [1.0 - versine, sine, u.y]);
+    let axes = frame_around(to_centre.direction);
+    let direction = around([axes.normal, axes.tangent, axes.bitangent], [1.0 - versine, sine, u.y]);
     let aside = to_centre.distance * sine;
     let half_chord = (light.radius * light.radius - aside * aside).max(0.0).sqrt();
     let distance = (to_centre.distance * (1.0 - versine) - half_chord).max(0.0);
