@@ -547,8 +547,6 @@ impl CpuRenderer {
 
     /// Traces the shadow rays of all bounces, and counts them.
     fn shadow(&mut self) {
-        // The reference takes `queue_capacity` as the stride between two lights in `light_visibility`.
-        self.frame.queue_capacity = self.queue.rays.len() as u32;
         let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
         let Queue { rays, bounces, hits, light_visibility, .. } = &mut self.queue;
         light_visibility.resize(rays.len() * inputs.lights.len(), 0);
@@ -561,7 +559,6 @@ impl CpuRenderer {
     }
 
     fn shade(&mut self) {
-        self.frame.queue_capacity = self.queue.rays.len() as u32;
         let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
         let Queue { rays, bounces, hits, ray_radiance, light_visibility, .. } = &mut self.queue;
         ray_radiance.resize(rays.len(), [0.0; 4]);

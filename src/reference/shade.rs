@@ -9,6 +9,7 @@ use super::{
     light::incident_light,
     maps::{bump_shadowing, shaded_at},
     material::{ambient_share, emitted, local_weight, reflectance_of, transmittance},
+    shadow::stride,
     studio::studio_radiance,
     surface::Surface,
 };
@@ -22,7 +23,7 @@ pub struct LitRays<'a> {
     pub hits: &'a [Hit],
     /// The number of the camera's rays, which come first.
     pub n_of_camera: usize,
-    /// One of `LIGHT_*` at each `[light * queue_capacity + ray]`.
+    /// As [`shadow`](super::shadow::shadow) writes them.
     pub light_visibility: &'a [u32],
 }
 
@@ -76,7 +77,7 @@ fn radiance_of(
 
 /// Writes `ray_radiance`, one for each ray, weighted by the ray's throughput.
 pub fn shade(inputs: &KernelInputs, lit: LitRays, ray_radiance: &mut [[f32; 4]]) {
-    let stride = inputs.frame().queue_capacity as usize;
+    let stride = stride(inputs, lit.light_visibility);
     ray_radiance.par_chunks_mut(RAYS_PER_TASK).enumerate().for_each(|(task, radiance)| {
         for (ray_ix, radiance) in (task * RAYS_PER_TASK..).zip(radiance) {
             let is_lit = |light_ix: usize| lit.light_visibility[light_ix * stride + ray_ix] == LIGHT_LIT;

@@ -44,8 +44,8 @@ pub(crate) fn shadow_ray_of(inputs: &KernelInputs, ray: &PathRay, hit: &Hit, lig
     })
 }
 
-/// Writes `light_visibility[light * queue_capacity + ray]`, one of `LIGHT_*`, for some of the queue's rays, those at
-/// the indices `places`. `rays` and `hits` are those of the whole queue. Returns the number of shadow rays that
+/// Writes `light_visibility[light * capacity + ray]`, one of `LIGHT_*`, for some of the queue's rays, those at the
+/// indices `places`. `capacity`: the number of rays for which `light_visibility` has room. `rays` and `hits` are those of the whole queue. Returns the number of shadow rays that
 /// were tested.
 pub fn shadow(
     inputs: &KernelInputs,
@@ -88,6 +88,11 @@ pub fn shadow_by<T: Tracer>(
             .map_init(&new_tracer, of_task)
             .sum()
     };
-    let stride = inputs.frame().queue_capacity as usize;
+    let stride = stride(inputs, light_visibility);
     inputs.lights.iter().zip(light_visibility.chunks_mut(stride)).map(of_light).sum()
+}
+
+/// Returns the number of elements from one light to the next in the light visibilities of all lights, at least 1.
+pub(super) fn stride(inputs: &KernelInputs, light_visibility: &[u32]) -> usize {
+    (light_visibility.len() / inputs.lights.len().max(1)).max(1)
 }
