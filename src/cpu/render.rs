@@ -1,6 +1,7 @@
 //! Renders a frame on the CPU: runs the passes of its [`Plan`], batch by batch.
 
 use bytemuck::Zeroable;
+use tracing::info_span;
 
 use super::{
     paths::Paths,
@@ -11,11 +12,12 @@ use super::{
 use crate::{
     accel::kdtree::TraversalLinks,
     frame::{
-        BounceStats, Denoise, FrameKind, Integrator, LightLayers, NoiseTiles, Pass, Picture, Plan, Primary, Profile,
-        RenderOptions, opaque, plan::passes,
+        BounceStats, Denoise, FrameKind, FrameRenderer, Integrator, LightLayers, NoiseTiles, Pass, Picture, Plan,
+        Primary, Profile, RenderOptions, Watcher, opaque, plan::passes,
     },
+    gpu::GpuError,
     layout::{
-        Auxiliary, Batch, Bounce, EdgeStep, Frame, Hit, LIGHT_LAYERS, MOST_SAMPLES_LOG2, Material, PathRay, PixelAovs,
+        Auxiliary, Batch, Bounce, EdgeStep, Frame, Hit, LIGHT_LAYERS, Material, PathRay, PixelAovs, SAMPLE_BLOCK_LOG2,
         SCAN_GROUP_SIZE,
     },
     reference::{
@@ -144,7 +146,7 @@ impl CpuRenderer {
     }
 
     /// Draws one more sample of each pixel on the current rayon pool. The first sample is at the pixel's centre. Of
-    /// paths, as many samples are drawn as [`CpuRenderer::set_samples_per_frame`] says. The picture is the mean of all
+    /// paths, as many samples are drawn as [`FrameRenderer::set_samples_per_frame`] says. The picture is the mean of all
     /// samples.
     pub fn draw_sample(&mut self) -> Profile {
         self.draw_sample_with(|_| ())
@@ -180,25 +182,6 @@ impl CpuRenderer {
         self.profile()
     }
 
-    /// Sets the number of samples that the next frame of paths draws: `2^log2`, at most `2^MOST_SAMPLES_LOG2`. The
-    /// number of samples so far must be a multiple of it. Other frames draw one sample.
-    ///
-    /// # Panics
-    /// `log2` is too large, or the number of samples so far is no multiple.
-    pub fn set_samples_per_frame(&mut self, log2: u32) {
-        assert!(
-            log2 <= MOST_SAMPLES_LOG2 && self.n_samples.is_multiple_of(1 << log2),
-            "2^{log2} after {}",
-            self.n_samples
-        );
-        self.frame.samples_log2 = log2;
-    }
-
-    /// Number of samples of each pixel in the picture.
-    pub fn n_samples(&self) -> u32 {
-        self.n_samples
-    }
-
     /// Sets the index of the picture's first sample, a multiple of `2^SAMPLE_BLOCK_LOG2`. Only frames of paths know it.
     /// The next sample is the first of a new picture.
     pub fn set_first_sample(&mut self, first_sample: u32) {
@@ -220,24 +203,10 @@ impl CpuRenderer {
         self.pixel_aovs.resize(if self.options.pixel_aovs { n_pixels } else { 0 }, PixelAovs::default());
     }
 
-    /// Returns the means of the samples, and in the fourth component of their squared luminance, of the whole window.
-    pub(crate) fn window_mean(&self) -> &[[f32; 4]] {
-        &self.pixel_radiance
-    }
-
     /// Moves the camera. The next sample is the first of a new picture.
     pub fn set_camera(&mut self, camera: &Camera) {
         self.camera = *camera;
         self.reset_samples();
-    }
-
-    pub fn options(&self) -> &RenderOptions {
-        &self.options
-    }
-
-    /// Starts a new picture, whose first sample is the next one.
-    pub fn reset_samples(&mut self) {
-        self.n_samples = 0;
     }
 
     /// Returns the mean of the samples so far, after the noise filter if there is one.
@@ -262,21 +231,6 @@ impl CpuRenderer {
     pub fn pixel_aovs(&self) -> Vec<PixelAovs> {
         assert!(self.options.pixel_aovs, "the options ask for AOVs");
         self.options.window().part(&self.pixel_aovs, &self.options.crop_or_whole())
-    }
-
-    /// Returns the layers of the picture's light, which are empty if the options do not request them.
-    pub fn light_layers(&self) -> LightLayers {
-        let (window, crop) = (self.options.window(), self.options.crop_or_whole());
-        let mut layers = LightLayers::default();
-        let pixels = self.pixel_layers.chunks_exact(self.pixel_radiance.len());
-        layers.0.iter_mut().zip(pixels).for_each(|(layer, pixels)| *layer = window.part(pixels, &crop));
-        layers
-    }
-
-    /// Adds to AOVs what the samples of each pixel tell of its noise. The frames must trace paths.
-    pub(crate) fn note_noise(&self, pixel_aovs: &mut [PixelAovs]) {
-        let means = self.options.window().part(&self.pixel_radiance, &self.options.crop_or_whole());
-        pixel_aovs.iter_mut().zip(means).for_each(|(aovs, mean)| aovs.set_noise(mean, self.n_samples));
     }
 
     /// Returns the properties that decide the passes of the next sample. The CPU does not rasterize: for both kinds
@@ -611,6 +565,54 @@ impl CpuRenderer {
             bounces: self.bounces.clone(),
             n_batches: self.n_batches,
         }
+    }
+}
+
+impl FrameRenderer for CpuRenderer {
+    fn options(&self) -> &RenderOptions {
+        &self.options
+    }
+
+    fn n_samples(&self) -> u32 {
+        self.n_samples
+    }
+
+    fn reset_samples(&mut self) {
+        self.n_samples = 0;
+    }
+
+    fn most_samples_log2(&self) -> u32 {
+        SAMPLE_BLOCK_LOG2
+    }
+
+    fn samples_log2(&mut self) -> &mut u32 {
+        &mut self.frame.samples_log2
+    }
+
+    fn draw_frame(&mut self, watcher: &mut impl Watcher) -> Result<Profile, GpuError> {
+        Ok(info_span!("render").in_scope(|| self.draw_sample_with(|share| watcher.part(share))))
+    }
+
+    fn set_tiles(&mut self, tiles: NoiseTiles) -> Result<(), GpuError> {
+        let first_sample = tiles.first_sample();
+        self.set_window(Some(tiles), first_sample);
+        Ok(())
+    }
+
+    fn window_mean(&self) -> Result<Vec<[f32; 4]>, GpuError> {
+        Ok(self.pixel_radiance.clone())
+    }
+
+    fn pixel_aovs(&self) -> Result<Vec<PixelAovs>, GpuError> {
+        Ok(self.pixel_aovs())
+    }
+
+    fn light_layers(&self) -> Result<LightLayers, GpuError> {
+        let (window, crop) = (self.options.window(), self.options.crop_or_whole());
+        let mut layers = LightLayers::default();
+        let pixels = self.pixel_layers.chunks_exact(self.pixel_radiance.len());
+        layers.0.iter_mut().zip(pixels).for_each(|(layer, pixels)| *layer = window.part(pixels, &crop));
+        Ok(layers)
     }
 }
 

@@ -2,8 +2,6 @@
 
 use std::{borrow::Cow, sync::Arc};
 
-use tracing::info_span;
-
 use super::{
     group::RendererGroup,
     noise::{self, NoiseGoal, NoisePicture},
@@ -11,11 +9,10 @@ use super::{
 use crate::{
     cpu::{self, Batching},
     frame::{
-        BadOptions, Denoise, Drawn, DrawnTiles, Goal, Integrator, NoiseTiles, Pacer, Picture, RangeSums, RenderOptions,
-        SampleRange, TileSamples, Watcher,
+        BadOptions, Denoise, Drawn, DrawnTiles, FrameRenderer, Goal, Integrator, NoiseTiles, Picture, RangeSums,
+        RenderOptions, SampleRange, TileSamples, Watcher,
     },
     gpu::{Context, DeviceInfo, ExternalImage, GpuError, TimelinePoint},
-    layout::SAMPLE_BLOCK_LOG2,
     render::BandedRenderer,
     scene::Camera,
     world::World,
@@ -154,7 +151,7 @@ impl Renderer {
         match &mut self.backend {
             Backend::Device(renderer) => renderer.draw_tiles(tiles),
             Backend::Group(group) => group.draw_tiles(tiles),
-            Backend::Cpu(renderer) => draw_tiles_on_cpu(renderer, tiles),
+            Backend::Cpu(renderer) => renderer.draw_tiles(tiles, NoiseTiles::MOST),
         }
     }
 
@@ -174,7 +171,7 @@ impl Renderer {
         match &mut self.backend {
             Backend::Device(renderer) => renderer.draw(goal, watcher),
             Backend::Group(group) => group.draw(goal, watcher),
-            Backend::Cpu(renderer) => Ok(draw_on_cpu(renderer, goal, watcher)),
+            Backend::Cpu(renderer) => renderer.draw_window(goal, watcher),
         }
     }
 
@@ -239,38 +236,4 @@ impl<W: Watcher> BandProgress<'_, W> {
         (self.n_told..n_done).for_each(|_| self.watcher.sample());
         self.n_told = self.n_told.max(n_done);
     }
-}
-
-fn draw_on_cpu(renderer: &mut cpu::CpuRenderer, goal: Goal, watcher: &mut impl Watcher) -> Drawn {
-    let integrator = renderer.options().integrator;
-    let (mut pacer, mut drawn) = (Pacer::new(goal, integrator, SAMPLE_BLOCK_LOG2), Drawn::default());
-    while let Some(log2) = pacer.next(renderer.n_samples()) {
-        if integrator == Integrator::Path {
-            renderer.set_samples_per_frame(log2);
-        }
-        let profile = info_span!("render").in_scope(|| renderer.draw_sample_with(|share| watcher.part(share)));
-        (drawn.n_samples..renderer.n_samples()).for_each(|_| watcher.sample());
-        drawn.profile.add(&profile);
-        if drawn.n_samples == 0 && renderer.options().pixel_aovs {
-            drawn.pixel_aovs = renderer.pixel_aovs();
-        }
-        drawn.n_samples = renderer.n_samples();
-    }
-    if integrator == Integrator::Path {
-        renderer.note_noise(&mut drawn.pixel_aovs);
-    }
-    drawn.light = renderer.light_layers();
-    drawn
-}
-
-fn draw_tiles_on_cpu(renderer: &mut cpu::CpuRenderer, tiles: &[TileSamples]) -> Result<DrawnTiles, GpuError> {
-    let mut all = DrawnTiles::default();
-    for together in tiles.chunks(NoiseTiles::MOST) {
-        let tiles = NoiseTiles::new(together)?;
-        let (first_sample, n_samples) = (tiles.first_sample(), tiles.n_samples());
-        renderer.set_window(Some(tiles), first_sample);
-        let drawn = draw_on_cpu(renderer, Goal::Samples(n_samples), &mut || ());
-        all.append(DrawnTiles { drawn, means: renderer.window_mean().to_vec() });
-    }
-    Ok(all)
 }

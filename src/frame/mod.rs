@@ -11,6 +11,7 @@
 //!   pass       what each pass does, reads and writes
 //!   resource   the buffers and images that passes write
 //! bounce     sizes of a bounce's dispatches
+//! frame_renderer  the loop over a picture's frames, on a device or on the CPU
 //! results    drawn; profile and counts; aov, light_layers and view: what there is beside the picture
 //! ```
 
@@ -21,6 +22,7 @@ mod constants;
 pub(crate) mod counts;
 mod crop;
 mod drawn;
+mod frame_renderer;
 mod goal;
 mod light_layers;
 #[doc(hidden)]
@@ -34,6 +36,8 @@ mod sample_range;
 pub mod sampling;
 mod view;
 
+#[doc(hidden)]
+pub use self::frame_renderer::FrameRenderer;
 pub use self::{
     aov::{Aov, Channel, Samples},
     crop::Crop,

@@ -2,16 +2,15 @@
 //! which the host joins. Bands are full rows, or parts of rows if there are fewer bands then, because a noise filter
 //! reads a border around each band.
 
-use std::{
-    borrow::Cow,
-    sync::Arc,
-    time::{Duration, Instant},
-};
+use std::{borrow::Cow, sync::Arc};
 
 use super::{GpuRenderer, JoinedPicture};
 use crate::{
     buffers::Pixels,
-    frame::{Crop, Drawn, Goal, Integrator, Pacer, PathOptions, Picture, Profile, RenderOptions, Watcher},
+    frame::{
+        Crop, Drawn, DrawnTiles, FrameRenderer, Goal, NoiseTiles, PathOptions, Picture, Profile, RenderOptions,
+        TileSamples, Watcher,
+    },
     gpu::{Context, DeviceInfo, ExternalImage, GpuError, Limits, TimelinePoint},
     scene::Camera,
     world::World,
@@ -26,15 +25,7 @@ pub struct BandedRenderer {
     /// The picture that was drawn last, joined from its bands. None before the first picture is complete. Always None
     /// if there is a single band: its picture stays on the device.
     pub(super) joined: Option<Picture>,
-    /// Whether the next sample is expected to be slow, as the last one was. The first one is expected to be slow if
-    /// the driver runs kernels on the CPU.
-    is_slow: bool,
 }
-
-/// Duration above which a sample is slow. The sample after a slow one is drawn part by part (`incremental.rs`), if
-/// the watcher sees parts. The wait for the device after each part takes about 0.1 ms. All these waits take less than
-/// a hundredth of a slow sample, but on a fast GPU a wait takes as long as a whole part.
-const SLOW_SAMPLE: Duration = Duration::from_millis(500);
 
 impl BandedRenderer {
     /// Uploads the scene and creates the pipelines.
@@ -45,13 +36,12 @@ impl BandedRenderer {
     pub fn new(context: Arc<Context>, world: &World, options: &RenderOptions) -> Result<Self, GpuError> {
         options.check()?;
         let bands = bands(context.limits(), options);
-        let is_slow = context.predicates_branches();
         let renderer = match largest(&bands, options) {
             None => GpuRenderer::new(context, world, options)?,
             Some(crop) => GpuRenderer::new(context, world, &RenderOptions { crop: Some(crop), ..options.clone() })?,
         };
         tracing::debug!(n_bands = bands.len(), "the picture's bands");
-        Ok(Self { renderer, bands, joined: None, is_slow })
+        Ok(Self { renderer, bands, joined: None })
     }
 
     /// Returns what is known of the device.
@@ -108,7 +98,7 @@ impl BandedRenderer {
     /// A Vulkan call fails; one pixel alone makes more rays than the queue holds; out of memory.
     pub fn draw(&mut self, goal: Goal, watcher: &mut impl Watcher) -> Result<Drawn, GpuError> {
         if let [_] = self.bands[..] {
-            return self.draw_band(goal, watcher);
+            return self.renderer.draw_window(goal, watcher);
         }
         self.joined = None;
         // A lack of memory is found before the first band is drawn.
@@ -120,7 +110,7 @@ impl BandedRenderer {
         };
         for band in self.bands.clone() {
             self.renderer.set_crop(band)?;
-            let drawn = self.draw_band(goal, watcher)?;
+            let drawn = self.renderer.draw_window(goal, watcher)?;
             goal = Goal::Samples(drawn.n_samples);
             joined.place(&band, &self.renderer.picture()?, &drawn);
             n_samples = drawn.n_samples;
@@ -185,52 +175,20 @@ impl BandedRenderer {
         self.renderer.copy_picture_to(image, after, then)
     }
 
-    pub(super) fn draw_band(&mut self, goal: Goal, watcher: &mut impl Watcher) -> Result<Drawn, GpuError> {
-        self.renderer.reset_samples();
-        let integrator = self.renderer.options().integrator;
-        let mut pacer = Pacer::new(goal, integrator, self.renderer.most_samples_log2());
-        let mut drawn = Drawn::default();
-        while let Some(log2) = pacer.next(self.renderer.n_samples()) {
-            let profile = self.draw_frame(log2, watcher)?;
-            drawn.profile.add(&profile);
-            if drawn.n_samples == 0 && self.renderer.options().pixel_aovs {
-                drawn.pixel_aovs = self.renderer.pixel_aovs()?;
-            }
-            drawn.n_samples = self.renderer.n_samples();
-        }
-        if !drawn.pixel_aovs.is_empty() && integrator == Integrator::Path {
-            self.renderer.note_noise(&mut drawn.pixel_aovs)?;
-        }
-        drawn.light = self.renderer.light_layers()?;
-        Ok(drawn)
-    }
-
-    /// Draws the next sample, or the next `2^log2` samples if the frame traces paths, part by part if it is expected to
-    /// be slow and the watcher sees parts.
-    fn draw_frame(&mut self, log2: u32, watcher: &mut impl Watcher) -> Result<Profile, GpuError> {
-        let n_before = self.renderer.n_samples();
-        if self.renderer.options().integrator == Integrator::Path {
-            self.renderer.set_samples_per_frame(log2);
-        }
-        let begin = Instant::now();
-        let profile = if self.is_slow && watcher.sees_parts() {
-            self.draw_steps(watcher)?
-        } else {
-            self.renderer.draw_sample()?
-        };
-        self.is_slow = begin.elapsed() > SLOW_SAMPLE;
-        (n_before..self.renderer.n_samples()).for_each(|_| watcher.sample());
-        Ok(profile)
-    }
-
-    /// Draws a sample part by part, and tells the watcher after each part which share of the sample is drawn.
-    fn draw_steps(&mut self, watcher: &mut impl Watcher) -> Result<Profile, GpuError> {
-        loop {
-            match self.renderer.draw_part()? {
-                Some(profile) => return Ok(profile),
-                None => watcher.part(self.renderer.progress()),
-            }
-        }
+    /// Draws samples of noise tiles from anywhere in the picture, as many tiles together as the device can bind. All
+    /// get equally many. [`BandedRenderer::set_crop`] ends the drawing of tiles.
+    ///
+    /// # Panics
+    /// The options have a noise filter, or they do not ask for paths.
+    ///
+    /// # Errors
+    /// Fails as [`BandedRenderer::draw`] does.
+    pub fn draw_tiles(&mut self, tiles: &[TileSamples]) -> Result<DrawnTiles, GpuError> {
+        let n_pixels = self.renderer.context.limits().storage_range / Pixels::bytes_per_pixel(self.renderer.options());
+        let most = (n_pixels as usize / NoiseTiles::N_PIXELS).clamp(1, NoiseTiles::MOST);
+        // One band that no crop equals, so that `set_crop` sets the next one.
+        (self.bands, self.joined) = (vec![Crop::whole(0, 0)], None);
+        self.renderer.draw_tiles(tiles, most)
     }
 
     /// Returns the part of the picture that all bands are together.
@@ -283,7 +241,7 @@ fn largest(bands: &[Crop], options: &RenderOptions) -> Option<Crop> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frame::Denoise;
+    use crate::frame::{Denoise, Integrator};
 
     fn limits(storage_range: u64) -> Limits {
         Limits {

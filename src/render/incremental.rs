@@ -11,9 +11,9 @@ use tracing::info_span;
 use super::{GpuRenderer, schedule::Schedule};
 use crate::{
     buffers::Needs,
-    frame::{Integrator, Pass, Picture, Profile, View},
+    frame::{FrameRenderer, Integrator, Pass, Picture, Profile, View},
     gpu::{CommandBuffer, GpuError},
-    layout::{Batch, FalseColor, Frame, MOST_SAMPLES_LOG2, PixelAovs, constants},
+    layout::{Batch, FalseColor, Frame, PixelAovs, constants},
     passes::FramePasses,
     scene::Camera,
 };
@@ -246,26 +246,6 @@ impl GpuRenderer {
         // There is one sum for each bit of the number of samples. Those of the lowest bits become one with the frame's.
         let n_joined = (self.n_samples >> samples_log2).trailing_ones();
         self.resources.make_room_for_sums(&self.context, self.n_samples.count_ones() - n_joined + 1)
-    }
-
-    /// Returns the base-2 logarithm of the most samples that a frame of paths should draw.
-    pub fn most_samples_log2(&self) -> u32 {
-        let constants = self.resources.constants();
-        self.budget.most_samples_log2(self.context.info(), u64::from(constants.width) * u64::from(constants.height))
-    }
-
-    /// Sets the number of samples that the next frame of paths draws: `2^log2`, at most `2^MOST_SAMPLES_LOG2`. The
-    /// number of samples so far must be a multiple of it. The picture does not depend on it. Other frames draw one.
-    ///
-    /// # Panics
-    /// `log2` is too large, or the number of samples so far is no multiple.
-    pub fn set_samples_per_frame(&mut self, log2: u32) {
-        assert!(
-            log2 <= MOST_SAMPLES_LOG2 && self.n_samples.is_multiple_of(1 << log2),
-            "2^{log2} after {}",
-            self.n_samples
-        );
-        self.samples_log2 = log2;
     }
 
     /// Replaces all kernels, which are made for one kind of camera, by those for the camera of `constants`.

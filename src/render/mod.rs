@@ -16,9 +16,9 @@
 
 mod bands;
 mod external;
+mod frames;
 mod incremental;
 mod joined;
-mod noise_tiles;
 mod profile;
 mod reconfigure;
 mod schedule;
@@ -35,7 +35,7 @@ use self::{
 use crate::{
     buffers::{Needs, Resources},
     frame::{
-        Denoise, FrameKind, Integrator, LightLayers, Pass, Picture, Plan, Primary, Profile, RenderOptions, Step,
+        Denoise, FrameKind, FrameRenderer, Integrator, Pass, Picture, Plan, Primary, Profile, RenderOptions, Step,
         opaque, plan,
     },
     gpu::{Access, AnyBuffer, CommandBuffer, Commands, Context, GpuError},
@@ -60,6 +60,9 @@ pub struct GpuRenderer {
     schedule: Schedule,
     /// Number of samples per pixel of which the picture is the mean.
     n_samples: u32,
+    /// Whether the next sample is expected to be slow, as the last one was. The first one is expected to be slow if
+    /// the driver runs kernels on the CPU.
+    is_slow: bool,
     /// Base-2 logarithm of the number of samples that a frame of paths draws.
     samples_log2: u32,
     /// The AOV that is displayed in place of the picture. Used only if the options ask for AOVs.
@@ -143,7 +146,7 @@ impl GpuRenderer {
         drop(uploading);
         let passes =
             info_span!("make pipelines").in_scope(|| FramePasses::new(&context, &resources.bindings, options))?;
-        let (camera, options) = (scene.camera, options.clone());
+        let (camera, options, is_slow) = (scene.camera, options.clone(), context.predicates_branches());
         Ok(Self {
             context,
             world: world.clone(),
@@ -155,6 +158,7 @@ impl GpuRenderer {
             passes,
             schedule,
             n_samples: 0,
+            is_slow,
             samples_log2: 0,
             false_color: None,
             needs_primary_rays_only: false,
@@ -184,7 +188,7 @@ impl GpuRenderer {
     }
 
     /// Draws one more sample a pixel; the first is at the pixel's centre. Of paths, as many samples are drawn as
-    /// [`GpuRenderer::set_samples_per_frame`] says, at random places. The picture, which stays on the device, is the
+    /// [`FrameRenderer::set_samples_per_frame`] says, at random places. The picture, which stays on the device, is the
     /// mean of all samples. If the ray queue overflows in a batch, the batch is halved and the sample is drawn again.
     /// Later samples keep the smaller batches.
     ///
@@ -212,14 +216,6 @@ impl GpuRenderer {
         })?;
         self.note_displayed();
         Ok(())
-    }
-
-    /// Downloads the mean of the samples before the noise filter, of the whole window.
-    ///
-    /// # Errors
-    /// A copy fails.
-    fn window_mean(&self) -> Result<Vec<[f32; 4]>, GpuError> {
-        self.resources.pixels.pixel_radiance.download_first(self.resources.n_pixels())
     }
 
     /// Replaces the mean of the samples, and returns the picture of it, filtered and encoded. The next sample is the
@@ -286,34 +282,6 @@ impl GpuRenderer {
         assert!(self.in_use.pixel_aovs, "the options ask for AOVs");
         let pixel_aovs = self.resources.pixels.pixel_aovs.download_first(self.resources.n_pixels())?;
         Ok(self.in_use.window().part(pixel_aovs, &self.in_use.crop_or_whole()))
-    }
-
-    /// Downloads the layers of the picture's light, which are empty if the options do not ask for them. The last sample
-    /// must be complete, as for [`GpuRenderer::picture`].
-    ///
-    /// # Errors
-    /// A copy fails.
-    pub fn light_layers(&self) -> Result<LightLayers, GpuError> {
-        let mut layers = LightLayers::default();
-        if !self.in_use.has_light_layers() {
-            return Ok(layers);
-        }
-        let (n_pixels, radiance) = (self.resources.n_pixels(), &self.resources.pixels.pixel_radiance);
-        let (window, crop) = (self.in_use.window(), self.in_use.crop_or_whole());
-        for (layer_ix, layer) in (1..).zip(&mut layers.0) {
-            *layer = window.part(radiance.download_part(layer_ix * n_pixels, n_pixels)?, &crop);
-        }
-        Ok(layers)
-    }
-
-    /// Adds to AOVs what the samples of each pixel tell of its noise. The frames must trace paths.
-    ///
-    /// # Errors
-    /// A copy fails.
-    fn note_noise(&self, pixel_aovs: &mut [PixelAovs]) -> Result<(), GpuError> {
-        let means = self.in_use.window().part(self.window_mean()?, &self.in_use.crop_or_whole());
-        pixel_aovs.iter_mut().zip(means).for_each(|(aovs, mean)| aovs.set_noise(mean, self.n_samples));
-        Ok(())
     }
 
     /// Returns the frame's buffers, with the contents that the last frame left.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::{GpuRenderer, in_use, lanes_to_share, schedule::Schedule};
 use crate::{
     buffers::{Needs, Resources},
-    frame::{Crop, RenderOptions},
+    frame::{Crop, FrameRenderer, RenderOptions},
     gpu::GpuError,
     layout::Frame,
     scene::Camera,
@@ -21,23 +21,6 @@ impl GpuRenderer {
 
     pub fn camera(&self) -> &Camera {
         &self.camera
-    }
-
-    /// Drops all samples, so that the next one is the first of a new picture.
-    pub fn reset_samples(&mut self) {
-        self.n_samples = 0;
-        self.has_sums = false;
-        self.pending = None;
-    }
-
-    /// Number of samples per pixel of which the picture is the mean.
-    pub fn n_samples(&self) -> u32 {
-        self.n_samples
-    }
-
-    /// The options as the caller has set them.
-    pub fn options(&self) -> &RenderOptions {
-        &self.options
     }
 
     /// Sets the picture's size, pixels, and removes its crop. If either changes, the next sample is the first of a

@@ -13,7 +13,7 @@ use super::{
     session::Session,
 };
 use crate::{
-    frame::{Integrator, RenderOptions},
+    frame::{FrameRenderer, Integrator, RenderOptions},
     gpu::GpuError,
     output::{self, OutputError},
     render::Displayed,

@@ -29,7 +29,7 @@ use super::{
 };
 use crate::{
     engine::choices::{Choices, Request},
-    frame::RenderOptions,
+    frame::{FrameRenderer, RenderOptions},
     gpu::GpuError,
 };
 

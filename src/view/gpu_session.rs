@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     engine::choices::{Cache, Choices, Methods, Request, Workload},
-    frame::RenderOptions,
+    frame::{FrameRenderer, RenderOptions},
     gpu::{Context, ContextOptions, GpuError, Presenter, WindowHandles},
     passes::Present,
     render::GpuRenderer,

@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{
     accel::Statistics,
-    frame::{Denoise, Profile, RenderOptions, View},
+    frame::{Denoise, FrameRenderer, Profile, RenderOptions, View},
     gpu::GpuError,
     layout::PixelAovs,
     scene::RenderDefaults,

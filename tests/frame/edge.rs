@@ -4,7 +4,7 @@
 use glam::{Vec3, vec3};
 use kdray::{
     cpu::{self, Batching},
-    frame::{Crop, Denoise, Goal, Integrator, Picture, RenderOptions, sampling::samples_log2},
+    frame::{Crop, Denoise, FrameRenderer, Goal, Integrator, Picture, RenderOptions, sampling::samples_log2},
     gpu::DeviceOverrides,
     layout::MOST_SAMPLES_LOG2,
     render::{BandedRenderer, GpuRenderer},

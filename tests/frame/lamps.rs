@@ -5,7 +5,7 @@ use std::f32::consts::PI;
 use glam::{Vec3, vec3};
 use kdray::{
     cpu::{self, Batching},
-    frame::{Denoise, Integrator, Picture, PixelFilter, RenderOptions, sampling::samples_log2},
+    frame::{Denoise, FrameRenderer, Integrator, Picture, PixelFilter, RenderOptions, sampling::samples_log2},
     layout::{AREA_DISK, AREA_RECTANGLE, AREA_SPHERE, AreaLight, MOST_SAMPLES_LOG2},
     render::GpuRenderer,
     scene::{Camera, Projection},

@@ -5,7 +5,8 @@ use glam::{Vec3, vec3};
 use kdray::{
     cpu::{self, Batching},
     frame::{
-        Crop, Denoise, Goal, Integrator, LightLayers, PathOptions, Picture, RenderOptions, sampling::samples_log2,
+        Crop, Denoise, FrameRenderer, Goal, Integrator, LightLayers, PathOptions, Picture, RenderOptions,
+        sampling::samples_log2,
     },
     gpu::DeviceOverrides,
     layout::{MOST_SAMPLES_LOG2, Material},
@@ -49,7 +50,7 @@ fn on_cpu_in_batches(scene: &FlatScene, options: &RenderOptions, n_samples: u32,
         renderer.set_samples_per_frame(samples_log2(renderer.n_samples(), n_samples, MOST_SAMPLES_LOG2));
         renderer.draw_sample();
     }
-    (renderer.picture(), renderer.light_layers())
+    (renderer.picture(), renderer.light_layers().expect("layers"))
 }
 
 /// A scene of all kinds of materials with a lamp that shines into the camera.

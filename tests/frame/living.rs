@@ -3,7 +3,7 @@
 use glam::vec3;
 use kdray::{
     accel::kdtree::Traversal,
-    frame::{Denoise, Integrator, Picture, Primary, RenderOptions, Tonemap},
+    frame::{Denoise, FrameRenderer, Integrator, Picture, Primary, RenderOptions, Tonemap},
     gpu::GpuError,
     render::GpuRenderer,
     scene::{Camera, Environment, Projection},

@@ -3,7 +3,7 @@
 
 use glam::uvec2;
 use kdray::{
-    frame::{Picture, RenderOptions, View},
+    frame::{FrameRenderer, Picture, RenderOptions, View},
     render::{Displayed, GpuRenderer},
     scene::{Camera, Projection},
 };

@@ -6,8 +6,8 @@ use kdray::{
     accel::kdtree::Traversal,
     cpu::{self, Batching},
     frame::{
-        Crop, Denoise, FrameKind, Goal, Integrator, Pass, PathOptions, Picture, PixelFilter, Plan, RenderOptions, plan,
-        sampling::samples_log2,
+        Crop, Denoise, FrameKind, FrameRenderer, Goal, Integrator, Pass, PathOptions, Picture, PixelFilter, Plan,
+        RenderOptions, plan, sampling::samples_log2,
     },
     gpu::DeviceOverrides,
     layout::{MATERIAL_MICROFACET, MOST_SAMPLES_LOG2, Material},

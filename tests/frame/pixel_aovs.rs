@@ -4,7 +4,7 @@ use glam::{Vec3, vec3};
 use kdray::{
     accel::kdtree::{BuildOptions, Traversal},
     cpu::{self, Batching},
-    frame::{Crop, Integrator, Primary, Profile, RenderOptions},
+    frame::{Crop, FrameRenderer, Integrator, Primary, Profile, RenderOptions},
     layout::{NO_TRIANGLE, PixelAovs},
     render::GpuRenderer,
     world::{FlatScene, World},

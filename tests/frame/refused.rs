@@ -7,7 +7,7 @@ use glam::Vec3;
 use kdray::{
     accel::kdtree::Traversal,
     buffers::SceneAccess,
-    frame::{Crop, Denoise, Picture, Primary, RenderOptions, Tonemap},
+    frame::{Crop, Denoise, FrameRenderer, Picture, Primary, RenderOptions, Tonemap},
     gpu::{Context, DeviceOverrides, GpuError},
     render::GpuRenderer,
     scene::{Camera, Projection},

@@ -1,0 +1,80 @@
+//! The frames of a device's pictures.
+
+use std::time::{Duration, Instant};
+
+use super::{GpuRenderer, incremental::Until};
+use crate::{
+    frame::{FrameRenderer, LightLayers, NoiseTiles, PathOptions, Profile, RenderOptions, Watcher},
+    gpu::GpuError,
+    layout::PixelAovs,
+};
+
+/// Duration above which a sample is slow. The sample after a slow one is drawn part by part (`incremental.rs`), if
+/// the watcher sees parts. The wait for the device after each part takes about 0.1 ms. All these waits take less than
+/// a hundredth of a slow sample, but on a fast GPU a wait takes as long as a whole part.
+const SLOW_SAMPLE: Duration = Duration::from_millis(500);
+
+impl FrameRenderer for GpuRenderer {
+    fn options(&self) -> &RenderOptions {
+        &self.options
+    }
+
+    fn n_samples(&self) -> u32 {
+        self.n_samples
+    }
+
+    fn reset_samples(&mut self) {
+        self.n_samples = 0;
+        self.has_sums = false;
+        self.pending = None;
+    }
+
+    fn most_samples_log2(&self) -> u32 {
+        let constants = self.resources.constants();
+        self.budget.most_samples_log2(self.context.info(), u64::from(constants.width) * u64::from(constants.height))
+    }
+
+    fn samples_log2(&mut self) -> &mut u32 {
+        &mut self.samples_log2
+    }
+
+    /// Draws part by part if the frame is expected to be slow and the watcher sees parts.
+    fn draw_frame(&mut self, watcher: &mut impl Watcher) -> Result<Profile, GpuError> {
+        let begin = Instant::now();
+        let until = if self.is_slow && watcher.sees_parts() { Until::Part } else { Until::End };
+        let profile = loop {
+            match self.go_on(until)? {
+                Some(profile) => break profile,
+                None => watcher.part(self.progress()),
+            }
+        };
+        self.is_slow = begin.elapsed() > SLOW_SAMPLE;
+        Ok(profile)
+    }
+
+    fn set_tiles(&mut self, tiles: NoiseTiles) -> Result<(), GpuError> {
+        let paths = PathOptions { first_sample: tiles.first_sample(), ..self.options.paths };
+        self.set_options(&RenderOptions { noise_tiles: Some(tiles), paths, ..self.options.clone() })
+    }
+
+    fn window_mean(&self) -> Result<Vec<[f32; 4]>, GpuError> {
+        self.resources.pixels.pixel_radiance.download_first(self.resources.n_pixels())
+    }
+
+    fn pixel_aovs(&self) -> Result<Vec<PixelAovs>, GpuError> {
+        self.pixel_aovs()
+    }
+
+    fn light_layers(&self) -> Result<LightLayers, GpuError> {
+        let mut layers = LightLayers::default();
+        if !self.in_use.has_light_layers() {
+            return Ok(layers);
+        }
+        let (n_pixels, radiance) = (self.resources.n_pixels(), &self.resources.pixels.pixel_radiance);
+        let (window, crop) = (self.in_use.window(), self.in_use.crop_or_whole());
+        for (layer_ix, layer) in (1..).zip(&mut layers.0) {
+            *layer = window.part(radiance.download_part(layer_ix * n_pixels, n_pixels)?, &crop);
+        }
+        Ok(layers)
+    }
+}
