@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     accel::{Accel, kdtree::Traversal},
-    frame::{Integrator, RenderOptions},
+    frame::{Integrator, RenderOptions, for_resources},
     gpu::{Access, Binding, BindingLayout, BindingSet, Buffer, BufferUse, Commands, Context, Dispatch, GpuError},
     layout::{self, Batch, Bounce, COUNTER_COPIES, COUNTER_STRIDE, Counters, Frame, Light, Material},
     world::{World, path_materials},
@@ -21,41 +21,34 @@ const PUSH_BYTES: u32 = {
     if batch > present { batch as u32 } else { present as u32 }
 };
 
-/// The bindings of the frame's descriptor set beside those of the acceleration structure, for both integrators.
-const OWN_BINDINGS: [u32; 15] = [
-    layout::BIND_FRAME,
-    layout::BIND_MATERIALS,
-    layout::BIND_LIGHTS,
-    layout::BIND_RAYS,
-    layout::BIND_CHILD_KINDS,
-    layout::BIND_SCAN_BLOCKS,
-    layout::BIND_BOUNCES,
-    layout::BIND_HITS,
-    layout::BIND_PIXEL_RADIANCE,
-    layout::BIND_PIXEL_ACCUMULATED,
-    layout::BIND_PIXEL_FILTERED,
-    layout::BIND_PIXEL_DISPLAY,
-    layout::BIND_PIXEL_AOVS,
-    layout::BIND_COUNTERS,
-    layout::BIND_TRIANGLE_IDS,
-];
-/// Further bindings, for ray trees.
-const BINDINGS_OF_WHITTED: [u32; 5] = [
-    layout::BIND_FIRST_CHILDREN,
-    layout::BIND_LIGHT_VISIBILITY,
-    layout::BIND_RAY_RADIANCE,
-    layout::BIND_PIXEL_NEAREST,
-    layout::BIND_RASTER_GROUPS,
-];
-/// Further bindings, for paths.
-const BINDINGS_OF_PATHS: [u32; 6] = [
-    layout::BIND_PATH_STATES,
-    layout::BIND_SHADOW_RAYS,
-    layout::BIND_LIVE_PATHS,
-    layout::BIND_PIXEL_AUX,
-    layout::BIND_PATH_SNAPSHOTS,
-    layout::BIND_NOISE_TILES,
-];
+/// A binding of the frame's descriptor set, and the buffer or image that is bound to it.
+type Row = (u32, fn(&Resources) -> Binding<'_>);
+
+macro_rules! rows {
+    ($($(#[doc = $doc:literal])* $name:ident($binding:ident, $($place:tt)+),)*) => {
+        &[$((layout::$binding, |resources| resources.$($place)+.as_binding())),*]
+    };
+}
+
+macro_rules! declare {
+    (all { $($all:tt)* } whitted { $($whitted:tt)* } paths { $($paths:tt)* } accel { $($accel:tt)* }) => {
+        /// The bindings of all frames beside those of the acceleration structure.
+        const OF_ALL: &[Row] = rows! {
+            Frame(BIND_FRAME, frame), Materials(BIND_MATERIALS, materials), Lights(BIND_LIGHTS, lights), $($all)*
+        };
+        /// Further bindings, for ray trees.
+        const OF_WHITTED: &[Row] = rows! { $($whitted)* };
+        /// Further bindings, for paths.
+        const OF_PATHS: &[Row] = rows! { NoiseTiles(BIND_NOISE_TILES, paths().noise_tiles), $($paths)* };
+    };
+}
+
+for_resources!(declare);
+
+/// Returns the bindings of a frame beside those of the acceleration structure.
+fn rows(is_of_paths: bool) -> impl Iterator<Item = &'static Row> {
+    OF_ALL.iter().chain(if is_of_paths { OF_PATHS } else { OF_WHITTED })
+}
 
 /// The number of elements of `counters` for each bounce of each batch, including the unused elements between the
 /// copies of a counter.
@@ -138,9 +131,7 @@ impl Resources {
         let storage = BufferUse::Storage;
         let &Needs { constants, options, n_bounces } = needs;
         let is_of_paths = options.integrator == Integrator::Path;
-        let more = if is_of_paths { &BINDINGS_OF_PATHS[..] } else { &BINDINGS_OF_WHITTED };
-        let own = OWN_BINDINGS.iter().chain(more).copied();
-        let kinds: Vec<_> = own.chain(accel::bindings()).map(binding).collect();
+        let kinds: Vec<_> = rows(is_of_paths).map(|row| row.0).chain(accel::bindings()).map(binding).collect();
         let (queue, paths) = new_queues(context, constants, options)?;
         let upload_indices = || new_vertex_indices(context, &vertex_indices(&scene.triangles));
         let mut resources = Self {
@@ -176,42 +167,12 @@ impl Resources {
     }
 
     fn make_set(&self) -> Result<BindingSet, GpuError> {
-        let (queue, pixels) = (&self.queue, &self.pixels);
-        let own = [
-            (layout::BIND_FRAME, Binding::Buffer(self.frame.any())),
-            (layout::BIND_MATERIALS, Binding::Buffer(self.materials.any())),
-            (layout::BIND_LIGHTS, Binding::Buffer(self.lights.any())),
-            (layout::BIND_RAYS, Binding::Buffer(queue.rays.any())),
-            (layout::BIND_CHILD_KINDS, Binding::Buffer(queue.child_kinds.any())),
-            (layout::BIND_SCAN_BLOCKS, Binding::Buffer(queue.scan_blocks.any())),
-            (layout::BIND_BOUNCES, Binding::Buffer(self.bounces.any())),
-            (layout::BIND_HITS, Binding::Buffer(queue.hits.any())),
-            (layout::BIND_PIXEL_RADIANCE, Binding::Buffer(pixels.pixel_radiance.any())),
-            (layout::BIND_PIXEL_ACCUMULATED, Binding::Buffer(pixels.accumulated().any())),
-            (layout::BIND_PIXEL_FILTERED, Binding::Buffer(pixels.filtered().any())),
-            (layout::BIND_PIXEL_DISPLAY, Binding::Buffer(pixels.pixel_display.any())),
-            (layout::BIND_PIXEL_AOVS, Binding::Buffer(pixels.pixel_aovs.any())),
-            (layout::BIND_COUNTERS, Binding::Buffer(self.counters.any())),
-            (layout::BIND_TRIANGLE_IDS, Binding::Image(&pixels.triangle_ids)),
-        ];
-        let more = match &self.paths {
-            None => vec![
-                (layout::BIND_FIRST_CHILDREN, Binding::Buffer(queue.first_children.any())),
-                (layout::BIND_LIGHT_VISIBILITY, Binding::Buffer(queue.light_visibility.any())),
-                (layout::BIND_RAY_RADIANCE, Binding::Buffer(queue.ray_radiance.any())),
-                (layout::BIND_PIXEL_NEAREST, Binding::Buffer(pixels.pixel_nearest.any())),
-                (layout::BIND_RASTER_GROUPS, Binding::Buffer(self.raster.groups.any())),
-            ],
-            Some(paths) => vec![
-                (layout::BIND_PATH_STATES, Binding::Buffer(paths.path_states.any())),
-                (layout::BIND_SHADOW_RAYS, Binding::Buffer(paths.shadow_rays.any())),
-                (layout::BIND_LIVE_PATHS, Binding::Buffer(paths.live_paths.any())),
-                (layout::BIND_PIXEL_AUX, Binding::Buffer(pixels.pixel_aux.any())),
-                (layout::BIND_PATH_SNAPSHOTS, Binding::Buffer(paths.path_snapshots.any())),
-                (layout::BIND_NOISE_TILES, Binding::Buffer(paths.noise_tiles.any())),
-            ],
-        };
-        BindingSet::new(&self.bindings, "frame", &[&self.accel.objects(), &own[..], &more].concat())
+        let own: Vec<_> = rows(self.paths.is_some()).map(|(number, object)| (*number, object(self))).collect();
+        BindingSet::new(&self.bindings, "frame", &[self.accel.objects(), own].concat())
+    }
+
+    fn paths(&self) -> &PathQueue {
+        self.paths.as_ref().expect("a frame of paths")
     }
 
     /// Makes the resources for another frame of the same scene. The scene keeps its contents, and so do the pixels if

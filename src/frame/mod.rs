@@ -38,6 +38,7 @@ mod view;
 
 #[doc(hidden)]
 pub use self::frame_renderer::FrameRenderer;
+pub(crate) use self::resource::for_resources;
 pub use self::{
     aov::{Aov, Channel, Samples},
     crop::Crop,

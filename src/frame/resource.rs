@@ -2,117 +2,103 @@
 
 use crate::layout;
 
-/// A buffer or image that some pass writes. Kernels have it under the same name in snake case, as `first_children`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Resource {
-    /// Rays of all bounces of a batch: the ray queue.
-    Rays,
-    /// The closest hit of each ray.
-    Hits,
-    /// The kinds of each ray's children, the rays that go on from its hit: reflected, refracted, both or none. In
-    /// frames of paths: whether each path goes on, and whether it has a shadow ray.
-    ChildKinds,
-    /// Index in `Rays` at which each ray's children begin, or would begin if it had any.
-    FirstChildren,
-    /// The number of children of each block of rays, then the exclusive prefix sums of these numbers. In frames of
-    /// paths, two numbers for each block: of paths that go on, and of shadow rays.
-    ScanBlocks,
-    /// The number of rays of each bounce, and the sizes of its dispatches.
-    Bounces,
-    /// For each light and each hit: whether the light is visible, in shadow or untested.
-    LightVisibility,
-    /// The radiance that each ray contributes to its pixel, weighted by the ray's throughput.
-    RayRadiance,
-    /// The sample's radiance in each pixel, then the mean of all samples. The layers of light follow, if the picture
-    /// has them.
-    PixelRadiance,
-    /// The sum of the radiances of all samples of each pixel.
-    PixelAccumulated,
-    /// The radiance of each pixel after the noise filter; the same buffer as `PixelRadiance` if there is no filter. The
-    /// filter `edge` also keeps the light here that it has blurred so far.
-    PixelFiltered,
-    /// Each pixel as it is displayed, sRGB bytes.
-    PixelDisplay,
-    /// What each pixel shows, and what its rays cost.
-    PixelAovs,
-    /// What the noise filter `edge` knows of each pixel beside its colour.
-    PixelAux,
-    /// Index of the triangle that the graphics pipeline found in each pixel.
-    TriangleIds,
-    /// The nearest triangle in each pixel and its distance, as found by the compute kernels that rasterize.
-    PixelNearest,
-    /// Triangles with large bounding rectangles, which `RasterizeBlocks` rasterizes, their number and that of their
-    /// blocks, and the size of its dispatch.
-    RasterGroups,
-    /// Numbers of hits and of shadow rays of each bounce of each batch.
-    Counters,
-    /// States of suspended rays: rays that have spent the loop iterations of a dispatch and go on in a further
-    /// dispatch.
-    SuspendedRays,
-    /// Radiance of each path so far, and the pdf of its last direction.
-    PathStates,
-    /// The shadow ray of each path from its last hit to a sampled light.
-    ShadowRays,
-    /// The indices of the paths that are alive, for this bounce and the next, and of those with a shadow ray.
-    LivePaths,
-    /// The radiance of each path when the last layer of light was complete.
-    PathSnapshots,
-}
-
-impl Resource {
-    /// Every resource.
-    pub const ALL: [Self; 23] = [
-        Self::Rays,
-        Self::Hits,
-        Self::ChildKinds,
-        Self::FirstChildren,
-        Self::ScanBlocks,
-        Self::Bounces,
-        Self::LightVisibility,
-        Self::RayRadiance,
-        Self::PixelRadiance,
-        Self::PixelAccumulated,
-        Self::PixelFiltered,
-        Self::PixelDisplay,
-        Self::PixelAovs,
-        Self::PixelAux,
-        Self::TriangleIds,
-        Self::PixelNearest,
-        Self::RasterGroups,
-        Self::Counters,
-        Self::SuspendedRays,
-        Self::PathStates,
-        Self::ShadowRays,
-        Self::LivePaths,
-        Self::PathSnapshots,
-    ];
-
-    /// Returns its binding in the frame's descriptor set.
-    pub fn binding(self) -> u32 {
-        match self {
-            Self::Rays => layout::BIND_RAYS,
-            Self::Hits => layout::BIND_HITS,
-            Self::ChildKinds => layout::BIND_CHILD_KINDS,
-            Self::FirstChildren => layout::BIND_FIRST_CHILDREN,
-            Self::ScanBlocks => layout::BIND_SCAN_BLOCKS,
-            Self::Bounces => layout::BIND_BOUNCES,
-            Self::LightVisibility => layout::BIND_LIGHT_VISIBILITY,
-            Self::RayRadiance => layout::BIND_RAY_RADIANCE,
-            Self::PixelRadiance => layout::BIND_PIXEL_RADIANCE,
-            Self::PixelAccumulated => layout::BIND_PIXEL_ACCUMULATED,
-            Self::PixelFiltered => layout::BIND_PIXEL_FILTERED,
-            Self::PixelDisplay => layout::BIND_PIXEL_DISPLAY,
-            Self::PixelAovs => layout::BIND_PIXEL_AOVS,
-            Self::PixelAux => layout::BIND_PIXEL_AUX,
-            Self::TriangleIds => layout::BIND_TRIANGLE_IDS,
-            Self::PixelNearest => layout::BIND_PIXEL_NEAREST,
-            Self::RasterGroups => layout::BIND_RASTER_GROUPS,
-            Self::Counters => layout::BIND_COUNTERS,
-            Self::SuspendedRays => layout::BIND_SUSPENDED_RAYS,
-            Self::PathStates => layout::BIND_PATH_STATES,
-            Self::ShadowRays => layout::BIND_SHADOW_RAYS,
-            Self::LivePaths => layout::BIND_LIVE_PATHS,
-            Self::PathSnapshots => layout::BIND_PATH_SNAPSHOTS,
+/// Calls a macro with a row for each resource: its name, its binding in the frame's descriptor set, whose number is in
+/// layout.glsl, and its place in [`Resources`](crate::buffers::Resources). The rows are grouped by the frames whose
+/// descriptor set has them.
+macro_rules! for_resources {
+    ($with:ident) => {
+        $with! {
+            // Resources of all frames.
+            all {
+                /// Rays of all bounces of a batch: the ray queue.
+                Rays(BIND_RAYS, queue.rays),
+                /// The closest hit of each ray.
+                Hits(BIND_HITS, queue.hits),
+                /// The kinds of each ray's children, the rays that go on from its hit: reflected, refracted, both or
+                /// none. In frames of paths: whether each path goes on, and whether it has a shadow ray.
+                ChildKinds(BIND_CHILD_KINDS, queue.child_kinds),
+                /// The number of children of each block of rays, then the exclusive prefix sums of these numbers. In
+                /// frames of paths, two numbers for each block: of paths that go on, and of shadow rays.
+                ScanBlocks(BIND_SCAN_BLOCKS, queue.scan_blocks),
+                /// The number of rays of each bounce, and the sizes of its dispatches.
+                Bounces(BIND_BOUNCES, bounces),
+                /// The sample's radiance in each pixel, then the mean of all samples. The layers of light follow, if
+                /// the picture has them.
+                PixelRadiance(BIND_PIXEL_RADIANCE, pixels.pixel_radiance),
+                /// The sum of the radiances of all samples of each pixel.
+                PixelAccumulated(BIND_PIXEL_ACCUMULATED, pixels.accumulated()),
+                /// The radiance of each pixel after the noise filter; the same buffer as `PixelRadiance` if there is no
+                /// filter. The filter `edge` also keeps the light here that it has blurred so far.
+                PixelFiltered(BIND_PIXEL_FILTERED, pixels.filtered()),
+                /// Each pixel as it is displayed, sRGB bytes.
+                PixelDisplay(BIND_PIXEL_DISPLAY, pixels.pixel_display),
+                /// What each pixel shows, and what its rays cost.
+                PixelAovs(BIND_PIXEL_AOVS, pixels.pixel_aovs),
+                /// Index of the triangle that the graphics pipeline found in each pixel.
+                TriangleIds(BIND_TRIANGLE_IDS, pixels.triangle_ids),
+                /// Numbers of hits and of shadow rays of each bounce of each batch.
+                Counters(BIND_COUNTERS, counters),
+            }
+            // Further ones, of ray trees.
+            whitted {
+                /// Index in `Rays` at which each ray's children begin, or would begin if it had any.
+                FirstChildren(BIND_FIRST_CHILDREN, queue.first_children),
+                /// For each light and each hit: whether the light is visible, in shadow or untested.
+                LightVisibility(BIND_LIGHT_VISIBILITY, queue.light_visibility),
+                /// The radiance that each ray contributes to its pixel, weighted by the ray's throughput.
+                RayRadiance(BIND_RAY_RADIANCE, queue.ray_radiance),
+                /// The nearest triangle in each pixel and its distance, as found by the compute kernels that rasterize.
+                PixelNearest(BIND_PIXEL_NEAREST, pixels.pixel_nearest),
+                /// Triangles with large bounding rectangles, which `RasterizeBlocks` rasterizes, their number and that
+                /// of their blocks, and the size of its dispatch.
+                RasterGroups(BIND_RASTER_GROUPS, raster.groups),
+            }
+            // Further ones, of paths.
+            paths {
+                /// Radiance of each path so far, and the pdf of its last direction.
+                PathStates(BIND_PATH_STATES, paths().path_states),
+                /// The shadow ray of each path from its last hit to a sampled light.
+                ShadowRays(BIND_SHADOW_RAYS, paths().shadow_rays),
+                /// The indices of the paths that are alive, for this bounce and the next, and of those with a shadow
+                /// ray.
+                LivePaths(BIND_LIVE_PATHS, paths().live_paths),
+                /// What the noise filter `edge` knows of each pixel beside its colour.
+                PixelAux(BIND_PIXEL_AUX, pixels.pixel_aux),
+                /// The radiance of each path when the last layer of light was complete.
+                PathSnapshots(BIND_PATH_SNAPSHOTS, paths().path_snapshots),
+            }
+            // Bound with the acceleration structure, for casts, too.
+            accel {
+                /// States of suspended rays: rays that have spent the loop iterations of a dispatch and go on in a
+                /// further dispatch.
+                SuspendedRays(BIND_SUSPENDED_RAYS, accel.suspended_rays),
+            }
         }
-    }
+    };
 }
+pub(crate) use for_resources;
+
+macro_rules! declare {
+    ($($group:ident { $($(#[doc = $doc:literal])* $name:ident($binding:ident, $($place:tt)+),)* })*) => {
+        /// A buffer or image that some pass writes. Kernels have it under the same name in snake case, as
+        /// `first_children`.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+        pub enum Resource {
+            $($($(#[doc = $doc])* $name,)*)*
+        }
+
+        impl Resource {
+            /// Every resource.
+            pub const ALL: [Self; [$($(layout::$binding,)*)*].len()] = [$($(Self::$name,)*)*];
+
+            /// Returns its binding in the frame's descriptor set.
+            pub fn binding(self) -> u32 {
+                match self {
+                    $($(Self::$name => layout::$binding,)*)*
+                }
+            }
+        }
+    };
+}
+
+for_resources!(declare);

@@ -7,7 +7,7 @@ use bytemuck::Pod;
 use gpu_allocator::{MemoryLocation, vulkan::Allocation};
 use rayon::prelude::*;
 
-use super::{Access, Context, GpuError, memory::Object, raw_device::RawDevice};
+use super::{Access, Binding, Context, GpuError, memory::Object, raw_device::RawDevice};
 
 /// Greatest size of one part of an upload or download, bytes. Staging buffers of this size are cut from a block of
 /// memory that the allocator keeps. Memory for larger ones would be mapped and pinned for each copy, which takes longer
@@ -236,6 +236,11 @@ impl<T: Pod> Buffer<T> {
     /// Returns the buffer without its element type.
     pub fn any(&self) -> &Arc<AnyBuffer> {
         &self.any
+    }
+
+    /// Returns the buffer as the object at a binding number.
+    pub(crate) fn as_binding(&self) -> Binding<'_> {
+        Binding::Buffer(&self.any)
     }
 
     /// Returns the address of a buffer for [`BufferUse::Address`], low word first, as kernels take it. It is a

@@ -5,7 +5,7 @@ use std::{mem::ManuallyDrop, sync::Arc};
 use ash::vk;
 use gpu_allocator::{MemoryLocation, vulkan::Allocation};
 
-use super::{Context, GpuError, memory::Object, raw_device::RawDevice};
+use super::{Binding, Context, GpuError, memory::Object, raw_device::RawDevice};
 
 /// Kind of a target's pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,6 +52,11 @@ pub struct Target {
 }
 
 impl Target {
+    /// Returns the image as the object at a binding number.
+    pub(crate) fn as_binding(self: &Arc<Self>) -> Binding<'_> {
+        Binding::Image(self)
+    }
+
     /// Creates a target with undefined contents.
     ///
     /// # Errors
