@@ -146,8 +146,8 @@ impl CpuRenderer {
     }
 
     /// Draws one more sample of each pixel on the current rayon pool. The first sample is at the pixel's centre. Of
-    /// paths, as many samples are drawn as [`FrameRenderer::set_samples_per_frame`] says. The picture is the mean of all
-    /// samples.
+    /// paths, as many samples are drawn as [`FrameRenderer::set_samples_per_frame`] says. The picture is the mean of
+    /// all samples.
     pub fn draw_sample(&mut self) -> Profile {
         self.draw_sample_with(|_| ())
     }

@@ -45,8 +45,8 @@ pub(crate) fn shadow_ray_of(inputs: &KernelInputs, ray: &PathRay, hit: &Hit, lig
 }
 
 /// Writes `light_visibility[light * capacity + ray]`, one of `LIGHT_*`, for some of the queue's rays, those at the
-/// indices `places`. `capacity`: the number of rays for which `light_visibility` has room. `rays` and `hits` are those of the whole queue. Returns the number of shadow rays that
-/// were tested.
+/// indices `places`. `capacity`: the number of rays for which `light_visibility` has room. `rays` and `hits` are those
+/// of the whole queue. Returns the number of shadow rays that were tested.
 pub fn shadow(
     inputs: &KernelInputs,
     traversal: Traversal,
