@@ -32,12 +32,14 @@
 //!
 //! # Features
 //!
+//! - `files`: scenes, images and rays from files, pictures and hits to files. Without it, programs hand over arrays
+//!   ([`scene::Mesh`]).
 //! - `cli`: the command `kdray`.
 //! - `view`: windows, for `kdray view`.
 //! - `bench`: measurements and their charts, for `kdray bench`.
 //! - `shaderc-from-source`: the build compiles the GLSL compiler shaderc from its C++ source.
 //!
-//! The first three are on by default. A program that only renders or casts needs none of them.
+//! The first four are on by default. A program that casts rays into its own arrays needs none of them.
 //!
 //! # Modules
 //!
@@ -103,10 +105,13 @@ pub mod cast;
 
 pub mod engine;
 
+#[cfg(feature = "files")]
 pub mod output;
 
+#[cfg(feature = "files")]
 pub mod merge;
 
+#[cfg(feature = "files")]
 pub mod pack;
 
 #[cfg(feature = "bench")]

@@ -7,9 +7,11 @@
 
 mod kernel;
 pub(crate) mod leaving;
+#[cfg(feature = "files")]
 mod read;
 mod recorded;
 mod rounds;
+#[cfg(feature = "files")]
 mod write;
 
 use std::{
@@ -25,12 +27,13 @@ use bytemuck::Zeroable;
 use glam::Vec3;
 use rayon::prelude::*;
 
+pub use self::recorded::RecordedCast;
 pub(crate) use self::rounds::time_in_turn;
 #[doc(hidden)]
 pub use self::{kernel::Kernel, rounds::Contender};
+#[cfg(feature = "files")]
 pub use self::{
     read::{RayFileError, RayReader},
-    recorded::RecordedCast,
     write::HitWriter,
 };
 pub use crate::layout::{Hit, NO_TRIANGLE, Ray};

@@ -8,10 +8,7 @@
 //!
 //! [`Engine::load`] goes all the way. A command that has more to check before the long work looks at [`Opened`] first.
 
-use std::{
-    path::{Path, PathBuf},
-    time::Instant,
-};
+use std::{path::Path, time::Instant};
 
 use glam::Vec3;
 
@@ -32,13 +29,15 @@ use crate::{
 #[derive(Clone, Debug)]
 pub enum Source {
     /// A scene file, a glTF file, a mesh file or a pack, as [`Scene::load`] reads them.
-    File(PathBuf),
+    #[cfg(feature = "files")]
+    File(std::path::PathBuf),
     /// A scene that a program has described.
     Scene(Box<Scene>),
     /// Triangles without a scene. They get a camera and lights as a mesh file does.
     Mesh(Mesh),
 }
 
+#[cfg(feature = "files")]
 impl<P: AsRef<Path> + ?Sized> From<&P> for Source {
     fn from(path: &P) -> Self {
         Self::File(path.as_ref().to_owned())
@@ -159,7 +158,8 @@ impl Opened {
         let LoadRequest { scene: options, picture, work: _ } = request;
         let aspect = options.aspect.or_else(|| Some(picture.as_ref()?.size?).map(|(w, h)| w as f32 / h as f32));
         let options = LoadOptions { aspect, ..options.clone() };
-        let (scene, file) = match source.into() {
+        let (scene, file): (Scene, Option<std::path::PathBuf>) = match source.into() {
+            #[cfg(feature = "files")]
             Source::File(path) => (Scene::load_with(&path, &options)?, Some(path)),
             Source::Scene(scene) => (*scene, None),
             Source::Mesh(mesh) => (Scene::of_mesh(mesh, &options)?, None),

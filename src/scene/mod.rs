@@ -4,28 +4,40 @@
 //! A scene file is a TOML file, whose keys `description` lists, a glTF file, a mesh file, OBJ, PLY or STL, or a pack of
 //! any of them with all that it names.
 
+// Readers of files alone use many functions of the model.
+#![cfg_attr(not(feature = "files"), allow(dead_code))]
+
+#[cfg(feature = "files")]
 mod files;
+#[cfg(feature = "files")]
 mod formats;
 mod guess;
+#[cfg(feature = "files")]
 mod load;
 mod meshes;
 mod model;
+mod of_mesh;
+#[cfg(feature = "files")]
 mod scene_file;
 
+#[cfg(feature = "files")]
 pub(crate) use self::files::pack;
+#[cfg(feature = "files")]
 pub use self::{
     files::pack::{ENDING as PACK_ENDING, pack_hash, packed_path},
+    scene_file::{
+        convert::scene_file_of,
+        path::CameraPath,
+        sources::{source_files, source_files_with},
+        terms::{Term, TermValue},
+    },
+};
+pub use self::{
     meshes::generate,
     model::{
         Alpha, Camera, Channel, ChosenLight, Clearcoat, Conductor, DenoiseChoice, Encoding, Environment, Ground, Image,
         Instance, Light, LightChoice, LoadOptions, Lobes, Look, MIN_EXTENT, Maps, Material, MaterialChoice,
         MendedTexels, Mesh, Microfacet, PathDefaults, PictureChoices, Pixels, Preset, Projection, RenderDefaults,
         Scene, SceneError, Sheen, Sky, SkyChoice, Texture, Transform, Up, Wrap, mesh,
-    },
-    scene_file::{
-        convert::scene_file_of,
-        path::CameraPath,
-        sources::{source_files, source_files_with},
-        terms::{Term, TermValue},
     },
 };

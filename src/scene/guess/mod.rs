@@ -6,4 +6,5 @@ pub(crate) mod interior;
 pub(crate) mod lamps;
 pub(crate) mod near;
 pub(crate) mod standard;
+#[cfg(feature = "files")]
 pub(crate) mod up_axis;

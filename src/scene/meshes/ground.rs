@@ -4,11 +4,11 @@
 
 use glam::{DQuat, DVec3, Vec3};
 
-use super::generate::{Generator, TriangleBudget};
+use super::generate::{Disc, TriangleBudget};
 use crate::scene::model::{Instance, Material, Mesh, Scene, Sky, Transform, Up, error::Checked, scene::GROUND};
 
-/// The keys of the ground's mesh in a scene file.
-pub(crate) const GENERATOR: &str = "generator = \"disc\"\nradius = 1.0\nsegments = 64\n";
+/// The ground before it is placed.
+const DISC: Disc = Disc { radius: 1.0, segments: 64 };
 /// Radius of the ground, in diagonals of the scene's bounding box.
 const RADIUS: f32 = 10.0;
 /// Distance of the ground below the scene, in the same unit. A flat underside must not be in the plane of the ground.
@@ -50,8 +50,7 @@ impl Ground {
 impl Scene {
     /// Adds a ground below all instances, whose bounds are given. It reflects as much light as the plain of a sky.
     pub(crate) fn add_ground(&mut self, bounds: (Vec3, Vec3), up: Up) -> Checked<()> {
-        let generator: Generator = toml::from_str(GENERATOR).expect("the generator knows its keys");
-        let mesh = generator.build(&TriangleBudget::default())?;
+        let mesh = DISC.build(&TriangleBudget::default())?;
         let mesh = Mesh { uvs: Default::default(), ..mesh };
         let transform = Ground::below(bounds, up).transform()?;
         mesh.placed(&transform)?;

@@ -1,5 +1,5 @@
-//! A scene as its parts: what files describe, programs fill, and `world` flattens. Nothing here reads a file or knows how
-//! kernels lay data out.
+//! A scene as its parts: what files describe, programs fill, and `world` flattens. Nothing here reads a file or knows
+//! how kernels lay data out.
 
 pub(crate) mod camera;
 pub(crate) mod defaults;

@@ -14,6 +14,7 @@ mod torus_knot;
 
 use serde::Deserialize;
 
+pub(crate) use self::plane::Disc;
 use super::needs::{Attributes, MeshSize, require_for_mesh};
 use crate::scene::model::{Mesh, error::Checked};
 

@@ -21,8 +21,8 @@ pub struct Plane {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Disc {
-    radius: f32,
-    segments: u32,
+    pub(crate) radius: f32,
+    pub(crate) segments: u32,
 }
 
 impl Plane {

@@ -9,7 +9,7 @@ use crate::{
     frame::Denoise,
     scene::{
         formats::material_spec::MaterialSpec,
-        meshes::ground::{self, GENERATOR},
+        meshes::ground,
         model::{
             Camera, Ground, Light, Material, MaterialChoice, Projection, RenderDefaults, Scene, Sky,
             preset::is_replaced,
@@ -68,8 +68,8 @@ pub(super) fn scene_file(scene: &Scene, mesh: &MeshTable) -> String {
     if let Some(ground::Ground { radius, turn, centre }) = ground::Ground::of(scene) {
         let (albedo, radius, turn) = (vector(Vec3::splat(Sky::GROUND_ALBEDO)), number(radius), number(turn));
         text += &format!(
-            "\n[materials.{GROUND:?}]\nKd = {albedo}\n\n[[mesh]]\n{GENERATOR}material = {GROUND:?}\n\
-             transform = {{ scale = {radius}, rotate = [{turn}, 0.0, 0.0], translate = {} }}\n",
+            "\n[materials.{GROUND:?}]\nKd = {albedo}\n\n[[mesh]]\ngenerator = \"disc\"\nradius = 1.0\nsegments = 64\n\
+             material = {GROUND:?}\ntransform = {{ scale = {radius}, rotate = [{turn}, 0.0, 0.0], translate = {} }}\n",
             vector(centre)
         );
     }
