@@ -20,9 +20,16 @@ pub fn built_in(on_host: f64, on_device: Option<&DeviceBuild>) -> String {
     }
 }
 
+/// Version of the names in the JSON of `--profile` and of `inspect`. 2: passes and terms have the field's names
+/// (`pixel_aovs`, `auxiliary`, `atrous_filter` in place of `features`, `guides`, `edge_filter`; opacity is `opaque`,
+/// `blend` or `mask`, as in glTF).
+pub const SCHEMA: u32 = 2;
+
 /// The report: the scene, the files, the options and choices, and the times and rays of the frame.
 #[derive(Serialize)]
 pub struct Report {
+    /// [`SCHEMA`].
+    pub schema: u32,
     pub scene: String,
     /// Files of the pictures in the order of frames, at least one.
     pub pictures: Vec<PathBuf>,

@@ -19,6 +19,7 @@ use super::{
     print, print_line,
     progress::Progress,
     render::set_threads,
+    report::SCHEMA,
     view_args::{Switch, ViewArgs},
 };
 
@@ -68,7 +69,10 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
         },
     )?;
     if let Some(path) = &args.profile {
-        output::write(path, &json(&Profile { scene: &scene_name, budget_ms: args.budget_ms, vsync, view: &report }))?;
+        output::write(
+            path,
+            &json(&Profile { schema: SCHEMA, scene: &scene_name, budget_ms: args.budget_ms, vsync, view: &report }),
+        )?;
     }
     if !args.quiet {
         print(&format!("{}\n", report.choices))?;
@@ -153,6 +157,7 @@ fn tour(args: &ViewArgs, scene: &Scene) -> Result<Option<Tour>, CliError> {
 /// The file of `--profile`.
 #[derive(Serialize)]
 struct Profile<'a> {
+    schema: u32,
     scene: &'a str,
     budget_ms: f64,
     vsync: bool,

@@ -96,7 +96,7 @@ pub struct MaterialDetails {
     pub model: &'static str,
     /// The terms that differ from their defaults, by their keys in scene files.
     pub terms: Map<String, Value>,
-    /// How opacity acts: `opaque`, `coverage` or `cutout`.
+    /// How opacity acts: `opaque`, `blend` or `mask`.
     pub opacity: &'static str,
     pub double_sided: bool,
     /// The names of the images of its terms.
@@ -180,8 +180,8 @@ impl MaterialDetails {
             terms: terms(material),
             opacity: match material.alpha {
                 Alpha::Opaque => "opaque",
-                Alpha::Blend => "coverage",
-                Alpha::Mask(_) => "cutout",
+                Alpha::Blend => "blend",
+                Alpha::Mask(_) => "mask",
             },
             double_sided: material.is_double_sided,
             maps: maps.collect(),

@@ -22,7 +22,7 @@ use self::{
     lighting::Lighting,
     text::{cut_table, shortened},
 };
-use super::{args::InspectArgs, error::CliError, print, print_raw, progress::Progress, table::table};
+use super::{args::InspectArgs, error::CliError, print, print_raw, progress::Progress, report::SCHEMA, table::table};
 
 /// Loads the scene, builds its structure and describes both.
 pub fn run(args: &InspectArgs) -> Result<(), CliError> {
@@ -49,6 +49,7 @@ pub fn run(args: &InspectArgs) -> Result<(), CliError> {
     drop(progress);
 
     let inspection = Inspection {
+        schema: SCHEMA,
         triangles: n_triangles,
         origin: (scene.origin != DVec3::ZERO).then(|| scene.origin.to_array()),
         bounds: world.bounds().map(|corner| corner.to_array()),
@@ -75,6 +76,7 @@ pub fn run(args: &InspectArgs) -> Result<(), CliError> {
 /// The description, as it is printed.
 #[derive(Serialize)]
 struct Inspection {
+    schema: u32,
     scene: String,
     triangles: usize,
     /// Minimum and maximum corner, world units.

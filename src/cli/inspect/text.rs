@@ -78,9 +78,9 @@ fn material_row(material: &MaterialUse) -> [String; 6] {
     // Without a term or a map that says otherwise, a surface covers what is behind it.
     let is_covered = !details.terms.contains_key("d") && !details.maps.keys().any(|term| OF_OPACITY.contains(&&**term));
     let opacity = match details.opacity {
-        "coverage" if is_covered => "opaque",
-        "coverage" => "blended",
-        "cutout" => "cut out",
+        "blend" if is_covered => "opaque",
+        "blend" => "blended",
+        "mask" => "cut out",
         other => other,
     };
     let term = |(key, value): (&String, &Value)| format!("{key} {}", plain(value));

@@ -31,7 +31,7 @@ use super::{
     error::CliError,
     print, print_line,
     progress::Progress,
-    report::{FrameTimeRange, Report},
+    report::{FrameTimeRange, Report, SCHEMA},
     spans::Spans,
     trace::trace_json,
 };
@@ -106,6 +106,7 @@ pub fn run(args: RenderArgs) -> Result<(), CliError> {
         output::write(path, &trace_json(begun_at, &spans.sorted(), &profile))?;
     }
     let report = Report {
+        schema: SCHEMA,
         scene: world.scene().name.clone(),
         pictures: views.iter().map(|view| view.files.picture.clone()).collect(),
         extra_files: views.iter().flat_map(|view| view.files.beside()).cloned().collect(),
