@@ -90,7 +90,8 @@ fn violations(rows: &[Row], prefix: &str, file: &str, code: &str) -> Vec<String>
     let Some(&place) = places.get(folder) else { return vec![format!("{file}: the table has no `{folder}`")] };
     let is_refused = |name: &&String| match places.get(&name[..]) {
         Some(&other) => other > place && !rows[place].exceptions.contains(name),
-        None => true,
+        // Other crates have modules of that name, too.
+        None => prefix == "crate::",
     };
     used(code, prefix).iter().filter(is_refused).map(|name| format!("{file} uses `{name}`")).collect()
 }
@@ -125,7 +126,7 @@ fn folders_use_only_what_the_table_allows() {
 fn rooms_of_scenes_use_only_those_above_them() {
     let rows = table("room of `scene`");
     let (found, n_uses) = checked(&rows, "scene::", "src/scene");
-    assert!(n_uses > 150, "{n_uses} uses were found");
+    assert!(n_uses > 100, "{n_uses} uses were found");
     assert!(found.is_empty(), "{found:#?}");
     let of = |file: &str, code: &str| violations(&rows, "scene::", file, code);
     let upward = "use crate::{\n    scene::{\n        files::store,\n        guess::standard,\n    },\n};";
