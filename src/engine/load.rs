@@ -34,7 +34,7 @@ pub enum Source {
     /// A scene that a program has described.
     Scene(Box<Scene>),
     /// Triangles without a scene. They get a camera and lights as a mesh file does.
-    Mesh(Mesh),
+    Mesh(Box<Mesh>),
 }
 
 #[cfg(feature = "files")]
@@ -52,7 +52,7 @@ impl From<Scene> for Source {
 
 impl From<Mesh> for Source {
     fn from(mesh: Mesh) -> Self {
-        Self::Mesh(mesh)
+        Self::Mesh(Box::new(mesh))
     }
 }
 
@@ -162,7 +162,7 @@ impl Opened {
             #[cfg(feature = "files")]
             Source::File(path) => (Scene::load_with(&path, &options)?, Some(path)),
             Source::Scene(scene) => (*scene, None),
-            Source::Mesh(mesh) => (Scene::of_mesh(mesh, &options)?, None),
+            Source::Mesh(mesh) => (Scene::of_mesh(*mesh, &options)?, None),
         };
         let mut notes = Vec::new();
         let render_options = scene.defaults.with(&picture.clone().unwrap_or_default());

@@ -34,8 +34,8 @@ impl Scene {
     ///
     /// # Errors
     /// The file, or one that it names, cannot be read or understood; the scene has no triangles, is too small to be
-    /// traced ([`MIN_EXTENT`]), reaches too far from the origin (`mesh::MAX_COORDINATE`), or needs more memory than
-    /// there is.
+    /// traced ([`MIN_EXTENT`](super::MIN_EXTENT)), reaches too far from the origin (`mesh::MAX_COORDINATE`), or needs
+    /// more memory than there is.
     pub fn load(path: &Path) -> Result<Scene, SceneError> {
         Self::load_with(path, &LoadOptions::default())
     }

@@ -14,10 +14,11 @@ pub struct LoadOptions {
     /// Whether the scene's files may name files that do not lie below their own folders.
     pub allow_outside: bool,
     /// Width of the picture divided by its height, which a camera is made for where the file has none. Where absent, it
-    /// is that of [`Scene::defaults`].
+    /// is that of [`Scene::defaults`](super::Scene::defaults).
     pub aspect: Option<f32>,
     /// Whether a scene is moved to the origin if its coordinates are so large that single precision loses details.
-    /// [`Scene::origin`] says by how much. Cameras and lights of the file and of `look` are moved with it.
+    /// [`Scene::origin`](super::Scene::origin) says by how much. Cameras and lights of the file and of `look` are moved
+    /// with it.
     pub recentre: bool,
     /// What replaces parts of the scene.
     pub look: Look,

@@ -20,12 +20,12 @@ pub struct Scene {
     /// The file's name without its folder and extension.
     pub name: String,
     /// The point of the file that is the origin of world space, in the file's coordinates. It is 0, unless the scene
-    /// was moved there ([`LoadOptions::recentre`]).
+    /// was moved there ([`LoadOptions::recentre`](super::LoadOptions::recentre)).
     pub origin: DVec3,
     /// Meshes, each of which may have several instances.
     pub meshes: Vec<Mesh>,
     /// Placed meshes. A loaded scene has at least one triangle, all triangles lie within `mesh::MAX_COORDINATE`, and
-    /// their bounding box has a side of [`MIN_EXTENT`] or more.
+    /// their bounding box has a side of [`MIN_EXTENT`](super::MIN_EXTENT) or more.
     pub instances: Vec<Instance>,
     /// Materials, to which the instances refer by index.
     pub materials: Vec<Material>,

@@ -102,8 +102,8 @@ impl CameraPath {
         Ok(Self { fps, origin: DVec3::ZERO, is_orthographic: first_is, keyframes })
     }
 
-    /// Returns the path for a scene that was moved to the origin: one whose [`Scene::origin`](super::Scene::origin) is
-    /// this point of the file.
+    /// Returns the path for a scene that was moved to the origin: one whose
+    /// [`Scene::origin`](crate::scene::Scene::origin) is this point of the file.
     pub fn from_origin(self, origin: DVec3) -> Self {
         Self { origin, ..self }
     }
