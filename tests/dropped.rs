@@ -30,6 +30,10 @@ const MAY_COPY: u64 = 2;
 const COPIED: u64 = 3;
 const READ: u64 = 4;
 
+/// A message about the layer itself. On a busy machine, version 1.3.239 misses a value that the host signals while one of
+/// its threads begins to wait for it. After ten seconds it says so, and that this "is most likely a validation bug".
+const MISSED_SIGNAL: &str = "UNASSIGNED-VkSemaphore-state-timeout";
+
 /// Runs an ignored test of this file in a process of its own, under the validation layer, which prints its messages.
 fn run_validated(test: &str) {
     let output = Command::new(env::current_exe().expect("this program"))
@@ -40,7 +44,8 @@ fn run_validated(test: &str) {
         .expect("the test runs");
     let [printed, errors] = [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
     assert!(output.status.success() && printed.contains("1 passed"), "{printed}{errors}");
-    assert!(!printed.contains("Validation") && !errors.contains("Validation"), "{printed}{errors}");
+    let is_message = |line: &str| line.contains("Validation") && !line.contains(MISSED_SIGNAL);
+    assert!(!printed.lines().chain(errors.lines()).any(is_message), "{printed}{errors}");
 }
 
 /// All orders of `n` things.
