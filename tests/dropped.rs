@@ -30,8 +30,8 @@ const MAY_COPY: u64 = 2;
 const COPIED: u64 = 3;
 const READ: u64 = 4;
 
-/// A message about the layer itself. On a busy machine, version 1.3.239 misses a value that the host signals while one of
-/// its threads begins to wait for it. After ten seconds it says so, and that this "is most likely a validation bug".
+/// A message about the layer itself. On a busy machine, version 1.3.239 misses a value that the host signals while one
+/// of its threads begins to wait for it. After ten seconds it says so, and that this "is most likely a validation bug".
 const MISSED_SIGNAL: &str = "UNASSIGNED-VkSemaphore-state-timeout";
 
 /// Runs an ignored test of this file in a process of its own, under the validation layer, which prints its messages.
