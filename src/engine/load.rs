@@ -8,7 +8,10 @@
 //!
 //! [`Engine::load`] goes all the way. A command that has more to check before the long work looks at [`Opened`] first.
 
-use std::{path::Path, time::Instant};
+use std::{
+    path::{Path, PathBuf},
+    time::Instant,
+};
 
 use glam::Vec3;
 
@@ -30,7 +33,7 @@ use crate::{
 pub enum Source {
     /// A scene file, a glTF file, a mesh file or a pack, as [`Scene::load`] reads them.
     #[cfg(feature = "files")]
-    File(std::path::PathBuf),
+    File(PathBuf),
     /// A scene that a program has described.
     Scene(Box<Scene>),
     /// Triangles without a scene. They get a camera and lights as a mesh file does.
@@ -158,7 +161,7 @@ impl Opened {
         let LoadRequest { scene: options, picture, work: _ } = request;
         let aspect = options.aspect.or_else(|| Some(picture.as_ref()?.size?).map(|(w, h)| w as f32 / h as f32));
         let options = LoadOptions { aspect, ..options.clone() };
-        let (scene, file): (Scene, Option<std::path::PathBuf>) = match source.into() {
+        let (scene, file): (Scene, Option<PathBuf>) = match source.into() {
             #[cfg(feature = "files")]
             Source::File(path) => (Scene::load_with(&path, &options)?, Some(path)),
             Source::Scene(scene) => (*scene, None),
