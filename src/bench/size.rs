@@ -1,9 +1,9 @@
 //! The benchmark of cost against size: one shape cut into more and more triangles, with the same number of rays each
 //! time. In a good tree, the time of a ray grows like the logarithm of the number of triangles.
 
-use std::time::Instant;
+use std::{path::Path, time::Instant};
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use serde::Serialize;
 
 use super::{
@@ -18,7 +18,7 @@ use crate::{
     accel::{Accel, Search, Statistics, kdtree::BuildOptions},
     gpu::{Device, GpuError},
     scene::{
-        Camera, Instance, Material, Projection, RenderDefaults, Scene, Transform,
+        Camera, Instance, Material, Projection, Scene, Transform,
         generate::{Generator, MAX_TRIANGLES, TriangleBudget},
     },
     world::FlatScene,
@@ -48,28 +48,16 @@ pub fn knot(n_triangles: u32) -> Scene {
     let generator: Generator = toml::from_str(&description).expect("the generator knows its words");
     let mesh = generator.build(&TriangleBudget::default()).expect("numbers within its limits and memory");
     Scene {
-        name: "knot".to_owned(),
-        origin: DVec3::ZERO,
         meshes: vec![mesh],
         instances: vec![Instance { mesh_ix: 0, transform: Transform::IDENTITY, materials: vec![0] }],
         materials: vec![Material::default()],
-        images: Vec::new(),
-        lights: Vec::new(),
-        chosen_light: None,
-        cameras: Vec::new(),
         camera: Camera {
             eye: Vec3::Z,
             target: Vec3::ZERO,
             up: Vec3::Y,
             projection: Projection::Perspective { vertical_fov_degrees: 60.0 },
         },
-        ambient: Vec3::ZERO,
-        ground: None,
-        background: Vec3::ZERO,
-        environment: None,
-        sky: None,
-        studio: None,
-        defaults: RenderDefaults::default(),
+        ..Scene::empty(Path::new("knot"))
     }
 }
 
