@@ -39,7 +39,7 @@ macro_rules! for_resources {
                 /// Numbers of hits and of shadow rays of each bounce of each batch.
                 Counters(BIND_COUNTERS, counters),
             }
-            // Further ones, of ray trees.
+            // Resources that only frames of ray trees have.
             whitted {
                 /// Index in `Rays` at which each ray's children begin, or would begin if it had any.
                 FirstChildren(BIND_FIRST_CHILDREN, queue.first_children),
@@ -53,7 +53,7 @@ macro_rules! for_resources {
                 /// of their blocks, and the size of its dispatch.
                 RasterGroups(BIND_RASTER_GROUPS, raster.groups),
             }
-            // Further ones, of paths.
+            // Resources that only frames of paths have.
             paths {
                 /// Radiance of each path so far, and the pdf of its last direction.
                 PathStates(BIND_PATH_STATES, paths().path_states),
@@ -67,7 +67,7 @@ macro_rules! for_resources {
                 /// The radiance of each path when the last layer of light was complete.
                 PathSnapshots(BIND_PATH_SNAPSHOTS, paths().path_snapshots),
             }
-            // Bound with the acceleration structure, for casts, too.
+            // This one is bound with the acceleration structure, since casts need it, too.
             accel {
                 /// States of suspended rays: rays that have spent the loop iterations of a dispatch and go on in a
                 /// further dispatch.

@@ -23,7 +23,7 @@ pub struct LitRays<'a> {
     pub hits: &'a [Hit],
     /// The number of the camera's rays, which come first.
     pub n_of_camera: usize,
-    /// As [`shadow`](super::shadow::shadow) writes them.
+    /// The visibility of each light at each ray, in the layout that [`shadow`](super::shadow::shadow) writes.
     pub light_visibility: &'a [u32],
 }
 

@@ -92,7 +92,7 @@ pub fn shadow_by<T: Tracer>(
     inputs.lights.iter().zip(light_visibility.chunks_mut(stride)).map(of_light).sum()
 }
 
-/// Returns the number of elements from one light to the next in the light visibilities of all lights, at least 1.
+/// Returns the stride from one light to the next in `light_visibility`, in elements, at least 1.
 pub(super) fn stride(inputs: &KernelInputs, light_visibility: &[u32]) -> usize {
     (light_visibility.len() / inputs.lights.len().max(1)).max(1)
 }

@@ -1,4 +1,4 @@
-//! From a file, a text or a mesh to a scene that lacks nothing.
+//! Loads a scene from a file or a text, and fills in what it lacks.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! From a mesh to a scene that lacks nothing.
+//! Makes a scene of a mesh, and fills in what it lacks.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! Readers of foreign formats: glTF, OBJ with MTL, PLY, STL, and images. Each is given bytes.
+//! Readers of foreign formats: glTF, OBJ with MTL, PLY, STL, and images.
 
 pub(crate) mod gltf;
 pub(crate) mod image;

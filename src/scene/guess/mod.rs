@@ -1,4 +1,4 @@
-//! What nobody has stated: the axis that points up, a camera, lights, whether the scene is an interior.
+//! Guesses where neither the file nor the user states the up axis, a camera or lights, and the test for interiors.
 
 pub(crate) mod few_rays;
 pub(crate) mod framing;
