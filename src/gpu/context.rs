@@ -1,6 +1,6 @@
 //! The context: an open Vulkan device with its queue, its memory and its limits.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use ash::vk;
 
@@ -10,6 +10,7 @@ use super::{
     devices::{list, queue_family, select},
     extras::{DeviceExtras, Purpose},
     instance::Instance,
+    pipeline::Made,
     probe,
     queue::Queue,
     raw_device::{Opened, RawDevice},
@@ -46,6 +47,7 @@ pub struct Context {
     n_lanes: OnceLock<u32>,
     /// See [`Context::loop_limit`].
     loop_limit: OnceLock<Option<u32>>,
+    pub(super) pipelines: Mutex<Made>,
 }
 
 impl Context {
@@ -145,6 +147,7 @@ impl Context {
             fuses_fma: OnceLock::new(),
             n_lanes: overrides.n_lanes.map_or_else(OnceLock::new, OnceLock::from),
             loop_limit: overrides.loop_limit.map_or_else(OnceLock::new, |limit| OnceLock::from(Some(limit))),
+            pipelines: Mutex::default(),
             device,
             queue,
         })

@@ -14,6 +14,8 @@ use super::GpuError;
 pub(super) enum Rank {
     /// Layouts of descriptor sets and pipelines.
     Layouts,
+    /// Compute pipelines.
+    Pipelines,
     /// Shaders that replace those of the program.
     #[cfg(feature = "view")]
     Replacements,

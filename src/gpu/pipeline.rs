@@ -1,15 +1,34 @@
 //! Compute and raster pipelines.
 
-use std::{ffi::CStr, sync::Arc};
+use std::{collections::HashMap, ffi::CStr, sync::Arc};
 
 use ash::vk;
 
 use super::{
-    BindingLayout, Constants, Context, GpuError, Shader, TargetKind, raw_device::RawDevice, robustness::without_checks,
-    shader::ShaderModule, specialization::Specialization, statistics::capture_flags,
+    BindingLayout, Constants, Context, GpuError, Shader, TargetKind,
+    lock::{Rank, lock},
+    raw_device::RawDevice,
+    robustness::without_checks,
+    shader::ShaderModule,
+    specialization::Specialization,
+    statistics::capture_flags,
 };
 
 pub(super) const ENTRY_POINT: &CStr = c"main";
+
+/// Compute pipelines that a device has made.
+pub(super) type Made = HashMap<Variant, Arc<RawPipeline>>;
+
+/// What distinguishes the compute pipelines of a device.
+#[derive(PartialEq, Eq, Hash)]
+pub(super) struct Variant {
+    name: &'static str,
+    file: &'static str,
+    /// See [`Specialization::values`].
+    constants: Vec<(u32, u32)>,
+    layout: vk::PipelineLayout,
+    full_subgroups: bool,
+}
 
 /// Vulkan's pipeline of any kind.
 pub(super) struct RawPipeline {
@@ -53,13 +72,35 @@ pub struct ComputePipeline {
 }
 
 impl ComputePipeline {
-    /// Creates the pipeline.
+    /// Creates the pipeline, or returns the one that the context has made of the same description. Drivers keep what
+    /// they compile, but some, such as lavapipe, not all of it: a renderer's pipelines take it a second each time.
     ///
     /// # Errors
     /// The driver refuses the module or is out of memory.
     pub fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>, desc: &ComputeDesc) -> Result<Self, GpuError> {
+        context.device.count_creation("vkCreateComputePipelines", desc.name)?;
+        let made = |raw| Self { raw, bindings: Arc::clone(bindings), name: desc.name };
+        #[cfg(feature = "view")]
+        if context.device.is_replaced(desc.shader) {
+            return Self::compile(context, bindings, desc).map(made);
+        }
+        let variant = Variant {
+            name: desc.name,
+            file: desc.shader.file,
+            constants: Specialization::new(desc.constants, bindings).values(),
+            layout: bindings.pipeline_layout,
+            full_subgroups: desc.full_subgroups,
+        };
+        if let Some(known) = lock(Rank::Pipelines, &context.pipelines)?.get(&variant) {
+            return Ok(made(Arc::clone(known)));
+        }
+        // The lock is not held meanwhile: other threads compile other pipelines.
+        let raw = Self::compile(context, bindings, desc)?;
+        Ok(made(Arc::clone(lock(Rank::Pipelines, &context.pipelines)?.entry(variant).or_insert(raw))))
+    }
+
+    fn compile(context: &Context, bindings: &BindingLayout, desc: &ComputeDesc) -> Result<Arc<RawPipeline>, GpuError> {
         let device = &context.device;
-        device.count_creation("vkCreateComputePipelines", desc.name)?;
         let module = ShaderModule::new(device, desc.shader)?;
         let constants = Specialization::new(desc.constants, bindings);
         let constants = constants.info();
@@ -85,7 +126,7 @@ impl ComputePipeline {
         // SAFETY: all that `info` points to lives until the call returns.
         let raw = unsafe { device.raw.create_compute_pipelines(device.pipeline_cache, &[info], None) }
             .map_err(|(_, result)| GpuError::call("vkCreateComputePipelines", desc.name)(result))?[0];
-        Ok(Self { raw: RawPipeline::new(context, raw, desc.name), bindings: bindings.clone(), name: desc.name })
+        Ok(RawPipeline::new(context, raw, desc.name))
     }
 }
 
@@ -199,5 +240,36 @@ impl RasterPipeline {
             bindings: bindings.clone(),
             name: desc.name,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::{BindingKind, Constant, ContextOptions};
+
+    const LANES: Shader =
+        Shader { file: "lanes.comp", spirv: include_bytes!(concat!(env!("OUT_DIR"), "/lanes.comp.spv")) };
+
+    #[test]
+    fn equal_descriptions_have_one_pipeline() {
+        let context = Context::new(&ContextOptions::new(None, true)).expect("a device with validation");
+        let layout = |push_bytes| BindingLayout::new(&context, &[(0, BindingKind::Storage)], push_bytes).unwrap();
+        let made = |bindings, constants: &Constants| {
+            let desc = ComputeDesc { name: "lanes", shader: LANES, constants, full_subgroups: false };
+            ComputePipeline::new(&context, &bindings, &desc).expect("a pipeline").raw.raw
+        };
+        let constants = Constants::new().set(Constant::new("A", 100), 7);
+        let first = made(layout(4), &constants);
+        assert_eq!(made(layout(4), &constants), first);
+        assert_ne!(made(layout(8), &constants), first);
+        assert_ne!(made(layout(4), &Constants::new()), first);
+        assert_ne!(made(layout(4), &Constants::new().set(Constant::new("A", 100), 8)), first);
+        #[cfg(feature = "view")]
+        {
+            context.replace_shaders([(LANES.file.to_owned(), LANES.spirv.to_vec())].into());
+            assert_ne!(made(layout(4), &constants), first, "a module that is replaced makes a pipeline of its own");
+        }
+        assert_eq!(context.validation_messages(), Vec::<String>::new());
     }
 }

@@ -30,6 +30,14 @@ impl super::Context {
     }
 }
 
+#[cfg(feature = "view")]
+impl RawDevice {
+    /// Whether later pipelines are made of another module than the shader's own.
+    pub fn is_replaced(&self, shader: Shader) -> bool {
+        lock_anyway(Rank::Replacements, &self.replacements).contains_key(shader.file)
+    }
+}
+
 /// A shader module, which is needed only while a pipeline is made from it.
 pub(super) struct ShaderModule<'a> {
     pub(super) raw: vk::ShaderModule,

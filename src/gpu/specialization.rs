@@ -99,6 +99,11 @@ impl Specialization {
         Self { entries, values }
     }
 
+    /// Returns the `constant_id` and the bits of each constant.
+    pub fn values(&self) -> Vec<(u32, u32)> {
+        self.entries.iter().map(|entry| entry.constant_id).zip(self.values.iter().copied()).collect()
+    }
+
     pub fn info(&self) -> vk::SpecializationInfo<'_> {
         vk::SpecializationInfo::default().map_entries(&self.entries).data(bytemuck::cast_slice(&self.values))
     }

@@ -17,9 +17,12 @@ pub fn device() -> Arc<Context> {
 /// Does what [`device`] does, for a device that kdray takes for what the overrides make of it.
 pub fn pretended(overrides: DeviceOverrides) -> Arc<Context> {
     let mut opened = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
-    // A device that has messages may be in a state that would fail another test.
-    opened.retain(|(_, context)| context.validation_messages().is_empty());
-    let is_free = |(theirs, context): &&_| *theirs == overrides && Arc::strong_count(context) == 1;
+    // A device that has messages may be in a state that would fail another test. The messages of one that a test still
+    // holds may come until then.
+    opened.retain(|(_, context)| Arc::strong_count(context) > 1 || context.validation_messages().is_empty());
+    let is_free = |(theirs, context): &&(DeviceOverrides, Arc<Context>)| {
+        *theirs == overrides && Arc::strong_count(context) == 1 && context.validation_messages().is_empty()
+    };
     if let Some((_, free)) = opened.iter().find(is_free) {
         return free.clone();
     }
