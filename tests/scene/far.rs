@@ -117,7 +117,7 @@ fn stray_points_cost_no_details() {
     let faces: String = (0..89).map(|ix| format!("f {} {} {}\n", ix + 1, ix + 2, ix + 11)).collect();
     let stray = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\n";
     for more in ["", "f 101 102 103\n"] {
-        // A weight is read the careful way.
+        // A weight, which only curves use, changes nothing.
         for points in [points.clone(), points.replacen(&words(corner(0)), &format!("{} 1", words(corner(0))), 1)] {
             let files = Files::new(&[("a.obj", &format!("{points}{stray}{faces}{more}"))]);
             let scene = files.load("a.obj", &recentred());

@@ -11,9 +11,8 @@ use std::{
 use super::pack;
 use crate::{scene::model::error::Checked, util::memory::require};
 
-/// Copies of a text file in memory while it is read: the file itself, what the quick way has read of it, and the
-/// statements rewritten for tobj where the quick way has missed what the careful way finds.
-const TEXT_COPIES: u64 = 3;
+/// Copies of a text file in memory while it is read: the file itself, and what has been read of it.
+const TEXT_COPIES: u64 = 2;
 
 /// Reads a regular file.
 pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use super::{
-    clean::{split_keyword, statements},
     maps::{MapKind, MapOptions},
+    statement::{split_keyword, statements},
     tiles::files_of_tiles,
 };
 use crate::scene::{

@@ -2,7 +2,7 @@
 
 use glam::Vec2;
 
-use super::{clean::split_keyword, tiles};
+use super::{statement::split_keyword, tiles};
 use crate::scene::{
     formats::image_files::{Images, View},
     model::{Alpha, Channel, Encoding, Material, Texture, Wrap, error::Checked},

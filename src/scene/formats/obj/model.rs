@@ -1,11 +1,14 @@
 //! Parts of an OBJ file whose faces have one kind and one material, and the mesh that they make.
 
-use std::borrow::Cow;
-
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::clean::{FaceKind, FaceShading};
+use super::{
+    content::ObjFile,
+    elements::Elements,
+    faces::{self, Faces, Run},
+    statement::split_keyword,
+};
 use crate::scene::{
     meshes::{
         coincident::{Coincident, CoincidentTriangles, Looks, Part},
@@ -15,50 +18,86 @@ use crate::scene::{
     model::{Mesh, texture::linear_of_srgb},
 };
 
+/// What the faces of a model have in common.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct FaceKind {
+    has_uvs: bool,
+    has_normals: bool,
+    /// Whether faces without normals are flat, by `s off`. A file without `s` is smooth except at creases.
+    is_flat: bool,
+}
+
 /// Faces of one kind and one material.
-#[derive(Clone, Debug)]
-pub struct Model<'a> {
-    pub kind: FaceKind,
-    pub material_ix: Option<usize>,
-    /// Three numbers a position, all of them used.
-    pub positions: Cow<'a, [f32]>,
-    /// Two numbers each.
-    pub texcoords: Cow<'a, [f32]>,
-    /// Three numbers a normal.
-    pub normals: Cow<'a, [f32]>,
+#[derive(Debug)]
+struct Model<'a> {
+    kind: FaceKind,
+    material_ix: Option<usize>,
+    elements: &'a Elements,
+    /// Three numbers a position, in the order in which the faces name them first.
+    positions: Vec<f32>,
     /// Three numbers a position, or empty.
-    pub colours: Cow<'a, [f32]>,
-    /// Indices of positions, texture coordinates and normals, one each per corner. The latter two count only if `kind`
-    /// says that the faces have them.
-    pub corners: [Cow<'a, [u32]>; 3],
-    /// Numbers of the faces' corners. Empty if all faces are triangles.
-    pub arities: Cow<'a, [u32]>,
+    colours: Vec<f32>,
+    /// Indices of positions, and of the file's texture coordinates and normals, one each per corner. There are only
+    /// those that `kind` says.
+    corners: [Vec<u32>; 3],
+    /// Numbers of the faces' corners.
+    arities: Vec<u32>,
+}
+
+/// Divides the faces of a file into models. `material_ix` returns the index of a named material.
+fn models(file: &ObjFile, material_ix: impl Fn(&str) -> Option<usize>) -> Vec<Model<'_>> {
+    let mut models: Vec<Model> = Vec::new();
+    // For each point of the file the last model that has it, and its index there.
+    let mut indices = vec![(u32::MAX, 0); file.n_points()];
+    let (mut material, mut begins, mut is_off) = (None, true, false);
+    for (chunk, part) in file.chunks.iter().flat_map(|chunk| chunk.parts.iter().map(move |part| (chunk, part))) {
+        match part {
+            faces::Part::Statement(_, statement) => match split_keyword(statement) {
+                ("s", rest) => is_off = matches!(rest, "off" | "0"),
+                ("usemtl", name) => {
+                    let next = material_ix(name);
+                    begins |= next != material;
+                    material = next;
+                }
+                _ => {}
+            },
+            faces::Part::Faces(run) => {
+                let has_normals = run.has(2);
+                let kind = FaceKind { has_uvs: run.has(1), has_normals, is_flat: is_off && !has_normals };
+                if begins || models.last().is_none_or(|model| model.kind != kind) {
+                    models.push(Model::new(kind, material, &file.elements));
+                    begins = false;
+                }
+                let model_ix = models.len() as u32 - 1;
+                models[model_ix as usize].add(model_ix, (chunk, run), &mut indices);
+            }
+        }
+    }
+    models
 }
 
 impl<'a> Model<'a> {
-    /// Returns a model that tobj has read from a cleaned file.
-    pub fn of_tobj(tobj::Model { mesh, name }: &'a tobj::Model) -> Self {
-        Self {
-            kind: FaceKind::of_group(name).unwrap_or(FaceKind { shading: FaceShading::Smooth, has_uvs: false }),
-            material_ix: mesh.material_id,
-            positions: (&mesh.positions).into(),
-            texcoords: (&mesh.texcoords).into(),
-            normals: (&mesh.normals).into(),
-            colours: (&mesh.vertex_color).into(),
-            corners: [&mesh.indices, &mesh.texcoord_indices, &mesh.normal_indices].map(Cow::from),
-            arities: (&mesh.face_arities).into(),
-        }
+    /// A model without faces.
+    fn new(kind: FaceKind, material_ix: Option<usize>, elements: &'a Elements) -> Self {
+        let (positions, colours, corners, arities) = Default::default();
+        Self { kind, material_ix, elements, positions, colours, corners, arities }
     }
 
-    /// Returns whether all numbers that faces name are finite.
-    pub fn is_finite(&self) -> bool {
-        let [_, texcoords, normals] = &self.corners;
-        let are_finite = |numbers: &[f32], corners: &[u32], n: usize| {
-            corners.iter().all(|ix| numbers[*ix as usize * n..][..n].iter().all(|number| number.is_finite()))
-        };
-        self.positions.iter().all(|number| number.is_finite())
-            && are_finite(&self.texcoords, texcoords, 2)
-            && are_finite(&self.normals, normals, 3)
+    /// Adds faces. `indices`: for each point of the file the last model that has it, and its index there.
+    fn add(&mut self, model_ix: u32, (chunk, run): (&Faces, &Run), indices: &mut [(u32, u32)]) {
+        self.arities.extend(&chunk.arities[run.arities.clone()]);
+        let of_run = |kind: usize| &chunk.corners[kind][run.corners[kind].clone()];
+        self.corners[1].extend(of_run(1));
+        self.corners[2].extend(of_run(2));
+        self.corners[0].extend(of_run(0).iter().map(|ix| {
+            let known = &mut indices[*ix as usize];
+            if known.0 != model_ix {
+                *known = (model_ix, (self.positions.len() / 3) as u32);
+                self.positions.extend_from_slice(self.elements.get(0, *ix as usize));
+                self.colours.extend_from_slice(self.elements.colour(*ix as usize));
+            }
+            known.1
+        }));
     }
 
     /// Returns its faces, as far as it matters whether some of them are there several times.
@@ -87,19 +126,19 @@ impl<'a> Model<'a> {
         Triangles::Cut(triangles)
     }
 
-    /// Makes the mesh of the model's triangles without its slots. `colour_scale`: the number that stands for 1 in
-    /// colours.
-    fn part(&self, triangles: &Triangles, (shading, colour_scale): (Shading, f32)) -> Mesh {
+    /// Makes the mesh of the model's triangles without its slots.
+    fn part(&self, triangles: &Triangles, shading: Shading) -> Mesh {
         let [points, texcoords, normals] = &self.corners;
         let normal =
-            |corner: usize| Vec3::from_slice(&self.normals[normals[corner] as usize * 3..]).normalize_or_zero();
+            |corner: usize| Vec3::from_slice(self.elements.get(2, normals[corner] as usize)).normalize_or_zero();
         let uv = |corner: usize| {
-            let ix = texcoords[corner] as usize;
+            let uv = self.elements.get(1, texcoords[corner] as usize);
             // The origin of OBJ's coordinates is the lower left corner of the image.
-            Vec2::new(self.texcoords[ix * 2], 1.0 - self.texcoords[ix * 2 + 1])
+            Vec2::new(uv[0], 1.0 - uv[1])
         };
         let colour = |corner: usize| {
-            let colour = Vec3::from_slice(&self.colours[points[corner] as usize * 3..]) / colour_scale;
+            let colour = Vec3::from_slice(&self.colours[points[corner] as usize * 3..]);
+            let colour = colour / self.elements.colour_scale();
             Vec3::from_array(colour.to_array().map(linear_of_srgb)).extend(1.0)
         };
         let mut part = Mesh {
@@ -107,7 +146,7 @@ impl<'a> Model<'a> {
             faces: triangles.each(|corner| points[corner]),
             ..Mesh::default()
         };
-        part.normals = match shading.smooth && self.kind.shading == FaceShading::Normals {
+        part.normals = match shading.smooth && self.kind.has_normals {
             true => triangles.each(normal),
             false => vec![[Vec3::ZERO; 3]; part.faces.len()],
         };
@@ -138,9 +177,15 @@ impl Triangles {
     }
 }
 
-/// Joins all models into one mesh. Also returns whether the crease angle counts. `colour_scale`: the number that
-/// stands for 1 in colours.
-pub fn mesh(models: &[Model], no_material: u32, (shading, colour_scale): (Shading, f32)) -> (Mesh, bool) {
+/// Makes the mesh of a file. Also returns whether the crease angle counts. `material_ix` returns the index of a named
+/// material. Faces without a material have the slot `no_material`.
+pub fn mesh(
+    file: &ObjFile,
+    material_ix: impl Fn(&str) -> Option<usize>,
+    no_material: u32,
+    shading: Shading,
+) -> (Mesh, bool) {
+    let models = models(file, material_ix);
     let mut mesh = Mesh::default();
     let mut to_smooth = Vec::new();
     let mut triangulator = Triangulator::default();
@@ -148,9 +193,9 @@ pub fn mesh(models: &[Model], no_material: u32, (shading, colour_scale): (Shadin
     let mut coincident = CoincidentTriangles::new(Coincident::of(&faces));
     for (model_ix, model) in models.iter().enumerate() {
         let triangles = model.triangles(&mut triangulator);
-        let part = model.part(&triangles, (shading, colour_scale));
+        let part = model.part(&triangles, shading);
         let n_faces = part.faces.len();
-        let is_smoothed = shading.smooth && model.kind.shading == FaceShading::Smooth;
+        let is_smoothed = shading.smooth && !model.kind.has_normals && !model.kind.is_flat;
         to_smooth.resize(to_smooth.len() + n_faces, is_smoothed);
         let first_corners = || triangles.each(|corner| corner).iter().map(|[first, ..]| *first).collect();
         coincident.add((model_ix, &faces[model_ix]), mesh.faces.len(), first_corners);

@@ -9,9 +9,9 @@ use std::{
 };
 
 use super::{
-    clean::{split_keyword, statements, words},
     files::{library_files, map_file},
     maps::{MapKind, MapOptions, Term, set_map},
+    statement::{split_keyword, statements, words},
     tiles::{TOKEN, Tiles, files_of_tiles},
 };
 use crate::{
