@@ -4,7 +4,7 @@
 use std::{collections::BTreeSet, fs};
 
 use kdray::frame::{
-    Denoise, FrameKind, Integrator, Pass, Plan, Primary, RenderOptions, Resource, Step, Touch,
+    Access, Denoise, FrameKind, Integrator, Pass, Plan, Primary, RenderOptions, Resource, Step,
     plan::{self, passes},
 };
 use spirq::{
@@ -48,31 +48,31 @@ fn steps(plan: &Plan) -> Vec<Step> {
 
 /// Returns the resources that a pass accesses. Two are left out, because visibility and the host order them on their
 /// own.
-fn touches(pass: Pass, denoises: bool) -> Vec<(Resource, Touch)> {
+fn accesses(pass: Pass, denoises: bool) -> Vec<(Resource, Access)> {
     // Without a noise filter, these two are one buffer.
     let same = |resource: &Resource| match resource {
         Resource::PixelFiltered if !denoises => Resource::PixelRadiance,
         other => *other,
     };
-    let reads = pass.reads().iter().map(|resource| (same(resource), Touch::Read));
-    let writes = pass.writes().iter().map(|resource| (same(resource), Touch::Write));
-    let indirect = pass.indirect().map(|resource| (resource, Touch::Indirect));
+    let reads = pass.reads().iter().map(|resource| (same(resource), Access::Read));
+    let writes = pass.writes().iter().map(|resource| (same(resource), Access::Write));
+    let indirect = pass.indirect().map(|resource| (resource, Access::Indirect));
     let ordered =
-        |(resource, _): &(Resource, Touch)| !matches!(resource, Resource::TriangleIds | Resource::SuspendedRays);
+        |(resource, _): &(Resource, Access)| !matches!(resource, Resource::TriangleIds | Resource::SuspendedRays);
     reads.chain(writes).chain(indirect).filter(ordered).collect()
 }
 
 /// Tells whether a barrier orders a later access of a resource after an earlier one.
-fn orders(barrier: &Step, resource: Resource, earlier: Touch, later: Touch) -> bool {
+fn orders(barrier: &Step, resource: Resource, earlier: Access, later: Access) -> bool {
     let Step::Barrier { before, after, of } = *barrier else { return false };
-    let is_kernel = |touch| touch != Touch::Indirect;
+    let is_kernel = |access| access != Access::Indirect;
     // A write after a read waits for the kernel or for the indirect read. No memory has to be made visible.
-    if earlier != Touch::Write {
+    if earlier != Access::Write {
         return is_kernel(before) == is_kernel(earlier) && is_kernel(after);
     }
-    let is_written = matches!(before, Touch::Write | Touch::Update);
-    let is_visible = after == later || (after == Touch::Update && is_kernel(later));
-    let is_named = later == Touch::Write || of.contains(&resource);
+    let is_written = matches!(before, Access::Write | Access::Update);
+    let is_visible = after == later || (after == Access::Update && is_kernel(later));
+    let is_named = later == Access::Write || of.contains(&resource);
     is_written && is_visible && is_named
 }
 
@@ -83,9 +83,9 @@ fn hazards(steps: &[Step], denoises: bool) -> Vec<String> {
         let Step::Run(later) = later else { continue };
         for (i, earlier) in steps[..j].iter().enumerate() {
             let Step::Run(earlier) = earlier else { continue };
-            for (resource, first) in touches(*earlier, denoises) {
-                for (_, then) in touches(*later, denoises).into_iter().filter(|(other, _)| *other == resource) {
-                    let conflict = first == Touch::Write || then == Touch::Write;
+            for (resource, first) in accesses(*earlier, denoises) {
+                for (_, then) in accesses(*later, denoises).into_iter().filter(|(other, _)| *other == resource) {
+                    let conflict = first == Access::Write || then == Access::Write;
                     if conflict && !steps[i..j].iter().any(|step| orders(step, resource, first, then)) {
                         found.push(format!("{earlier:?} {first:?}s {resource:?}, {later:?} {then:?}s it"));
                     }
@@ -138,7 +138,7 @@ fn barriers_name_what_they_are_for() {
         let all = steps(&Plan::new(&kind));
         for (i, step) in all.iter().enumerate() {
             let Step::Barrier { before, of, .. } = step else { continue };
-            let earlier: Vec<_> = passes(&all[..i]).flat_map(|pass| touches(pass, true)).collect();
+            let earlier: Vec<_> = passes(&all[..i]).flat_map(|pass| accesses(pass, true)).collect();
             for resource in *of {
                 assert!(earlier.contains(&(*resource, *before)), "{kind:?}: {resource:?} of {step:?}");
             }
@@ -199,7 +199,7 @@ fn passes_declare_what_their_kernels_read_and_write() {
 fn a_missing_barrier_is_noticed() {
     let section = plan::next_rays();
     assert_eq!(hazards(&section, true), Vec::<String>::new());
-    let scatter_waits = |step: &Step| matches!(step, Step::Barrier { after: Touch::Read, .. });
+    let scatter_waits = |step: &Step| matches!(step, Step::Barrier { after: Access::Read, .. });
     let without: Vec<_> = section.into_iter().filter(|step| !scatter_waits(step)).collect();
     assert!(hazards(&without, true).iter().any(|hazard| hazard.contains("CompactSpine Writes ScanBlocks")));
 }

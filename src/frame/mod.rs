@@ -47,7 +47,7 @@ pub use self::{
     light_layers::{LightLayers, RangeSums},
     noise_tiles::{NoiseTiles, TileSamples},
     pass::{Pass, Role, Scope},
-    plan::{FrameKind, Plan, Section, Step, Touch},
+    plan::{Access, FrameKind, Plan, Section, Step},
     profile::{BounceStats, PassTime, Profile},
     resource::Resource,
     sample_range::{BlockSum, SampleRange, SampleSums, variance_of_joined},

@@ -19,7 +19,7 @@ use crate::layout::{EDGE_STEPS, LIGHT_LAYERS};
 
 /// How the passes before or after a barrier access its resources.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Touch {
+pub enum Access {
     /// Kernels read them.
     Read,
     /// Kernels write them.
@@ -38,9 +38,9 @@ pub enum Step {
     /// The accesses of later passes to the resources wait for those of earlier passes.
     Barrier {
         /// The accesses of earlier passes.
-        before: Touch,
+        before: Access,
         /// The accesses of later passes.
-        after: Touch,
+        after: Access,
         /// The resources for which the plan needs the barrier. The Vulkan barrier itself is not limited to them: it
         /// orders accesses of these kinds to all memory.
         of: &'static [Resource],
@@ -124,10 +124,10 @@ impl Plan {
     /// Returns the passes of a frame that traces paths.
     fn of_paths(kind: &FrameKind) -> Self {
         let mut light = if kind.light_layers { layer().to_vec() } else { Section::new() };
-        light.extend([Step::Run(Pass::PathResolve), barrier(Touch::Write, Touch::Update, &[PixelRadiance])]);
+        light.extend([Step::Run(Pass::PathResolve), barrier(Access::Write, Access::Update, &[PixelRadiance])]);
         let sums = vec![
             Step::Run(Pass::PathAccumulate),
-            barrier(Touch::Write, Touch::Read, &[PixelAccumulated, PixelRadiance]),
+            barrier(Access::Write, Access::Read, &[PixelAccumulated, PixelRadiance]),
         ];
         Self {
             visibility: Section::new(),
@@ -170,10 +170,10 @@ pub fn visibility(primary: Primary) -> Section {
         Primary::Raster => vec![Step::Run(Pass::Visibility)], // the pass itself makes triangle_ids visible to kernels
         Primary::SoftwareRaster => vec![
             Step::Run(Pass::RasterizeTriangles),
-            barrier(Touch::Write, Touch::Update, &[PixelNearest, RasterGroups]),
-            barrier(Touch::Write, Touch::Indirect, &[RasterGroups]),
+            barrier(Access::Write, Access::Update, &[PixelNearest, RasterGroups]),
+            barrier(Access::Write, Access::Indirect, &[RasterGroups]),
             Step::Run(Pass::RasterizeBlocks),
-            barrier(Touch::Write, Touch::Read, &[PixelNearest]),
+            barrier(Access::Write, Access::Read, &[PixelNearest]),
         ],
     }
 }
@@ -184,24 +184,24 @@ fn bounce_of_paths(kind: &FrameKind, depth: u32) -> Section {
     if depth == 0 {
         bounce.extend([
             Step::Run(Pass::PathBegin),
-            barrier(Touch::Write, Touch::Update, &[Rays, PathStates, ShadowRays, LivePaths]),
+            barrier(Access::Write, Access::Update, &[Rays, PathStates, ShadowRays, LivePaths]),
         ]);
     }
     bounce.extend([
         Step::Run(Pass::PathTrace),
-        barrier(Touch::Write, Touch::Update, &[Hits, PathStates, ShadowRays, Counters, PixelAovs]),
+        barrier(Access::Write, Access::Update, &[Hits, PathStates, ShadowRays, Counters, PixelAovs]),
     ]);
     if depth == 0 && kind.pixel_aovs {
-        bounce.extend([Step::Run(Pass::PixelAovs), barrier(Touch::Write, Touch::Update, &[PixelAovs])]);
+        bounce.extend([Step::Run(Pass::PixelAovs), barrier(Access::Write, Access::Update, &[PixelAovs])]);
     }
     if kind.is_lit {
         bounce.extend([
             Step::Run(Pass::PathScatter),
-            barrier(Touch::Write, Touch::Update, &[Rays, PathStates, ShadowRays, ChildKinds, ScanBlocks]),
+            barrier(Access::Write, Access::Update, &[Rays, PathStates, ShadowRays, ChildKinds, ScanBlocks]),
         ]);
     }
     if depth == 0 && kind.is_lit && kind.denoise == Denoise::Edge {
-        bounce.extend([Step::Run(Pass::Auxiliary), barrier(Touch::Write, Touch::Update, &[PixelAux])]);
+        bounce.extend([Step::Run(Pass::Auxiliary), barrier(Access::Write, Access::Update, &[PixelAux])]);
     }
     // The last layer is complete after the last bounce.
     if depth + 1 < LIGHT_LAYERS && kind.is_lit && kind.light_layers {
@@ -209,12 +209,12 @@ fn bounce_of_paths(kind: &FrameKind, depth: u32) -> Section {
     }
     if depth + 1 < kind.n_bounces {
         bounce.extend([
-            barrier(Touch::Indirect, Touch::Write, &[Bounces]),
+            barrier(Access::Indirect, Access::Write, &[Bounces]),
             Step::Run(Pass::CompactSpine),
-            barrier(Touch::Write, Touch::Read, &[ScanBlocks, Bounces]),
-            barrier(Touch::Write, Touch::Indirect, &[Bounces]),
+            barrier(Access::Write, Access::Read, &[ScanBlocks, Bounces]),
+            barrier(Access::Write, Access::Indirect, &[Bounces]),
             Step::Run(Pass::PathCompact),
-            barrier(Touch::Write, Touch::Update, &[LivePaths]),
+            barrier(Access::Write, Access::Update, &[LivePaths]),
         ]);
     }
     bounce
@@ -222,7 +222,7 @@ fn bounce_of_paths(kind: &FrameKind, depth: u32) -> Section {
 
 /// Returns the steps that add up a layer of light.
 fn layer() -> [Step; 2] {
-    [Step::Run(Pass::PathLayers), barrier(Touch::Write, Touch::Update, &[PathSnapshots, PixelRadiance])]
+    [Step::Run(Pass::PathLayers), barrier(Access::Write, Access::Update, &[PathSnapshots, PixelRadiance])]
 }
 
 /// Returns the section that finds the closest hits of one bounce's rays and, from these, makes the next bounce's
@@ -230,7 +230,7 @@ fn layer() -> [Step; 2] {
 fn bounce(kind: &FrameKind, depth: u32) -> Section {
     let mut bounce = closest_hits(kind, depth);
     if depth == 0 && kind.pixel_aovs {
-        bounce.extend([Step::Run(Pass::PixelAovs), barrier(Touch::Write, Touch::Update, &[PixelAovs])]);
+        bounce.extend([Step::Run(Pass::PixelAovs), barrier(Access::Write, Access::Update, &[PixelAovs])]);
     }
     if depth + 1 < kind.n_bounces {
         bounce.extend(next_rays());
@@ -244,7 +244,7 @@ fn closest_hits(kind: &FrameKind, depth: u32) -> Section {
     let is_rasterized = depth == 0 && kind.primary != Primary::Trace;
     vec![
         Step::Run(if is_rasterized { Pass::PrimaryHit } else { Pass::Trace }),
-        barrier(Touch::Write, Touch::Update, &[Hits, Counters, PixelAovs]),
+        barrier(Access::Write, Access::Update, &[Hits, Counters, PixelAovs]),
     ]
 }
 
@@ -253,13 +253,13 @@ fn closest_hits(kind: &FrameKind, depth: u32) -> Section {
 pub fn next_rays() -> Section {
     vec![
         Step::Run(Pass::CompactReduce),
-        barrier(Touch::Write, Touch::Update, &[ChildKinds, ScanBlocks]),
-        barrier(Touch::Indirect, Touch::Write, &[Bounces]),
+        barrier(Access::Write, Access::Update, &[ChildKinds, ScanBlocks]),
+        barrier(Access::Indirect, Access::Write, &[Bounces]),
         Step::Run(Pass::CompactSpine),
-        barrier(Touch::Write, Touch::Read, &[ScanBlocks, Bounces]),
-        barrier(Touch::Write, Touch::Indirect, &[Bounces]),
+        barrier(Access::Write, Access::Read, &[ScanBlocks, Bounces]),
+        barrier(Access::Write, Access::Indirect, &[Bounces]),
         Step::Run(Pass::CompactScatter),
-        barrier(Touch::Write, Touch::Update, &[Rays, FirstChildren]),
+        barrier(Access::Write, Access::Update, &[Rays, FirstChildren]),
     ]
 }
 
@@ -269,15 +269,15 @@ pub fn next_rays() -> Section {
 fn light(has_lights: bool) -> Section {
     let mut light = Section::new();
     if has_lights {
-        light.extend([Step::Run(Pass::Shadow), barrier(Touch::Write, Touch::Update, &[LightVisibility, PixelAovs])]);
+        light.extend([Step::Run(Pass::Shadow), barrier(Access::Write, Access::Update, &[LightVisibility, PixelAovs])]);
     }
     light.extend([
         Step::Run(Pass::Shade),
-        barrier(Touch::Write, Touch::Update, &[RayRadiance, Counters]),
+        barrier(Access::Write, Access::Update, &[RayRadiance, Counters]),
         Step::Run(Pass::Resolve),
         // The next batch overwrites the ray queue. This barrier makes it wait until the passes of this batch have
         // read the queue.
-        barrier(Touch::Write, Touch::Update, &[PixelRadiance]),
+        barrier(Access::Write, Access::Update, &[PixelRadiance]),
     ]);
     light
 }
@@ -288,7 +288,7 @@ fn samples(kind: &FrameKind) -> Section {
     if !kind.is_lit || !kind.adds_samples {
         return Section::new();
     }
-    vec![Step::Run(Pass::Accumulate), barrier(Touch::Write, Touch::Read, &[PixelAccumulated, PixelRadiance])]
+    vec![Step::Run(Pass::Accumulate), barrier(Access::Write, Access::Read, &[PixelAccumulated, PixelRadiance])]
 }
 
 /// Returns the steps that turn the mean of all samples into the displayed picture, or display an AOV in its place.
@@ -305,15 +305,17 @@ pub fn display(kind: &FrameKind) -> Section {
 fn noise_filter(denoise: Denoise) -> Section {
     match denoise {
         Denoise::Off => Section::new(),
-        Denoise::Paper { .. } => vec![Step::Run(Pass::Denoise), barrier(Touch::Write, Touch::Read, &[PixelFiltered])],
+        Denoise::Paper { .. } => vec![Step::Run(Pass::Denoise), barrier(Access::Write, Access::Read, &[PixelFiltered])],
         Denoise::Edge => {
             let steps = std::iter::repeat_n(Pass::AtrousFilter, EDGE_STEPS as usize);
             let passes = std::iter::once(Pass::Demodulate).chain(steps);
-            passes.flat_map(|pass| [Step::Run(pass), barrier(Touch::Write, Touch::Update, &[PixelFiltered])]).collect()
+            passes
+                .flat_map(|pass| [Step::Run(pass), barrier(Access::Write, Access::Update, &[PixelFiltered])])
+                .collect()
         }
     }
 }
 
-fn barrier(before: Touch, after: Touch, of: &'static [Resource]) -> Step {
+fn barrier(before: Access, after: Access, of: &'static [Resource]) -> Step {
     Step::Barrier { before, after, of }
 }

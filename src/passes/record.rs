@@ -4,7 +4,7 @@
 use super::Passes;
 use crate::{
     buffers::Resources,
-    frame::{Pass, Step, Touch},
+    frame::{self, Pass, Step},
     gpu::{Access, Commands},
     layout::{Batch, FalseColor},
 };
@@ -73,12 +73,12 @@ pub(super) fn record_steps(commands: &Commands, section: &[Step], record: impl F
     }
 }
 
-/// Returns the Vulkan access of a barrier that stands for a plan's `touch`.
-fn access(touch: Touch) -> Access {
-    match touch {
-        Touch::Read => Access::ComputeRead,
-        Touch::Write => Access::ComputeWrite,
-        Touch::Update => Access::ComputeUpdate,
-        Touch::Indirect => Access::IndirectRead,
+/// Returns the Vulkan access that stands for one of a plan.
+fn access(of_plan: frame::Access) -> Access {
+    match of_plan {
+        frame::Access::Read => Access::ComputeRead,
+        frame::Access::Write => Access::ComputeWrite,
+        frame::Access::Update => Access::ComputeUpdate,
+        frame::Access::Indirect => Access::IndirectRead,
     }
 }
