@@ -186,7 +186,10 @@ fn mistakes_are_named() {
     let ply = String::from_utf8(ply_text()).unwrap();
     for (from, to, what) in [
         ("4 0 3 2 1", "4 0 3 2 8", "face 0 (counted from 0) has vertex 8, but there are 8 vertices"),
-        ("4 0 3 2 1", "4 0 3 2 -1", "element `face`"),
+        ("4 0 3 2 1", "4 0 3 2 -1", "face 0 (counted from 0) has vertex -1, but there are 8 vertices"),
+        ("4 0 3 2 1", "4 0 3 2 1.5", "face 0 (counted from 0) has vertex 1.5, but there are 8 vertices"),
+        ("4 0 3 2 1", "4 0 3 2", "element `face`: line 19 has fewer numbers than the row"),
+        ("4 0 3 2 1", "-4 0 3 2 1", "element `face`: line 19: -4 is no length of a list"),
         ("element face 6", "element face 600", "element `face`: the file ends too early"),
         (
             "element face 6\nproperty list uchar int vertex_indices",
@@ -197,7 +200,7 @@ fn mistakes_are_named() {
         ("vertex_indices", "indices", "lacks the list `vertex_indices`"),
         ("property float z", "property float w", "lacks x, y or z"),
         ("element vertex 8", "element corner 8", "no element `vertex`"),
-        ("1 -1 -1", "1 x -1", "element `vertex`"),
+        ("1 -1 -1", "1 x -1", "element `vertex`: line 11: `x` is not a number"),
         ("format ascii 1.0", "format morse 1.0", "is no PLY file"),
     ] {
         let found = error("x.ply", ply.replacen(from, to, 1).as_bytes());

@@ -150,6 +150,50 @@ fn ply_files_of_old_programs_are_read() {
     assert_eq!(n_faces(&latin), 2);
 }
 
+#[test]
+fn ply_files_of_careless_programs_are_read() {
+    let text = coloured_faces(None);
+    let read = |bytes: &[u8]| {
+        let (scene, warnings) = loaded(&[("m.ply", bytes)]);
+        (scene.meshes[0].faces.clone(), warnings)
+    };
+    let (faces, none) = read(text.as_bytes());
+    assert_eq!((faces.len(), none), (2, Vec::new()));
+    let bom = [b"\xef\xbb\xbf", text.as_bytes()].concat();
+    assert_eq!(read(&bom), (faces.clone(), Vec::new()), "a byte order mark");
+    let floats = text.replace("3 0 1 2", "3.0 0.0 1 2e0").replace("uchar int", "float float");
+    assert_eq!(read(floats.as_bytes()), (faces.clone(), Vec::new()), "indices that are written as floats");
+    let more = text.replace("1 0 0\n", "1 0 0 7 7\n");
+    let warning = "line 14 has more numbers than its row, which are not read";
+    let (found, warnings) = read(more.as_bytes());
+    assert!(found == faces && warnings.len() == 1 && warnings[0].ends_with(warning), "{warnings:?}");
+    let (head, rows) = text.split_once("end_header\n").unwrap();
+    let in_one_line = format!("{head}end_header\n{}", rows.replace('\n', " "));
+    assert_eq!(read(in_one_line.as_bytes()), (faces.clone(), Vec::new()), "rows that follow each other");
+    // The first coordinate begins with the byte of a line feed. In two of the files an element that is not read
+    // comes first.
+    let point = |x: u32| [x.to_le_bytes(), [0; 4], [0; 4]].concat();
+    let points = [point(0x3f80_000a), point(0), [[0; 4], 1f32.to_le_bytes(), [0; 4]].concat()].concat();
+    let other = "element tags 2\nproperty list uchar short of\nproperty char more\n";
+    let tags = [&[1, 5, 0, 9][..], &[0, 10]].concat();
+    for (other, tags) in [("", Vec::new()), (other, tags)] {
+        for line_end in ["\n", "\r\n", "\r"] {
+            let head = format!(
+                "ply\nformat binary_little_endian 1.0\n{other}element vertex 3\nproperty float x\nproperty float y\n\
+                 property float z\nelement face 1\nproperty list uchar int vertex_index\nend_header\n"
+            );
+            let face = [&[3][..], &[0_u32, 1, 2].map(u32::to_le_bytes).concat()].concat();
+            let head = head.replace('\n', line_end).into_bytes();
+            let bytes = [head, tags.clone(), points.clone(), face].concat();
+            assert_eq!(read(&bytes), (vec![[0, 1, 2]], Vec::new()), "{line_end:?}");
+            let mesh = &loaded(&[("m.ply", &bytes)]).0.meshes[0];
+            assert_eq!(mesh.positions[0].x.to_bits(), 0x3f80_000a, "{line_end:?}");
+            let (_, warnings) = read(&[&bytes[..], &[1, 2, 3]].concat());
+            assert!(warnings[0].ends_with("3 bytes behind the last row are not read"), "{warnings:?}");
+        }
+    }
+}
+
 /// Faces that are there once for each side, in formats that are no OBJ.
 #[test]
 fn faces_for_each_side_are_moved_apart_in_all_formats() {
