@@ -112,6 +112,21 @@ fn stl_files_of_writers_that_do_not_count_are_read() {
     assert_eq!(loaded(&[("m.stl", facet.as_bytes())]).0.meshes[0].faces.len(), 1, "the first line is missing");
 }
 
+#[test]
+fn stl_files_with_bytes_behind_their_facets_are_read() {
+    for comment in [&b"made by hand"[..], b"solid of a program that writes binary"] {
+        let mut bytes = [stl(comment, &[0, 0]), vec![0]].concat();
+        let (scene, warnings) = loaded(&[("m.stl", &bytes)]);
+        assert_eq!(scene.meshes[0].faces.len(), 2);
+        let warning = "the header states 2 facets: 1 bytes behind them are not read";
+        assert!(warnings.len() == 1 && warnings[0].ends_with(warning), "{warnings:?}");
+        bytes[80..84].copy_from_slice(&1_u32.to_le_bytes());
+        let (scene, warnings) = loaded(&[("m.stl", &bytes)]);
+        assert_eq!(scene.meshes[0].faces.len(), 1);
+        assert!(warnings[0].ends_with("states 1 facets: 51 bytes behind them are not read"), "{warnings:?}");
+    }
+}
+
 /// Returns a text PLY file of a square whose two triangles have different colours.
 fn coloured_faces(of_vertices: Option<[u8; 4]>) -> String {
     let properties =

@@ -76,6 +76,27 @@ fn wrong_statements_of_mtl_files_are_left_out() {
 }
 
 #[test]
+fn libraries_of_other_machines_and_names_before_comments_are_found() {
+    let of = |mtllib: &str, usemtl: &str| {
+        let obj = format!("mtllib {mtllib}\nusemtl {usemtl}\n{TRIANGLE}f 1 2 3\n");
+        let mtl = b"newmtl red\nKd 1 0 0\nnewmtl red #2\nKd 0 1 0\n";
+        let files = [("m.obj", obj.as_bytes()), ("my part.mtl", &mtl[..]), ("part.mtl", mtl)];
+        let (scene, warnings) = loaded(&files);
+        let mesh = &scene.meshes[0];
+        (scene.materials[mesh.slots[0] as usize].kd, warnings)
+    };
+    let (red, green) = (Vec3::X, Vec3::Y);
+    for mtllib in ["part.mtl", "C:\\work\\part.mtl", "/home/me/my part.mtl", "part.mtl # colours", "none.mtl part.mtl"]
+    {
+        for (usemtl, colour) in [("red", red), ("red # of paint", red), ("red #2", green), ("red #2 # so", green)] {
+            let (kd, warnings) = of(mtllib, usemtl);
+            assert_eq!(kd, colour, "{mtllib}, {usemtl}: {warnings:?}");
+            assert_eq!(warnings.len(), usize::from(mtllib.starts_with("none")), "{warnings:?}");
+        }
+    }
+}
+
+#[test]
 fn names_may_be_in_an_old_encoding() {
     // \xfc is u with two dots in Windows-1252.
     let obj = [b"mtllib K\xfcche.mtl\nusemtl gr\xfcn\n", TRIANGLE.as_bytes(), b"f 1 2 3\n"].concat();
@@ -336,7 +357,8 @@ fn files_that_are_no_scenes_are_called_by_their_names() {
         ("a.stl", b"PK\x03\x04", "ZIP"),
         ("a.ply", b"<!DOCTYPE html>", "web page"),
         ("a.fbx", b"Kaydara FBX Binary  \0", "FBX"),
-        ("a.xyz", b"1 2 3", "ends in none of"),
+        ("a.xyz", b"1 2 3", "a cloud of points"),
+        ("a.what", b"1 2 3", "ends in none of"),
         ("a.obj", b"v 0 0 0\nv 1 0 0\nl 1 2\n", "has 2 points but no triangles"),
         ("a.obj", b"v 0,5 0 0\n", "need a point in place of the comma"),
         ("a.gltf", br#"{ "asset": { "version": "1.0" }, "scenes": {} }"#, "this is glTF 1.0"),

@@ -3,19 +3,21 @@
 use std::path::Path;
 
 /// First bytes of other files, and what these files are.
-const FOREIGN: [(&[u8], &str); 24] = [
+const FOREIGN: [(&[u8], &str); 26] = [
     (
         b"version https://git-lfs",
         "is a pointer of Git LFS, which stands for a larger file: `git lfs pull` fetches that file",
     ),
     (b"PK\x03\x04", "is a ZIP archive: unpack it first"),
     (b"\x1f\x8b", "is compressed by gzip: unpack it first"),
+    (b"BZh", "is compressed by bzip2: unpack it first"),
     (b"7z\xbc\xaf", "is a 7z archive: unpack it first"),
     (b"Rar!", "is a RAR archive: unpack it first"),
     (b"Kaydara FBX Binary", "is an FBX file, which is not read: Blender, for example, saves it as glTF"),
+    (b"; FBX ", "is an FBX file, which is not read: Blender, for example, saves it as glTF"),
+    (b"DRACO", "is a Draco file, which is not read: `draco_decoder` saves it as PLY"),
     (b"BLENDER", "is a file of Blender: export it from there as glTF"),
     (b"PXR-USDC", "is a USD file, which is not read: Blender, for example, saves it as glTF"),
-    (b"ISO-10303-21", "is a STEP file, which has no triangles: FreeCAD, for example, saves it as OBJ or STL"),
     (b"%PDF", "is a PDF document"),
     (b"//Maya ASCII", "is a file of Maya: export it from there as OBJ"),
     (b"#usda", "is a USD file, which is not read: Blender, for example, saves it as glTF"),
@@ -51,6 +53,15 @@ pub(crate) fn what_it_is(bytes: &[u8]) -> Option<&'static str> {
             () if head.starts_with('<') && head.contains("<collada") => {
                 Some("is a COLLADA file, which is not read: Blender 4, for example, saves it as glTF")
             }
+            () if head.starts_with("iso-10303-21") && head.contains("ifc") => {
+                Some("is an IFC file, which is not read: IfcConvert, for example, saves it as glTF")
+            }
+            () if head.starts_with("iso-10303-21") => {
+                Some("is a STEP file, which has no triangles: FreeCAD, for example, saves it as OBJ or STL")
+            }
+            () if bytes.starts_with(b"FORM") && bytes.get(8..11) == Some(b"LWO") => {
+                Some("is a file of LightWave, which is not read: Assimp, for example, saves it as glTF")
+            }
             () => None,
         }
     })
@@ -63,6 +74,7 @@ fn of_name(path: &Path) -> Option<&'static str> {
         "usdz" => Some("is a USD file, which is not read: Blender, for example, saves it as glTF"),
         "3ds" => Some("is a 3DS file, which is not read: Assimp, for example, saves it as glTF"),
         "x3d" => Some("is an X3D file, which is not read: Blender, for example, saves it as glTF"),
+        "xyz" | "pts" => Some("is a cloud of points, without triangles to show. CloudCompare makes a mesh of it"),
         "amf" => Some("is an AMF file, which is not read: PrusaSlicer, for example, saves it as STL"),
         "skp" => Some("is a file of SketchUp: export it from there as OBJ"),
         "max" => Some("is a file of 3ds Max: export it from there as glTF or OBJ"),
@@ -101,6 +113,11 @@ mod tests {
             (b"<?xml version=\"1.0\"?>\n<COLLADA xmlns=\"\">", "COLLADA"),
             (b"Kaydara FBX Binary  \0", "FBX"),
             (b"VOX \x96\0\0\0", "MagicaVoxel"),
+            (b"ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('IFC4'));", "an IFC file"),
+            (b"ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('AP214'));", "a STEP file"),
+            (b"FORM\0\0\x12\x34LWO2TAGS", "LightWave"),
+            (b"BZh91AY&SY", "bzip2"),
+            (b"; FBX 7.4.0 project file", "an FBX file"),
             (b"\x28\xb5\x2f\xfd\0", "Zstandard"),
         ] {
             assert!(what_it_is(bytes).unwrap().contains(what), "{what}");

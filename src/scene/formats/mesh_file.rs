@@ -125,7 +125,8 @@ pub(crate) struct Shape {
 enum ShapeKind {
     Obj(ObjFile),
     Ply(PlyMesh),
-    Stl(Mesh),
+    /// The mesh, and what is to be warned of.
+    Stl(Mesh, Option<String>),
 }
 
 impl Shape {
@@ -148,14 +149,17 @@ impl Shape {
         let parse = |bytes: Vec<u8>, origin: DVec3| {
             let made = match format {
                 MeshFormat::Ply => ply_mesh(&bytes, (shading, origin), n_loaded, progress).map(ShapeKind::Ply),
-                _ => parse_stl(bytes, (shading, origin), (n_loaded, progress)).map(ShapeKind::Stl),
+                _ => {
+                    let made = parse_stl(bytes, (shading, origin), (n_loaded, progress));
+                    made.map(|(mesh, warning)| ShapeKind::Stl(mesh, warning))
+                }
             };
             made.map(|kind| Self { kind, origin }).map_err(|what| SceneError::file(path, what))
         };
         let made = parse(bytes, origin.first())?;
         let mesh = match &made.kind {
             ShapeKind::Ply(ply) => ply.mesh(),
-            ShapeKind::Stl(mesh) => mesh,
+            ShapeKind::Stl(mesh, _) => mesh,
             ShapeKind::Obj(_) => return Ok(made),
         };
         match origin.second(&mesh.positions) {
@@ -170,14 +174,17 @@ impl Shape {
         let n_points = match &kind {
             ShapeKind::Obj(file) => file.n_points(),
             ShapeKind::Ply(ply) => ply.mesh().positions.len(),
-            ShapeKind::Stl(mesh) => mesh.positions.len(),
+            ShapeKind::Stl(mesh, _) => mesh.positions.len(),
         };
         // An OBJ file's polygons are separated before they are cut into triangles.
         let is_obj = matches!(kind, ShapeKind::Obj(_));
         let mut loaded = match kind {
             ShapeKind::Obj(file) => obj_mesh(path, file, loading)?,
             ShapeKind::Ply(ply) => Loaded { origin, ..ply.with_materials(path, loading.access, loading.images) },
-            ShapeKind::Stl(mesh) => Loaded { mesh, origin, materials: Vec::new(), uses_crease: loading.shading.smooth },
+            ShapeKind::Stl(mesh, warning) => {
+                warning.iter().for_each(|warning| tracing::warn!("{}: {warning}", path.display()));
+                Loaded { mesh, origin, materials: Vec::new(), uses_crease: loading.shading.smooth }
+            }
         };
         scan_colours::leave_out(path, &mut loaded, loading.images);
         if !is_obj {

@@ -55,22 +55,36 @@ pub(crate) fn is_stl_text(bytes: &[u8]) -> bool {
     first.is_some_and(|word| ["solid", "facet"].iter().any(|it| word.eq_ignore_ascii_case(it.as_bytes())))
 }
 
-/// Makes a mesh of a file's content. Its faces have slot 0. `n_loaded`: the number of triangles that the scene has
-/// already. `progress` is told of the facets that have been read.
+/// Returns whether a file that begins like text is binary nevertheless: it has the facets that its header states, and
+/// no word of a text's facets.
+fn has_binary_facets(bytes: &[u8]) -> bool {
+    let has_facets = n_facets(bytes).is_some_and(|n| n > 0 && (bytes.len() - HEAD_BYTES) / FACET_BYTES >= n);
+    has_facets && !bytes.windows(b"facet".len()).any(|word| word.eq_ignore_ascii_case(b"facet"))
+}
+
+/// Makes a mesh of a file's content. Its faces have slot 0. Also returns what is to be warned of. `n_loaded`: the
+/// number of triangles that the scene has already. `progress` is told of the facets that have been read.
 pub(crate) fn parse_stl(
     bytes: Vec<u8>,
     (shading, origin): (Shading, DVec3),
     (n_loaded, progress): (usize, &Progress),
-) -> Checked<Mesh> {
-    let (facets, colours) = match is_binary_stl(&bytes) || !is_stl_text(&bytes) {
+) -> Checked<(Mesh, Option<String>)> {
+    let is_binary = is_binary_stl(&bytes) || !is_stl_text(&bytes) || has_binary_facets(&bytes);
+    let (facets, colours) = match is_binary {
         true => binary(&bytes, origin, (n_loaded, progress))?,
         false => (text::facets(&bytes, origin, (n_loaded, progress))?, Vec::new()),
     };
+    let n_facets = n_facets(&bytes).filter(|_| is_binary);
+    let n_behind = n_facets.map_or(0, |n| bytes.len() - HEAD_BYTES - n * FACET_BYTES);
+    let warning = (n_behind > 0).then(|| {
+        let n = n_facets.unwrap_or_default();
+        format!("the header states {n} facets: {n_behind} bytes behind them are not read")
+    });
     let positions = facets.as_flattened().to_vec();
     let faces: Vec<_> = (0..facets.len() as u32).map(|ix| [3 * ix, 3 * ix + 1, 3 * ix + 2]).collect();
     let normals = smooth_normals(&positions, &faces, shading);
     let colours = colours.into_iter().map(|colour: Vec3| [colour.extend(1.0); 3]).collect();
-    Ok(Mesh { positions, slots: vec![0; faces.len()], faces, normals, colours, ..Mesh::default() })
+    Ok((Mesh { positions, slots: vec![0; faces.len()], faces, normals, colours, ..Mesh::default() }, warning))
 }
 
 /// Returns the facets of a binary file whose corners are finite, and their colours, if the file has any. Programs write

@@ -7,6 +7,8 @@ use glam::{DVec2, DVec3, Vec3};
 /// Share of twice the polygon's area by which a triangle of a fan may be turned over. Corners that should lie on one
 /// line deviate from it by the rounding of single precision, 2^-24 of their coordinates.
 const TURNED_TOLERANCE: f64 = 1e-6;
+/// Share of a polygon's area by which that of its ears may differ from it.
+const CLIPPED_TOLERANCE: f64 = 1e-6;
 /// Largest number of corners of a polygon that is cut by ear clipping, whose time can grow with the square of the
 /// number. Larger polygons become fans.
 const MAX_CLIPPED_CORNERS: usize = 1 << 14;
@@ -20,8 +22,9 @@ pub(crate) struct Triangulator {
 }
 
 impl Triangulator {
-    /// Calls `push` with the numbers of the corners of each triangle: `corners.len() - 2` triangles, or fewer where
-    /// corners lie on one line. The order of corners is that of the polygon.
+    /// Calls `push` with the numbers of the corners of each of the `corners.len() - 2` triangles. The order of corners
+    /// is that of the polygon. Triangles without area are left where corners lie on one line: they close the edge to a
+    /// neighbour that has a corner there.
     pub fn cut(&mut self, corners: &[Vec3], mut push: impl FnMut([usize; 3])) {
         if !self.clips(corners) {
             (2..corners.len()).for_each(|ix| push([0, ix - 1, ix]));
@@ -29,12 +32,12 @@ impl Triangulator {
         }
         for triangle in self.clipped.as_chunks::<3>().0 {
             let [a, b, c] = triangle.map(|ix| ix as usize);
-            let [p, q, r] = [a, b, c].map(|ix| DVec2::from_array(self.flat[ix]));
-            push(if (q - p).perp_dot(r - p) < 0.0 { [a, c, b] } else { [a, b, c] });
+            push(if self.doubled_area(*triangle) < 0.0 { [a, c, b] } else { [a, b, c] });
         }
     }
 
-    /// Clips the ears of a polygon that is no fan. Returns false for a fan, and for a polygon without a plane.
+    /// Clips the ears of a polygon that is no fan. Returns false for a fan, for a polygon without a plane, and for one
+    /// that crosses itself, so that the ears do not cover it.
     fn clips(&mut self, corners: &[Vec3]) -> bool {
         if !(4..=MAX_CLIPPED_CORNERS).contains(&corners.len()) {
             return false;
@@ -52,7 +55,23 @@ impl Triangulator {
         self.flat.clear();
         self.flat.extend(corners.iter().map(flat));
         self.clipper.earcut(self.flat.iter().copied(), &[], &mut self.clipped);
-        !self.clipped.is_empty()
+        let area: f64 = self.clipped.as_chunks().0.iter().map(|triangle| self.doubled_area(*triangle).abs()).sum();
+        if !((area - normal.length()).abs() <= CLIPPED_TOLERANCE * normal.length()) {
+            return false;
+        }
+        // The clipper leaves corners out that lie on the line between their neighbours.
+        let n = corners.len();
+        let mut is_used = vec![false; n];
+        self.clipped.iter().for_each(|ix| is_used[*ix as usize] = true);
+        let left_out = (0..n).filter(|ix| !is_used[*ix]);
+        self.clipped.extend(left_out.flat_map(|ix| [(ix + n - 1) % n, ix, (ix + 1) % n]).map(|ix| ix as u32));
+        self.clipped.len() == 3 * (n - 2)
+    }
+
+    /// Returns twice the area of a triangle, which is negative if it is clockwise.
+    fn doubled_area(&self, triangle: [u32; 3]) -> f64 {
+        let [p, q, r] = triangle.map(|ix| DVec2::from_array(self.flat[ix as usize]));
+        (q - p).perp_dot(r - p)
     }
 }
 
@@ -114,6 +133,21 @@ mod tests {
         }
     }
 
+    #[test]
+    fn every_polygon_has_its_number_of_triangles() {
+        // A quad that crosses itself, as meshes that were deformed have.
+        assert_eq!(cut(&[[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.3]]), [[0, 1, 2], [0, 2, 3]]);
+        // An L with corners on its edges, at a reflex corner's neighbours, too.
+        let l = [[2.0, 0.0], [2.0, 1.0], [1.5, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0], [0.0, 1.0], [0.0, 0.0]];
+        for first in 0..l.len() {
+            let corners = [&l[first..], &l[..first]].concat();
+            let triangles = cut(&corners);
+            assert_eq!(triangles.len(), 6, "{first}");
+            let areas: Vec<f32> = triangles.iter().map(|t| doubled(&corners, t)).collect();
+            assert!(areas.iter().all(|area| *area >= 0.0) && areas.iter().sum::<f32>() == 6.0, "{first}: {areas:?}");
+        }
+    }
+
     /// Returns whether a ray from a point along +x crosses the polygon's edges an odd number of times.
     fn is_inside(corners: &[[f32; 2]], [x, y]: [f32; 2]) -> bool {
         let edges = corners.iter().zip(corners.iter().cycle().skip(1));
@@ -127,7 +161,7 @@ mod tests {
         assert_eq!(cut(&[[0.0, 0.0]; 4]).len(), 2);
         assert_eq!(cut(&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [1.0, 0.0]]).len(), 2);
         assert!(cut(&[[0.0, 0.0]; 2]).is_empty());
-        cut(&[[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]]);
+        assert_eq!(cut(&[[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]]).len(), 2);
         cut(&[[0.0, 0.0], [3e38, 3e38], [1.0, 0.0], [-3e38, 1.0], [0.0, 1.0]]);
     }
 }

@@ -254,7 +254,7 @@ mod tests {
             [("f 1 2 3/2", "texture vertex 2"), ("f 1 2 3//2", "normal 2"), ("f 1/0 2 3", "texture vertex 0")];
         let wrong = [
             ("v 0 0", "`v` has 2 numbers: it takes 3 to 7".to_owned()),
-            ("vn 0 0", "`vn` has 2 numbers: it takes 3 to 3".to_owned()),
+            ("vn 0 0", "`vn` has 2 numbers: it takes 3".to_owned()),
             ("vt 0 0 x", "`x` is not a number".to_owned()),
             ("v 0 0 1,5", "`1,5` is not a number: decimals need a point in place of the comma".to_owned()),
             ("f 1 2 4", out_of_range("vertex 4", 3)),

@@ -173,6 +173,10 @@ fn fault(kind: usize, rest: &str, origin: DVec3) -> String {
     };
     words(rest).enumerate().find_map(of_word).unwrap_or_else(|| {
         let (keyword, n, allowed) = (KEYWORDS[kind], words(rest).count(), &COUNTS[kind]);
-        format!("`{keyword}` has {n} numbers: it takes {} to {}", allowed.start(), allowed.end())
+        let allowed = match (allowed.start(), allowed.end()) {
+            (least, most) if least == most => least.to_string(),
+            (least, most) => format!("{least} to {most}"),
+        };
+        format!("`{keyword}` has {n} numbers: it takes {allowed}")
     })
 }

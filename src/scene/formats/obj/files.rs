@@ -39,7 +39,7 @@ fn named_images(reach: Reach, mtl: &Path) -> Vec<PathBuf> {
             let Ok(MapOptions { name, .. }) = MapOptions::new(rest) else { return Vec::new() };
             let tiles = files_of_tiles(reach, folder, &name);
             match tiles.is_empty() {
-                true => map_file(reach, folder, &name).into_iter().map(|file| file.path).collect(),
+                true => find_file(reach, folder, &name).into_iter().map(|file| file.path).collect(),
                 false => tiles.into_iter().map(|(_, file)| file.path).collect(),
             }
         }
@@ -49,20 +49,26 @@ fn named_images(reach: Reach, mtl: &Path) -> Vec<PathBuf> {
 }
 
 /// Returns the files that a `mtllib` line names. The rest of the line is one name, possibly with spaces, if such a
-/// file exists; otherwise it is a list of names.
+/// file exists. Otherwise it is a list of names, or, if none of them exists or one leaves the folder, one name that
+/// [`find_file`] finds.
 pub fn library_files(reach: Reach, rest: &str) -> Vec<Checked<NamedFile>> {
-    let find = |name: &str| reach.find(reach.root, name.trim_matches('"'));
-    match find(rest) {
-        Ok(whole) if store::is_file(&whole.path) => vec![Ok(whole)],
-        _ => rest.split_whitespace().map(find).collect(),
+    let name = rest.trim_matches('"');
+    let whole = reach.find(reach.root, name);
+    if exists(&whole) {
+        return vec![whole];
     }
+    let names = rest.split(" #").next().unwrap_or_default().split_whitespace();
+    let listed: Vec<_> = names.map(|name| reach.find(reach.root, name.trim_matches('"'))).collect();
+    let elsewhere = || Some(find_file(reach, reach.root, name)).filter(exists);
+    // A path of another machine may have spaces.
+    let is_list = listed.iter().any(exists) && listed.iter().all(Result::is_ok);
+    if is_list { listed } else { elsewhere().map_or(listed, |file| vec![file]) }
 }
 
-/// Returns the file of a map. Writers often state absolute names of their own machine: where a name leaves the folder
-/// of the OBJ file, the file is taken whose name beside the MTL file has the most last parts in common with it. A
-/// comment may follow the name.
-pub fn map_file(reach: Reach, folder: &Path, name: &str) -> Checked<NamedFile> {
-    let exists = |file: &Checked<NamedFile>| file.as_ref().is_ok_and(|file| store::is_file(&file.path));
+/// Returns the file that a name in an OBJ or MTL file stands for. Writers often state absolute names of their own
+/// machine: where a name leaves the folder of the OBJ file, the file is taken whose name in `folder` has the most last
+/// parts in common with it. A comment may follow the name.
+pub fn find_file(reach: Reach, folder: &Path, name: &str) -> Checked<NamedFile> {
     let whole = reach.find(folder, name);
     if exists(&whole) {
         return whole;
@@ -74,4 +80,8 @@ pub fn map_file(reach: Reach, folder: &Path, name: &str) -> Checked<NamedFile> {
     }
     let ends = name.match_indices(['/', '\\']).map(|(at, _)| &name[at + 1..]).filter(|end| !end.is_empty());
     ends.map(|end| reach.within().find(folder, end)).find(exists).unwrap_or(without_comment)
+}
+
+fn exists(file: &Checked<NamedFile>) -> bool {
+    file.as_ref().is_ok_and(|file| store::is_file(&file.path))
 }

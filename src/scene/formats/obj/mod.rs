@@ -73,9 +73,13 @@ fn used_materials(path: &Path, file: &ObjFile, materials: &[Material]) -> HashMa
     let (mut by_name, mut undefined, mut other_case) = (HashMap::new(), None, None);
     // `usemtl` without a name is for faces without a material.
     for (name, line) in file.used_materials.iter().filter(|(name, _)| !name.is_empty()) {
-        let alike = by_lower.get(&name.to_lowercase()).map_or(&[][..], |alike| alike);
+        let find = |name: &str| by_lower.get(&name.to_lowercase());
+        // A comment may follow the name.
+        let stated =
+            if find(name).is_some() { name } else { name.rsplit_once(" #").map_or(&**name, |(it, _)| it.trim_end()) };
+        let alike = find(stated).map_or(&[][..], |alike| alike);
         // If several materials have the same name, the last one counts.
-        let exact = alike.iter().rev().find(|ix| materials[**ix].name == *name);
+        let exact = alike.iter().rev().find(|ix| materials[**ix].name == stated);
         let Some(ix) = exact.or(alike.last()) else {
             undefined = undefined.or(Some((name, line)));
             continue;

@@ -9,7 +9,7 @@ use std::{
 };
 
 use super::{
-    files::{library_files, map_file},
+    files::{find_file, library_files},
     maps::{MapKind, MapOptions, Term, set_map},
     statement::{split_keyword, statements, words},
     tiles::{TOKEN, Tiles, files_of_tiles},
@@ -310,7 +310,7 @@ fn read_more(reach: Reach, path: &Path, text: &str, images: &mut Images) -> Vec<
                 continue;
             }
         }
-        let found = options.and_then(|options| Ok((map_file(reach, folder, &options.name)?, options)));
+        let found = options.and_then(|options| Ok((find_file(reach, folder, &options.name)?, options)));
         match found {
             Err(what) => warn(line, rest, format!("`{keyword}` is not shown: {what}")),
             Ok((NamedFile { path, is_other_case }, options)) => {

@@ -10,7 +10,7 @@ use std::{
     path::Path,
 };
 
-use super::files::map_file;
+use super::files::find_file;
 use crate::scene::{
     files::{
         outside::{NamedFile, Reach},
@@ -46,7 +46,7 @@ fn around_number(name: &str) -> Option<(&str, &str)> {
 pub fn files_of_tiles(reach: Reach, folder: &Path, name: &str) -> Vec<(u32, NamedFile)> {
     let Some((before, after)) = around_number(name) else { return Vec::new() };
     let file = |tile: u32| {
-        let file = map_file(reach, folder, &format!("{before}{tile}{after}")).ok()?;
+        let file = find_file(reach, folder, &format!("{before}{tile}{after}")).ok()?;
         store::is_file(&file.path).then_some((tile, file))
     };
     let found: Vec<_> = ALL.filter_map(file).collect();

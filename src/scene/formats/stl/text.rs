@@ -100,6 +100,7 @@ pub(super) fn facets(bytes: &[u8], origin: DVec3, (n_loaded, progress): (usize, 
         let failed = |what: String| format!("line {}: {what}", word.line);
         match () {
             () if word.is("solid") || word.is("endsolid") => words.skip_name(),
+            () if word.is("end") && words.clone().next().is_some_and(|next| next.is("solid")) => {}
             () if word.is("facet") => pass_over_normal(&mut words),
             () if word.is("vertex") => corners.push(corner(&mut words, failed)? - origin),
             () if word.is("endfacet") => {
@@ -166,6 +167,7 @@ mod tests {
         let one_line = format!("solid a b {FACET}endsolid a b solid c {FACET}").replace('\n', " ");
         assert_eq!(read(&one_line).unwrap(), expected[..2]);
         assert_eq!(read(&text.replace("normal 0 0 1", "")).unwrap(), expected);
+        assert_eq!(read(&text.replace("endsolid", "end solid")).unwrap(), expected);
         assert_eq!(read(&text.replace("normal 0 0 1", "normal nan -1.#IND x")).unwrap(), expected);
     }
 
