@@ -73,17 +73,13 @@ pub struct ComputePipeline {
 
 impl ComputePipeline {
     /// Creates the pipeline, or returns the one that the context has made of the same description. Drivers keep what
-    /// they compile, but some, such as lavapipe, not all of it: a renderer's pipelines take it a second each time.
+    /// they compile, but not all of it: lavapipe would need more than a second for the pipelines of each renderer.
     ///
     /// # Errors
     /// The driver refuses the module or is out of memory.
     pub fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>, desc: &ComputeDesc) -> Result<Self, GpuError> {
         context.device.count_creation("vkCreateComputePipelines", desc.name)?;
         let made = |raw| Self { raw, bindings: Arc::clone(bindings), name: desc.name };
-        #[cfg(feature = "view")]
-        if context.device.is_replaced(desc.shader) {
-            return Self::compile(context, bindings, desc).map(made);
-        }
         let variant = Variant {
             name: desc.name,
             file: desc.shader.file,
@@ -91,17 +87,26 @@ impl ComputePipeline {
             layout: bindings.pipeline_layout,
             full_subgroups: desc.full_subgroups,
         };
-        if let Some(known) = lock(Rank::Pipelines, &context.pipelines)?.get(&variant) {
-            return Ok(made(Arc::clone(known)));
+        let known = lock(Rank::Pipelines, &context.pipelines)?.get(&variant).cloned();
+        if let Some(known) = known.filter(|_| !context.device.has_replacement(desc.shader)) {
+            return Ok(made(known));
         }
         // The lock is not held meanwhile: other threads compile other pipelines.
-        let raw = Self::compile(context, bindings, desc)?;
+        let module = ShaderModule::new(&context.device, desc.shader)?;
+        let raw = Self::compile(context, bindings, desc, &module)?;
+        if module.is_replacement {
+            return Ok(made(raw));
+        }
         Ok(made(Arc::clone(lock(Rank::Pipelines, &context.pipelines)?.entry(variant).or_insert(raw))))
     }
 
-    fn compile(context: &Context, bindings: &BindingLayout, desc: &ComputeDesc) -> Result<Arc<RawPipeline>, GpuError> {
+    fn compile(
+        context: &Context,
+        bindings: &BindingLayout,
+        desc: &ComputeDesc,
+        module: &ShaderModule,
+    ) -> Result<Arc<RawPipeline>, GpuError> {
         let device = &context.device;
-        let module = ShaderModule::new(device, desc.shader)?;
         let constants = Specialization::new(desc.constants, bindings);
         let constants = constants.info();
         let flags = if desc.full_subgroups {

@@ -29,8 +29,7 @@ pub(super) struct RawDevice {
     /// Whether commands get debug labels. They get none under the validation layer, because that of Debian 12
     /// (1.3.239) corrupts its heap after some ten thousand labelled command buffers.
     pub has_labels: bool,
-    /// What the driver has compiled for this device. A pipeline that is created again, for other options or another
-    /// renderer, is then taken from there: software drivers need up to a second to compile a kernel.
+    /// What the driver keeps of its work for this device. Equal compute pipelines are not made twice (`pipeline.rs`).
     pub pipeline_cache: vk::PipelineCache,
     /// All layouts that have been made for the device.
     pub layouts: Mutex<Vec<Layouts>>,

@@ -30,17 +30,24 @@ impl super::Context {
     }
 }
 
-#[cfg(feature = "view")]
 impl RawDevice {
-    /// Whether later pipelines are made of another module than the shader's own.
-    pub fn is_replaced(&self, shader: Shader) -> bool {
+    /// Whether pipelines are made of another module than that which is compiled into the program.
+    #[cfg(feature = "view")]
+    pub fn has_replacement(&self, shader: Shader) -> bool {
         lock_anyway(Rank::Replacements, &self.replacements).contains_key(shader.file)
+    }
+
+    #[cfg(not(feature = "view"))]
+    pub fn has_replacement(&self, _: Shader) -> bool {
+        false
     }
 }
 
 /// A shader module, which is needed only while a pipeline is made from it.
 pub(super) struct ShaderModule<'a> {
     pub(super) raw: vk::ShaderModule,
+    /// Whether it is not the module that is compiled into the program.
+    pub(super) is_replacement: bool,
     device: &'a RawDevice,
 }
 
@@ -50,19 +57,19 @@ impl<'a> ShaderModule<'a> {
         {
             let replacements = lock_anyway(Rank::Replacements, &device.replacements);
             if let Some(spirv) = replacements.get(shader.file) {
-                return Self::of(device, shader.file, spirv);
+                return Self::of(device, shader.file, (spirv, true));
             }
         }
-        Self::of(device, shader.file, shader.spirv)
+        Self::of(device, shader.file, (shader.spirv, false))
     }
 
-    fn of(device: &'a RawDevice, file: &str, spirv: &[u8]) -> Result<Self, GpuError> {
+    fn of(device: &'a RawDevice, file: &str, (spirv, is_replacement): (&[u8], bool)) -> Result<Self, GpuError> {
         let code = ash::util::read_spv(&mut Cursor::new(spirv)).expect("build.rs writes whole SPIR-V words");
         let info = vk::ShaderModuleCreateInfo::default().code(&code);
         // SAFETY: the code lives until the call returns.
         let raw = unsafe { device.raw.create_shader_module(&info, None) }
             .map_err(GpuError::call("vkCreateShaderModule", file))?;
-        Ok(Self { raw, device })
+        Ok(Self { raw, is_replacement, device })
     }
 }
 
