@@ -86,9 +86,12 @@ fn libraries_of_other_machines_and_names_before_comments_are_found() {
         (scene.materials[mesh.slots[0] as usize].kd, warnings)
     };
     let (red, green) = (Vec3::X, Vec3::Y);
-    for mtllib in ["part.mtl", "C:\\work\\part.mtl", "/home/me/my part.mtl", "part.mtl # colours", "none.mtl part.mtl"]
-    {
-        for (usemtl, colour) in [("red", red), ("red # of paint", red), ("red #2", green), ("red #2 # so", green)] {
+    let of_others = ["C:\\work\\part.mtl", "/home/me/my part.mtl", "../mats/part.mtl part.mtl"];
+    let with_comments = ["part.mtl # colours", "part.mtl\t# colours", "none.mtl part.mtl", "none.mtl ../mats/part.mtl"];
+    let names = [("red", red), ("red # of paint", red), ("red #2", green), ("red #2 # so", green)];
+    let names = names.into_iter().chain([("red # once #3", red), ("red\t# so", red)]);
+    for mtllib in ["part.mtl"].into_iter().chain(of_others).chain(with_comments) {
+        for (usemtl, colour) in names.clone() {
             let (kd, warnings) = of(mtllib, usemtl);
             assert_eq!(kd, colour, "{mtllib}, {usemtl}: {warnings:?}");
             assert_eq!(warnings.len(), usize::from(mtllib.starts_with("none")), "{warnings:?}");

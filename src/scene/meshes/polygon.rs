@@ -1,5 +1,6 @@
-//! Division of polygons into triangles. A polygon that a fan around its first corner covers becomes that fan; any
-//! other one is cut by ear clipping in the plane of its mean normal.
+//! Division of polygons into triangles. A polygon that a fan around its first corner covers becomes that fan. Others
+//! are cut by ear clipping in the plane of their mean normal, unless they are too large, or cross themselves so that
+//! ears do not cover them.
 
 use earcut::Earcut;
 use glam::{DVec2, DVec3, Vec3};
@@ -7,8 +8,8 @@ use glam::{DVec2, DVec3, Vec3};
 /// Share of twice the polygon's area by which a triangle of a fan may be turned over. Corners that should lie on one
 /// line deviate from it by the rounding of single precision, 2^-24 of their coordinates.
 const TURNED_TOLERANCE: f64 = 1e-6;
-/// Share of a polygon's area by which that of its ears may differ from it.
-const CLIPPED_TOLERANCE: f64 = 1e-6;
+/// Share of a polygon's area by which that of its ears may differ from it, if there are fewer than the polygon has.
+const CLIPPED_TOLERANCE: f64 = 0.01;
 /// Largest number of corners of a polygon that is cut by ear clipping, whose time can grow with the square of the
 /// number. Larger polygons become fans.
 const MAX_CLIPPED_CORNERS: usize = 1 << 14;
@@ -23,8 +24,7 @@ pub(crate) struct Triangulator {
 
 impl Triangulator {
     /// Calls `push` with the numbers of the corners of each of the `corners.len() - 2` triangles. The order of corners
-    /// is that of the polygon. Triangles without area are left where corners lie on one line: they close the edge to a
-    /// neighbour that has a corner there.
+    /// is that of the polygon. Where corners lie on one line, some triangles have no area.
     pub fn cut(&mut self, corners: &[Vec3], mut push: impl FnMut([usize; 3])) {
         if !self.clips(corners) {
             (2..corners.len()).for_each(|ix| push([0, ix - 1, ix]));
@@ -55,17 +55,30 @@ impl Triangulator {
         self.flat.clear();
         self.flat.extend(corners.iter().map(flat));
         self.clipper.earcut(self.flat.iter().copied(), &[], &mut self.clipped);
-        let area: f64 = self.clipped.as_chunks().0.iter().map(|triangle| self.doubled_area(*triangle).abs()).sum();
-        if !((area - normal.length()).abs() <= CLIPPED_TOLERANCE * normal.length()) {
+        self.complete(corners.len(), normal.length())
+    }
+
+    /// Adds the triangles that the clipper has left out of a polygon of `n` corners, whose area is half of
+    /// `doubled_area`: none of them has an area. Returns whether the triangles cover the polygon.
+    fn complete(&mut self, n: usize, doubled_area: f64) -> bool {
+        if self.clipped.len() == 3 * (n - 2) {
+            return true;
+        }
+        let clipped: f64 = self.clipped.as_chunks().0.iter().map(|triangle| self.doubled_area(*triangle).abs()).sum();
+        if !((clipped - doubled_area).abs() <= CLIPPED_TOLERANCE * doubled_area) {
             return false;
         }
-        // The clipper leaves corners out that lie on the line between their neighbours.
-        let n = corners.len();
         let mut is_used = vec![false; n];
         self.clipped.iter().for_each(|ix| is_used[*ix as usize] = true);
-        let left_out = (0..n).filter(|ix| !is_used[*ix]);
-        self.clipped.extend(left_out.flat_map(|ix| [(ix + n - 1) % n, ix, (ix + 1) % n]).map(|ix| ix as u32));
-        self.clipped.len() == 3 * (n - 2)
+        for ix in (0..n).filter(|ix| !is_used[*ix]) {
+            // It covers what rounding leaves between an edge and a corner of a neighbour on that edge.
+            let triangle = [(ix + n - 1) % n, ix, (ix + 1) % n].map(|ix| ix as u32);
+            if self.doubled_area(triangle).abs() <= TURNED_TOLERANCE * doubled_area {
+                self.clipped.extend(triangle);
+            }
+        }
+        self.clipped.resize(3 * (n - 2), 0);
+        true
     }
 
     /// Returns twice the area of a triangle, which is negative if it is clockwise.
@@ -137,6 +150,15 @@ mod tests {
     fn every_polygon_has_its_number_of_triangles() {
         // A quad that crosses itself, as meshes that were deformed have.
         assert_eq!(cut(&[[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.3]]), [[0, 1, 2], [0, 2, 3]]);
+        // A square with a spike, which covers nothing, and a staircase with its steps on one line.
+        let spike = [[0.0, 0.0], [4.0, 0.0], [4.0, 2.0], [7.0, 2.0], [4.0, 2.0], [4.0, 4.0], [0.0, 4.0]];
+        let stairs = [[3.0, 1.0], [2.0, 1.0], [2.0, 2.0], [1.0, 2.0], [1.0, 3.0], [0.0, 3.0], [0.0, 0.0], [3.0, 0.0]];
+        for (corners, area) in [(&spike[..], 32.0), (&stairs, 12.0)] {
+            let triangles = cut(corners);
+            assert_eq!(triangles.len(), corners.len() - 2);
+            let areas: Vec<f32> = triangles.iter().map(|t| doubled(corners, t)).collect();
+            assert!(areas.iter().all(|area| *area >= 0.0) && areas.iter().sum::<f32>() == area, "{areas:?}");
+        }
         // An L with corners on its edges, at a reflex corner's neighbours, too.
         let l = [[2.0, 0.0], [2.0, 1.0], [1.5, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0], [0.0, 1.0], [0.0, 0.0]];
         for first in 0..l.len() {

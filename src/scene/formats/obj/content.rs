@@ -20,10 +20,6 @@ use crate::{
 /// Least number of bytes of the text that one thread reads at a time.
 const CHUNK_BYTES: usize = 1 << 20;
 
-/// Keywords of the format that do not concern polygons or their materials.
-const IGNORED: &str = "o g l p vp deg bmat step cstype curv curv2 surf parm trim hole scrv sp end con mg bevel \
-    c_interp d_interp lod shadow_obj trace_obj ctech stech maplib usemap call";
-
 /// The content of an OBJ file, without its materials.
 #[derive(Debug, Default)]
 pub struct ObjFile {
@@ -124,7 +120,6 @@ impl ObjFile {
             ("usemtl", name) => drop(self.used_materials.entry(name.to_owned()).or_insert(line)),
             ("s", _) | ("mtllib", "") => {}
             ("mtllib", rest) => self.libraries.push((line, rest.to_owned())),
-            (keyword, _) if IGNORED.split(' ').any(|known| known == keyword) => {}
             _ if statement.contains('\0') => return Err("this is no text file".to_owned()),
             (keyword, _) => self.unknown = self.unknown.take().or(Some((line, keyword.to_owned()))),
         }
@@ -137,7 +132,8 @@ fn chunks_of(mut text: &str, n_bytes: usize) -> Vec<Chunk<'_>> {
     let mut texts = Vec::new();
     while text.len() > n_bytes {
         // A line that ends in `\\` is continued by the next one.
-        let is_end = |at: &usize| text.as_bytes()[*at] == b'\n' && !text[..*at].trim_end().ends_with('\\');
+        let line = |at: usize| text[..at].rsplit('\n').next().unwrap_or_default();
+        let is_end = |at: &usize| text.as_bytes()[*at] == b'\n' && !line(*at).trim_end().ends_with('\\');
         let Some(end) = (n_bytes..text.len() - 1).find(is_end) else { break };
         let (chunk, rest) = text.split_at(end + 1);
         texts.push(chunk);
@@ -243,6 +239,15 @@ mod tests {
             assert_eq!((content.size.n_triangles, content.size.attributes.n_uv_sets), (1, 0));
             // Without a face, and beside other faults, they count too.
             assert_eq!((read("").err(), read("f 1 2 9").err()), (overflow.clone(), overflow));
+        }
+    }
+
+    /// Work that grows with the square of the number of lines would take hours.
+    #[test]
+    fn millions_of_blank_and_continued_lines_take_no_time() {
+        for lines in ["\n", "\\\n"] {
+            let text = format!("v 0 0 0\\\n{}\n", lines.repeat(3 << 20));
+            assert_eq!(in_chunks(&text, CHUNK_BYTES).unwrap().size.n_points, 1);
         }
     }
 

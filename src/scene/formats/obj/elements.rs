@@ -19,12 +19,7 @@ const KEYWORDS: [&str; 3] = ["v", "vt", "vn"];
 
 /// Returns the kind of the elements with a keyword.
 pub fn kind_of(keyword: &str) -> Option<usize> {
-    match keyword {
-        "v" => Some(0),
-        "vt" => Some(1),
-        "vn" => Some(2),
-        _ => None,
-    }
+    KEYWORDS.iter().position(|known| *known == keyword)
 }
 
 /// The elements of a file or of a part of it.

@@ -12,6 +12,10 @@ use glam::DVec3;
 /// What a face's corner names, by kind.
 const NAMES: [&str; 3] = ["vertex", "texture vertex", "normal"];
 
+/// Keywords of the format that do not concern polygons or their materials.
+const IGNORED: &str = "o g l p vp deg bmat step cstype curv curv2 surf parm trim hole scrv sp end con mg bevel \
+    c_interp d_interp lod shadow_obj trace_obj ctech stech maplib usemap call";
+
 /// A part of a file, which begins with a statement.
 #[derive(Clone, Copy)]
 pub struct Chunk<'a> {
@@ -54,7 +58,7 @@ pub struct Faces {
 #[derive(Debug)]
 pub enum Part {
     Faces(Run),
-    /// Any statement that is neither an element nor a face, with its line.
+    /// Any other statement that is not ignored, with its line.
     Statement(usize, String),
 }
 
@@ -85,7 +89,7 @@ impl Chunk<'_> {
             ("f", rest) => faces.add(line, rest, None),
             (keyword, rest) => match kind_of(keyword) {
                 Some(kind) => elements.add(kind, (line, rest), origin),
-                None => faces.parts.push(Part::Statement(line, statement.to_owned())),
+                None => faces.add_statement(line, statement),
             },
         });
         (elements, faces)
@@ -98,7 +102,7 @@ impl Chunk<'_> {
             ("f", rest) => faces.add(line, rest, Some(&known)),
             (keyword, _) => match kind_of(keyword) {
                 Some(kind) => known.seen[kind] += 1,
-                None => faces.parts.push(Part::Statement(line, statement.to_owned())),
+                None => faces.add_statement(line, statement),
             },
         });
         faces
@@ -113,6 +117,14 @@ impl Faces {
     /// Returns whether the faces are right, whatever elements the file has, if it has so many.
     pub fn are_certain(&self, counts: [usize; 3]) -> bool {
         self.error.is_none() && self.greatest.iter().zip(counts).all(|(greatest, n)| *greatest as usize <= n)
+    }
+
+    /// Adds a statement that is neither an element nor a face.
+    fn add_statement(&mut self, line: usize, statement: &str) {
+        let (keyword, _) = split_keyword(statement);
+        if !IGNORED.split(' ').any(|ignored| ignored == keyword) {
+            self.parts.push(Part::Statement(line, statement.to_owned()));
+        }
     }
 
     /// Adds a face. It has three or more corners, each of the form `v`, `v/vt`, `v//vn` or `v/vt/vn`.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::{
     maps::{MapKind, MapOptions},
-    statement::{split_keyword, statements},
+    statement::{split_keyword, statements, without_comment},
     tiles::files_of_tiles,
 };
 use crate::scene::{
@@ -48,21 +48,16 @@ fn named_images(reach: Reach, mtl: &Path) -> Vec<PathBuf> {
     statements(&text).flat_map(|(_, statement)| files(&statement)).collect()
 }
 
-/// Returns the files that a `mtllib` line names. The rest of the line is one name, possibly with spaces, if such a
-/// file exists. Otherwise it is a list of names, or, if none of them exists or one leaves the folder, one name that
-/// [`find_file`] finds.
+/// Returns the files that a `mtllib` line names. The rest of the line is one name with spaces, if [`find_file`] finds
+/// such a file; otherwise it is a list of names.
 pub fn library_files(reach: Reach, rest: &str) -> Vec<Checked<NamedFile>> {
-    let name = rest.trim_matches('"');
-    let whole = reach.find(reach.root, name);
-    if exists(&whole) {
+    let find = |name: &str| find_file(reach, reach.root, name.trim_matches('"'));
+    let whole = find(rest);
+    let has_spaces = |file: &NamedFile| file.path.file_name().is_some_and(|name| name.to_string_lossy().contains(' '));
+    if exists(&whole) && whole.as_ref().is_ok_and(has_spaces) {
         return vec![whole];
     }
-    let names = rest.split(" #").next().unwrap_or_default().split_whitespace();
-    let listed: Vec<_> = names.map(|name| reach.find(reach.root, name.trim_matches('"'))).collect();
-    let elsewhere = || Some(find_file(reach, reach.root, name)).filter(exists);
-    // A path of another machine may have spaces.
-    let is_list = listed.iter().any(exists) && listed.iter().all(Result::is_ok);
-    if is_list { listed } else { elsewhere().map_or(listed, |file| vec![file]) }
+    without_comment(rest).split_whitespace().map(find).collect()
 }
 
 /// Returns the file that a name in an OBJ or MTL file stands for. Writers often state absolute names of their own
@@ -73,13 +68,13 @@ pub fn find_file(reach: Reach, folder: &Path, name: &str) -> Checked<NamedFile> 
     if exists(&whole) {
         return whole;
     }
-    let name = name.split_once(" #").map_or(name, |(name, _)| name.trim_end().trim_end_matches('"'));
-    let without_comment = reach.find(folder, name);
-    if exists(&without_comment) || reach.within().find(folder, name).is_ok() {
-        return without_comment;
+    let name = without_comment(name).trim_end_matches('"');
+    let named = reach.find(folder, name);
+    if exists(&named) || reach.within().find(folder, name).is_ok() {
+        return named;
     }
     let ends = name.match_indices(['/', '\\']).map(|(at, _)| &name[at + 1..]).filter(|end| !end.is_empty());
-    ends.map(|end| reach.within().find(folder, end)).find(exists).unwrap_or(without_comment)
+    ends.map(|end| reach.within().find(folder, end)).find(exists).unwrap_or(named)
 }
 
 fn exists(file: &Checked<NamedFile>) -> bool {

@@ -13,8 +13,8 @@ mod tiles;
 
 use std::{collections::HashMap, path::Path};
 
-use self::polypaint::with_polypaint;
 pub(crate) use self::{content::ObjFile, files::named_files};
+use self::{polypaint::with_polypaint, statement::comments};
 use super::mesh_file::{Loaded, Loading};
 use crate::{
     scene::{
@@ -74,9 +74,9 @@ fn used_materials(path: &Path, file: &ObjFile, materials: &[Material]) -> HashMa
     // `usemtl` without a name is for faces without a material.
     for (name, line) in file.used_materials.iter().filter(|(name, _)| !name.is_empty()) {
         let find = |name: &str| by_lower.get(&name.to_lowercase());
-        // A comment may follow the name.
-        let stated =
-            if find(name).is_some() { name } else { name.rsplit_once(" #").map_or(&**name, |(it, _)| it.trim_end()) };
+        // A comment may follow the name, which may have `#`, too.
+        let shorter = comments(name).rev().map(|at| name[..at].trim_end());
+        let stated = std::iter::once(&**name).chain(shorter).find(|name| find(name).is_some()).unwrap_or(name);
         let alike = find(stated).map_or(&[][..], |alike| alike);
         // If several materials have the same name, the last one counts.
         let exact = alike.iter().rev().find(|ix| materials[**ix].name == stated);

@@ -11,7 +11,11 @@ pub fn statements(text: &str) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
         let mut statement = Cow::Borrowed(line.trim());
         while let Some(head) = statement.strip_suffix('\\') {
             let Some((_, tail)) = lines.next() else { break };
-            statement = Cow::Owned(format!("{head} {}", tail.trim()));
+            let n = head.len();
+            let joined = statement.to_mut();
+            joined.truncate(n);
+            joined.push(' ');
+            joined.push_str(tail.trim());
         }
         Some((ix + 1, statement))
     };
@@ -22,6 +26,16 @@ pub fn statements(text: &str) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
 pub fn split_keyword(statement: &str) -> (&str, &str) {
     let (keyword, rest) = statement.split_once(char::is_whitespace).unwrap_or((statement, ""));
     (keyword, rest.trim())
+}
+
+/// Returns a name without a comment: `#` begins one after white space only, since names may have it.
+pub fn without_comment(name: &str) -> &str {
+    comments(name).next().map_or(name, |at| name[..at].trim_end())
+}
+
+/// Returns where comments could begin behind a name.
+pub fn comments(name: &str) -> impl DoubleEndedIterator<Item = usize> {
+    name.match_indices('#').map(|(at, _)| at).filter(|at| name[..*at].ends_with(char::is_whitespace))
 }
 
 /// Returns the words before a comment.
