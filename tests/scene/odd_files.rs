@@ -185,6 +185,13 @@ fn ply_files_of_careless_programs_are_read() {
     let (head, rows) = text.split_once("end_header\n").unwrap();
     let in_one_line = format!("{head}end_header\n{}", rows.replace('\n', " "));
     assert_eq!(read(in_one_line.as_bytes()), (faces.clone(), Vec::new()), "rows that follow each other");
+    let (found, warnings) = read(format!("{in_one_line} # end").as_bytes());
+    let warning = "what follows the last row is not read: line 13";
+    assert!(found == faces && warnings.len() == 1 && warnings[0].ends_with(warning), "{warnings:?}");
+    // A scanner's time is no texture coordinate.
+    let timed = text.replace("element face", "property float t\nelement face").replace(" 0\n", " 0 9\n");
+    let (scene, warnings) = loaded(&[("m.ply", timed.as_bytes())]);
+    assert!(scene.meshes[0].uvs[0].is_empty(), "{warnings:?}");
     // The first coordinate begins with the byte of a line feed. In two of the files an element that is not read
     // comes first.
     let point = |x: u32| [x.to_le_bytes(), [0; 4], [0; 4]].concat();
@@ -203,6 +210,12 @@ fn ply_files_of_careless_programs_are_read() {
             assert_eq!(read(&bytes), (vec![[0, 1, 2]], Vec::new()), "{line_end:?}");
             let mesh = &loaded(&[("m.ply", &bytes)]).0.meshes[0];
             assert_eq!(mesh.positions[0].x.to_bits(), 0x3f80_000a, "{line_end:?}");
+            let at = bytes.windows(10).rposition(|part| part == b"list uchar").unwrap();
+            let mut negative = [&bytes[..at], b"list char", &bytes[at + 10..]].concat();
+            let of_face = negative.len() - 13;
+            negative[of_face] = 0xff;
+            let error = load_scene(&[("m.ply", &negative)]).0.unwrap_err().to_string();
+            assert!(error.ends_with("element `face`: the file ends too early, or a list has no length"), "{error}");
             let (_, warnings) = read(&[&bytes[..], &[1, 2, 3]].concat());
             assert!(warnings[0].ends_with("3 bytes behind the last row are not read"), "{warnings:?}");
         }

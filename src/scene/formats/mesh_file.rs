@@ -65,7 +65,8 @@ impl MeshFormat {
 /// Returns whether a file's first bytes are those of a GLB or a PLY file, whatever its name is: avatars in `.vrm`
 /// files, for example, are GLB.
 pub(crate) fn is_certain(head: &[u8]) -> bool {
-    [&b"glTF"[..], b"ply\n", b"ply\r"].iter().any(|first| head.starts_with(first))
+    let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head);
+    head.starts_with(b"glTF") || [b"ply\n", b"ply\r"].iter().any(|first| text.starts_with(*first))
 }
 
 /// Returns whether a file is glTF: a GLB file, or a JSON object with the key `asset`.

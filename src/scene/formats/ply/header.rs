@@ -34,7 +34,7 @@ impl Number {
             "uint" | "uint32" => Self::U32,
             "float" | "float32" => Self::F32,
             "double" | "float64" => Self::F64,
-            _ => return Err(format!("`{}` is no type of numbers", name.escape_debug())),
+            _ => return Err(format!("`{}` is not a type of number", name.escape_debug())),
         })
     }
 
@@ -53,23 +53,26 @@ impl Number {
     /// # Panics
     /// There are fewer bytes than the number has.
     pub fn read(self, bytes: &[u8], is_big: bool) -> f64 {
-        let (mut little, n) = ([0; 8], self.n_bytes());
-        little[..n].copy_from_slice(&bytes[..n]);
-        if is_big {
-            little[..n].reverse();
-        }
-        let bits = u64::from_le_bytes(little);
         match self {
-            Self::I8 => f64::from(bits as i8),
-            Self::U8 => f64::from(bits as u8),
-            Self::I16 => f64::from(bits as i16),
-            Self::U16 => f64::from(bits as u16),
-            Self::I32 => f64::from(bits as i32),
-            Self::U32 => f64::from(bits as u32),
-            Self::F32 => f64::from(f32::from_bits(bits as u32)),
-            Self::F64 => f64::from_bits(bits),
+            Self::I8 => f64::from(bytes[0] as i8),
+            Self::U8 => f64::from(bytes[0]),
+            Self::I16 => i16::from_le_bytes(little(bytes, is_big)).into(),
+            Self::U16 => u16::from_le_bytes(little(bytes, is_big)).into(),
+            Self::I32 => i32::from_le_bytes(little(bytes, is_big)).into(),
+            Self::U32 => u32::from_le_bytes(little(bytes, is_big)).into(),
+            Self::F32 => f32::from_le_bytes(little(bytes, is_big)).into(),
+            Self::F64 => f64::from_le_bytes(little(bytes, is_big)),
         }
     }
+}
+
+/// Returns the bytes of the number with which `bytes` begin, the least one first.
+fn little<const N: usize>(bytes: &[u8], is_big: bool) -> [u8; N] {
+    let mut number: [u8; N] = *bytes.first_chunk().expect("the bytes have the number");
+    if is_big {
+        number.reverse();
+    }
+    number
 }
 
 /// A number or a list of numbers that each row of an element has.

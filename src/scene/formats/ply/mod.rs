@@ -91,9 +91,8 @@ pub(crate) fn ply_mesh(
     let content = &bytes[header.n_bytes..];
     let content = match header.encoding {
         Encoding::Text => {
-            let (rows, longer) = binary_rows(&header, content, &meter)?;
-            let warning = |line| format!("line {line} has more numbers than its row, which are not read");
-            warnings.extend(longer.map(warning));
+            let (rows, warning) = binary_rows(&header, content, &meter)?;
+            warnings.extend(warning);
             Cow::Owned(rows)
         }
         _ => Cow::Borrowed(content),
@@ -101,7 +100,8 @@ pub(crate) fn ply_mesh(
     let mut elements = Elements::default();
     let mut rest = &content[..];
     for element in &header.elements {
-        let too_early = || format!("element `{}`: the file ends too early", element.name.escape_debug());
+        let too_early =
+            || format!("element `{}`: the file ends too early, or a list has no length", element.name.escape_debug());
         let n_before = rest.len();
         let (rows, after) = Rows::take(element, header.encoding, rest).ok_or_else(too_early)?;
         rest = after;
@@ -222,7 +222,9 @@ fn check_counts(header: &Header, n_bytes: u64) -> Checked<()> {
                 "element `{name}`: the file ends too early: {n_bytes} bytes do not hold its {n_rows} rows"
             ));
         }
-        let of_row = if element.name == "vertex" { Vertices::n_row_bytes(element) } else { size_of::<usize>() };
+        let of_vertex = if element.name == "vertex" { Vertices::n_row_bytes(element) } else { 0 };
+        let has_list = element.properties.iter().any(|property| property.length.is_some());
+        let of_row = of_vertex + if has_list { size_of::<usize>() } else { 0 };
         n_held = n_held.saturating_add(n_rows.saturating_mul(of_row as u64));
     }
     // The numbers of a text become eight bytes each.

@@ -36,7 +36,7 @@ enum Starts {
 
 impl<'a> Rows<'a> {
     /// Takes an element's rows, with which `bytes` begin. Also returns the bytes behind them. Returns `None` if the
-    /// bytes end before.
+    /// bytes end before, or if the length of a list is no whole number.
     pub fn take(element: &'a Element, encoding: Encoding, bytes: &'a [u8]) -> Option<(Self, &'a [u8])> {
         let mut offset = Some(0);
         let field = |property: &super::header::Property| {
@@ -68,20 +68,22 @@ impl<'a> Rows<'a> {
         Some((rows, &bytes[end..]))
     }
 
-    /// Returns where a property that begins at a place ends, if the bytes do not end before.
+    /// Returns where a property that begins at a place ends, if the bytes do not end before and it has a length.
     fn end(&self, field: &Field, at: usize) -> Option<usize> {
         let n_bytes = match field.length {
             None => field.number.n_bytes(),
             Some(length) => {
                 self.bytes.get(at..at + length.n_bytes())?;
-                length.n_bytes().checked_add(self.length(length, at).checked_mul(field.number.n_bytes())?)?
+                length.n_bytes().checked_add(self.length(length, at)?.checked_mul(field.number.n_bytes())?)?
             }
         };
         at.checked_add(n_bytes).filter(|end| *end <= self.bytes.len())
     }
 
-    fn length(&self, length: Number, at: usize) -> usize {
-        length.read(&self.bytes[at..], self.is_big) as usize
+    fn length(&self, length: Number, at: usize) -> Option<usize> {
+        let stated = length.read(&self.bytes[at..], self.is_big);
+        let n = stated as usize;
+        (n as f64 == stated).then_some(n)
     }
 
     pub fn len(&self) -> usize {
@@ -125,7 +127,8 @@ impl<'a> Row<'a> {
     pub fn list(self, property: usize) -> impl ExactSizeIterator<Item = f64> + Clone + 'a {
         let Rows { fields, bytes, is_big, .. } = self.rows;
         let (at, Field { length, number, .. }) = (self.place(property), &fields[property]);
-        let (n_before, n) = length.map_or((0, 1), |length| (length.n_bytes(), self.rows.length(length, at)));
+        let of_list = |length: Number| (length.n_bytes(), self.rows.length(length, at).expect("`take` has read it"));
+        let (n_before, n) = length.map_or((0, 1), of_list);
         let n_bytes = number.n_bytes();
         let numbers = &bytes[at + n_before..][..n * n_bytes];
         numbers.chunks_exact(n_bytes).map(|bytes| number.read(bytes, *is_big))

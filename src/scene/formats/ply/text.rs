@@ -19,10 +19,9 @@ struct Words<'a, L> {
     row_is_line: bool,
 }
 
-/// Translates the rows of all elements, `text`. Also returns the first line that has more numbers than its row, or
-/// than the last row.
-/// `meter` is told of the bytes that have been read.
-pub fn binary_rows(header: &Header, text: &[u8], meter: &Meter) -> Checked<(Vec<u8>, Option<usize>)> {
+/// Translates the rows of all elements, `text`. Also returns what is to be warned of. `meter` is told of the bytes that
+/// have been read.
+pub fn binary_rows(header: &Header, text: &[u8], meter: &Meter) -> Checked<(Vec<u8>, Option<String>)> {
     let lines = || {
         let lines = text.split(|byte| *byte == header.line_end).zip(header.n_lines + 1..);
         lines.filter(|(line, _)| !line.trim_ascii().is_empty())
@@ -49,10 +48,10 @@ pub fn binary_rows(header: &Header, text: &[u8], meter: &Meter) -> Checked<(Vec<
             }
         }
     }
-    if words.next().is_some() {
-        longer.get_or_insert(words.line);
-    }
-    Ok((binary, longer))
+    let warning = longer.map(|line| format!("line {line} has more numbers than its row, which are not read"));
+    let is_rest = !row_is_line && words.next().is_some();
+    let of_rest = || is_rest.then(|| format!("what follows the last row is not read: line {}", words.line));
+    Ok((binary, warning.or_else(of_rest)))
 }
 
 impl<'a, L: Iterator<Item = (&'a [u8], usize)>> Words<'a, L> {

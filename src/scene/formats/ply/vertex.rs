@@ -39,7 +39,7 @@ fn three(vertex: &Element, names: [&str; 3]) -> Option<[usize; 3]> {
 impl Vertices {
     /// Returns the memory that a vertex takes, bytes.
     pub fn n_row_bytes(vertex: &Element) -> usize {
-        let has_uvs = UVS.iter().any(|names| vertex.number(names).is_some());
+        let has_uvs = vertex.number(&UVS[0]).is_some();
         let has_normals = three(vertex, ["nx", "ny", "nz"]).is_some();
         let n_vectors = 1 + usize::from(has_normals);
         let n_colours = usize::from(Colours::of(vertex).is_some());
@@ -68,7 +68,7 @@ impl Vertices {
             vertices.colours = rows.map(|row| colours.linear(row, one).extend(opacity(row)));
         }
         let uvs = UVS.map(|names| rows.element.number(&names));
-        if uvs.iter().any(Option::is_some) {
+        if uvs[0].is_some() {
             vertices.uvs = rows.map(|row| {
                 let [u, v] = uvs.map(|ix| ix.map_or(0.0, |ix| row.number(ix) as f32));
                 upper_left(u, v)
