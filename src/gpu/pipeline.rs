@@ -16,7 +16,7 @@ use super::{
 
 pub(super) const ENTRY_POINT: &CStr = c"main";
 
-/// Compute pipelines that a device has made.
+/// The compute pipelines of a context, which are kept as long as it.
 pub(super) type Made = HashMap<Variant, Arc<RawPipeline>>;
 
 /// What distinguishes the compute pipelines of a device.

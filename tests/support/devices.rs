@@ -17,8 +17,8 @@ pub fn device() -> Arc<Context> {
 /// Does what [`device`] does, for a device that kdray takes for what the overrides make of it.
 pub fn pretended(overrides: DeviceOverrides) -> Arc<Context> {
     let mut opened = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
-    // A device that has messages may be in a state that would fail another test. The messages of one that a test still
-    // holds may come until then.
+    // A device that has messages may be in a state that would fail another test. Messages may come as long as a test
+    // holds the device, so they are looked at again when it is free.
     opened.retain(|(_, context)| Arc::strong_count(context) > 1 || context.validation_messages().is_empty());
     let is_free = |(theirs, context): &&(DeviceOverrides, Arc<Context>)| {
         *theirs == overrides && Arc::strong_count(context) == 1 && context.validation_messages().is_empty()

@@ -131,7 +131,7 @@ impl ObjFile {
 fn chunks_of(mut text: &str, n_bytes: usize) -> Vec<Chunk<'_>> {
     let mut texts = Vec::new();
     while text.len() > n_bytes {
-        // A line that ends in `\\` is continued by the next one.
+        // A line that ends in `\` is continued by the next one.
         let line = |at: usize| text[..at].rsplit('\n').next().unwrap_or_default();
         let is_end = |at: &usize| text.as_bytes()[*at] == b'\n' && !line(*at).trim_end().ends_with('\\');
         let Some(end) = (n_bytes..text.len() - 1).find(is_end) else { break };
@@ -194,7 +194,7 @@ mod tests {
         let points = [&points[..], &[[0.0, 0.0, 5.0], [0.0, -0.725, 0.5]]].concat();
         let expected = mesh_of(&in_chunks(&usual(false), CHUNK_BYTES).unwrap());
         assert_eq!(expected.slots, [0, 0, 0, 0, 0, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2]);
-        // Faces that are there again have no area.
+        // Repeated faces become triangles without area.
         let has_area = |ix: &usize| expected.faces[*ix][0] != expected.faces[*ix][1];
         assert_eq!((0..15).filter(|ix| !has_area(ix)).collect::<Vec<_>>(), [3, 4, 6, 14]);
         let is_one_of = |point: &Vec3| points.iter().any(|known| point.distance(Vec3::from_array(*known)) < 1e-4);

@@ -9,7 +9,7 @@ use super::{
 use crate::scene::model::error::Checked;
 use glam::DVec3;
 
-/// What a face's corner names, by kind.
+/// Words for what a face's corner names, by kind.
 const NAMES: [&str; 3] = ["vertex", "texture vertex", "normal"];
 
 /// Keywords of the format that do not concern polygons or their materials.
@@ -37,7 +37,7 @@ pub struct Faces {
     /// Indices of what the corners name, counted from 0. Of texture vertices and normals, there are only those of faces
     /// whose corners all have some.
     pub corners: [Vec<u32>; 3],
-    /// Numbers of the faces' corners.
+    /// How many corners each face has.
     pub arities: Vec<u32>,
     pub parts: Vec<Part>,
     /// The first face that is wrong. If the elements of the file are not known, it may be one that needs them.

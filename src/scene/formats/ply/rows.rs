@@ -2,11 +2,11 @@
 
 use rayon::prelude::*;
 
-use super::header::{Element, Encoding, Number};
+use super::header::{Element, Encoding, Number, Property};
 
-/// The types of a list's length and of a number in the translation of a text. Coordinates may have more digits than
-/// single precision holds, whatever their type, as maps have.
-pub const OF_TEXT: (Number, Number) = (Number::U32, Number::F64);
+/// Types of list lengths and of numbers in a translated text. They are not those of the header, since coordinates of
+/// maps have more digits than the single precision that it states.
+const OF_TEXT: (Number, Number) = (Number::U32, Number::F64);
 
 /// Where a row has a property, and how.
 struct Field {
@@ -39,7 +39,7 @@ impl<'a> Rows<'a> {
     /// bytes end before, or if the length of a list is no whole number.
     pub fn take(element: &'a Element, encoding: Encoding, bytes: &'a [u8]) -> Option<(Self, &'a [u8])> {
         let mut offset = Some(0);
-        let field = |property: &super::header::Property| {
+        let field = |property: &Property| {
             let (length, number) = match encoding {
                 Encoding::Text => (property.length.map(|_| OF_TEXT.0), OF_TEXT.1),
                 _ => (property.length, property.number),

@@ -26,7 +26,7 @@ pub struct Vertices {
 const ALPHAS: [&str; 3] = ["alpha", "diffuse_alpha", "a"];
 const UVS: [[&str; 3]; 2] = [["s", "u", "texture_u"], ["t", "v", "texture_v"]];
 
-/// Returns the indices of the coordinates of vertices, if they have all three.
+/// Returns the indices of the properties x, y and z, if vertices have all three.
 pub fn coordinates(vertex: &Element) -> Option<[usize; 3]> {
     three(vertex, ["x", "y", "z"])
 }
