@@ -194,19 +194,23 @@ fn modules() -> Vec<Module> {
     modules
 }
 
-/// Returns the modules of a kernel that finds hits. The alpha test is inlined wherever a triangle is
-/// tested. Scenes without masked or blended materials are spared it.
+/// Returns the modules of a kernel that finds hits. The alpha test is inlined wherever a triangle is tested. Scenes
+/// without masked or blended materials are spared it, and flat worlds are spared what is for instances. Grids have no
+/// instances.
 fn searching_modules(kernel: &str, has_alpha_test: bool, path: &Path) -> Vec<Module> {
     let of_search = |search: &str| {
         let traversal = ("TRAVERSAL", Some(format!("TRAVERSAL_{}", search.to_uppercase())));
-        let module = |alpha: &str, macros| Module {
-            name: format!("{kernel}_{search}{alpha}.comp"),
+        let module = |kind: &str, macros| Module {
+            name: format!("{kernel}_{search}{kind}.comp"),
             path: path.to_owned(),
             macros,
         };
-        let macros = vec![traversal.clone(), ("WITH_ALPHA_TEST", None)];
-        let with_alpha_test = has_alpha_test.then(|| module("_alpha", macros));
-        iter::once(module("", vec![traversal])).chain(with_alpha_test)
+        let alpha_test = has_alpha_test.then_some(("WITH_ALPHA_TEST", None));
+        let with = |more: Vec<(&'static str, Option<String>)>| iter::once(traversal.clone()).chain(more).collect();
+        let of_alpha = alpha_test.clone().map(|alpha_test| module("_alpha", with(vec![alpha_test])));
+        let instances = alpha_test.into_iter().chain([("WITH_INSTANCES", None)]).collect();
+        let of_instances = (search != "grid").then(|| module("_instances", with(instances)));
+        iter::once(module("", with(Vec::new()))).chain(of_alpha).chain(of_instances).collect::<Vec<_>>()
     };
     SEARCH_MODULES.into_iter().flat_map(of_search).collect()
 }

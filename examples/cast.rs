@@ -36,7 +36,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let letter = |material: u32| char::from(b'a' + (material % 26) as u8);
         let of_hit = |triangle_ix: u32| match triangle_ix {
             NO_TRIANGLE => ' ',
-            _ => letter(world.scene().triangle_materials[triangle_ix as usize]),
+            _ => letter(world.scene().material_ix_of(triangle_ix as usize)),
         };
         println!("{}", row.iter().map(|hit| of_hit(hit.triangle_ix)).collect::<String>());
     }

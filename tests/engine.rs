@@ -4,7 +4,7 @@ mod support;
 
 use std::{fs, path::PathBuf};
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use kdray::{
     accel::{
         Query,
@@ -14,7 +14,7 @@ use kdray::{
     engine::{Engine, LoadRequest, Loaded},
     frame::RenderOptions,
     gpu::ContextOptions,
-    scene::{Mesh, PictureChoices, Scene},
+    scene::{LoadOptions, Look, Mesh, PictureChoices, Scene},
 };
 use support::{scenes, world_of};
 use tempfile::TempDir;
@@ -146,4 +146,33 @@ fn a_mesh_of_a_program_is_shown() {
     for (mesh, expected) in odd {
         assert_eq!(engine.load(mesh, &LoadRequest::default()).unwrap_err().to_string(), expected);
     }
+}
+
+/// Twenty panes that nobody sees hide nothing, nor do ten of glass that is nearly clear.
+#[test]
+fn what_is_behind_many_see_through_surfaces_is_seen() {
+    let folder = TempDir::new().unwrap();
+    let engine = Engine::on_cpu();
+    let shown = |n_panes: u32, opacity: f32| {
+        let box_of = |ix: u32| format!("v -9 -9 {ix}\nv 9 -9 {ix}\nv 9 9 {ix}\nv -9 9 {ix}\nf -4 -3 -2 -1\n");
+        let panes: String = (1..=n_panes).map(box_of).collect();
+        let obj = format!("mtllib m.mtl\nusemtl red\n{}usemtl pane\n{panes}", box_of(0));
+        fs::write(folder.path().join("m.obj"), obj).unwrap();
+        let mtl = format!("newmtl red\nKd 0.8 0.1 0.1\nnewmtl pane\nKd 0 0 0\nd {opacity}\n");
+        fs::write(folder.path().join("m.mtl"), mtl).unwrap();
+        let look = Look { eye: Some(DVec3::new(0.0, 0.0, 40.0)), target: Some(DVec3::ZERO), ..Look::default() };
+        let scene = LoadOptions { look, ..LoadOptions::default() };
+        let choices = PictureChoices { size: Some((16, 12)), ..PictureChoices::default() };
+        let request = LoadRequest { scene, ..LoadRequest::pictures(choices) };
+        let loaded = engine.load(&folder.path().join("m.obj"), &request).unwrap();
+        engine.render(&loaded.world, &loaded.options).unwrap().picture.display[6 * 16 + 8].map(i32::from)
+    };
+    let [r, g, _, _] = shown(0, 1.0);
+    assert!(r > 150 && g < 120, "the bare surface is red: {r} {g}");
+    let behind = shown(20, 0.001);
+    assert!((behind[0] - r).abs() <= 2 && (behind[1] - g).abs() <= 2, "{behind:?} for {r} {g}");
+    // 0.95 to the tenth is 0.6 of the light, in the shadow of the panes.
+    let behind = shown(10, 0.05);
+    assert!((70..r).contains(&behind[0]), "{behind:?}");
+    assert!(shown(20, 1.0)[0] < 60, "opaque panes hide it");
 }

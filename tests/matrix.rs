@@ -38,7 +38,8 @@ impl Expected {
     /// Returns the names of the channels, in alphabetical order.
     fn names(&self) -> Vec<String> {
         let colour = |prefix: String| ["B", "G", "R"].map(|component| format!("{prefix}{component}"));
-        let of_aov = |aov: &Aov| match aov.is_of_light() {
+        let of_aov = |aov: &Aov| match aov.is_of_means() {
+            true if *aov == Aov::Normal => ["X", "Y", "Z"].map(|component| format!("{aov}.{component}")).to_vec(),
             true => colour(format!("{aov}.")).to_vec(),
             false => aov.channels(&[]).into_iter().map(|channel| channel.name).collect(),
         };
@@ -143,7 +144,11 @@ fn can_combine(integrator: Integrator, denoise: Denoise, aov: Option<Aov>) -> bo
 
 /// Returns the layers that pictures have, those that show AOVs or those of light.
 fn aovs_of(options: &RenderOptions) -> Vec<Aov> {
-    let is_asked = |aov: &&Aov| if aov.is_of_light() { options.light_layers } else { options.pixel_aovs };
+    let is_asked = |aov: &&Aov| match aov {
+        aov if aov.is_of_light() => options.light_layers,
+        aov if aov.is_of_means() => options.surface_layers,
+        _ => options.pixel_aovs,
+    };
     let aovs = Aov::ALL.iter().filter(is_asked).copied();
     aovs.filter(|&aov| can_combine(options.integrator, options.denoise, Some(aov))).collect()
 }
@@ -159,8 +164,8 @@ fn world() -> World {
 fn write_and_check(options: &RenderOptions, n_samples: Option<u32>, (picture, drawn): (&Picture, &Drawn), case: &str) {
     let directory = TempDir::new().unwrap();
     let aovs = aovs_of(options);
-    let light = drawn.light.0.each_ref().map(Vec::as_slice);
-    let layers = Layers { aovs: &aovs, pixel_aovs: &drawn.pixel_aovs, light, ..Layers::default() };
+    let means = drawn.layers.0.each_ref().map(Vec::as_slice);
+    let layers = Layers { aovs: &aovs, pixel_aovs: &drawn.pixel_aovs, means, ..Layers::default() };
     let path = directory.path().join("x.png");
     let written = output::write_layers(&path.with_extension("exr"), picture, &layers);
     written.and_then(|()| output::write_picture(&path, picture)).unwrap_or_else(|error| panic!("{case}: {error}"));
@@ -199,7 +204,14 @@ fn check_engine(engine: &Engine, kinds: impl Iterator<Item = Kind>, crops: &[Opt
         {
             let (width, height, max_depth) = (WIDTH, HEIGHT, 3);
             let of_picture = RenderOptions { width, height, crop, max_depth, ..RenderOptions::default() };
-            let options = RenderOptions { integrator, denoise, pixel_aovs, light_layers, ..of_picture };
+            let options = RenderOptions {
+                integrator,
+                denoise,
+                pixel_aovs,
+                light_layers,
+                surface_layers: pixel_aovs,
+                ..of_picture
+            };
             let workload = Workload::of_pictures(&options, world.scene().lights.len(), 1);
             let options = engine.methods(world, &workload).unwrap().apply(&options);
             let mut renderer = engine.renderer(world, &options).unwrap();

@@ -6,7 +6,7 @@ use std::fs;
 
 use kdray::{
     engine::{Engine, LoadRequest, NoiseGoal, NoisePicture},
-    frame::{Crop, Denoise, Drawn, Goal, Integrator, Picture, RenderOptions, Watcher},
+    frame::{Crop, Denoise, Drawn, Goal, Integrator, Picture, RenderOptions, SampleRange, Watcher},
     gpu::DeviceOverrides,
     world::World,
 };
@@ -136,7 +136,7 @@ fn the_progress_of_a_picture_in_bands_adds_up_to_one_sample() {
 /// If no tile ever has little noise, the picture is that of the most samples, with all of its layers.
 #[test]
 fn without_an_end_the_picture_has_the_most_samples() {
-    let options = RenderOptions { light_layers: true, width: 20, height: 12, ..options() };
+    let options = RenderOptions { light_layers: true, surface_layers: true, width: 20, height: 12, ..options() };
     let world = world();
     for engine in [Engine::on_cpu(), Engine::on_device(device())] {
         let drawn = until(&engine, &world, &options, NoiseGoal { noise: 1e-9, most_samples: 64 });
@@ -144,7 +144,7 @@ fn without_an_end_the_picture_has_the_most_samples() {
         assert_eq!((drawn.n_noisy, drawn.n_tiles, drawn.mean_samples), (2, 2, 64.0));
         assert!(drawn.picture.radiance == picture.radiance);
         assert!(drawn.drawn.pixel_aovs == of_picture.pixel_aovs);
-        assert!(drawn.drawn.light == of_picture.light && !of_picture.light.is_empty());
+        assert!(drawn.drawn.layers == of_picture.layers && !of_picture.layers.is_empty());
     }
 }
 
@@ -245,4 +245,53 @@ fn the_command_draws_until_the_noise_is_low() {
     refused(&["--noise", "0.1", "--time", "1s"], "--time");
     refused(&["--noise", "0.1", "--samples", "0-32"], "--samples");
     fail(path, &["render", &scene, "--noise", "0.1", "--cpu"], 2, "--noise needs --integrator path");
+}
+
+/// Ends a picture when it has been asked a number of times.
+struct EndsAt {
+    n_asked: u32,
+    ask: u32,
+}
+
+impl EndsAt {
+    fn ask(ask: u32) -> Self {
+        Self { n_asked: 0, ask }
+    }
+}
+
+impl Watcher for &mut EndsAt {
+    fn sample(&mut self) {}
+
+    fn ends(&mut self) -> bool {
+        self.n_asked += 1;
+        self.n_asked == self.ask
+    }
+}
+
+/// A picture that its watcher ends is the picture of the samples so far.
+#[test]
+fn a_watcher_ends_a_picture_with_the_samples_so_far() {
+    let world = world();
+    let camera = world.scene().camera;
+    let size = |integrator| RenderOptions { integrator, width: 20, height: 12, ..options() };
+    for engine in [Engine::on_cpu(), Engine::on_device(device())] {
+        let whitted = RenderOptions { pixel_aovs: false, ..size(Integrator::Whitted) };
+        for (options, ask) in [(size(Integrator::Path), 2), (whitted, 3)] {
+            let mut renderer = engine.renderer(&world, &options).unwrap();
+            let drawn = renderer.draw(&camera, Goal::Samples(65536), &mut EndsAt::ask(ask)).unwrap();
+            assert!(drawn.n_samples >= ask && drawn.n_samples < 65536, "{}", drawn.n_samples);
+            let (picture, of_picture) = fixed(&engine, &world, &options, drawn.n_samples);
+            assert!(renderer.picture().unwrap().radiance == picture.radiance);
+            assert!(drawn.pixel_aovs == of_picture.pixel_aovs);
+        }
+        let mut renderer = engine.renderer(&world, &size(Integrator::Path)).unwrap();
+        let goal = NoiseGoal { noise: 1e-9, most_samples: 4096 };
+        let drawn = renderer.draw_until(&camera, goal, &mut EndsAt::ask(3)).unwrap();
+        assert_eq!((drawn.drawn.n_samples, drawn.n_noisy), (64, 2));
+        // Parts that are joined later have all of their samples.
+        let mut never_asked = EndsAt::ask(1);
+        let range = SampleRange { first: 16, end: 48 };
+        let (drawn, _) = renderer.draw_range(&camera, range, &mut never_asked).unwrap();
+        assert_eq!((drawn.n_samples, never_asked.n_asked), (32, 0));
+    }
 }

@@ -7,6 +7,7 @@ use kdray::frame::{
     Access, Denoise, FrameKind, Integrator, Pass, Plan, Primary, RenderOptions, Resource, Step,
     plan::{self, passes},
 };
+use kdray::layout::Frame;
 use spirq::{
     ReflectConfig,
     ty::{AccessType, DescriptorType},
@@ -26,6 +27,7 @@ fn kinds() -> Vec<FrameKind> {
                 n_bounces,
                 pixel_aovs,
                 light_layers: of_paths && has_lights,
+                surface_layers: has_lights,
                 is_lit,
                 has_lights,
                 adds_samples,
@@ -115,11 +117,13 @@ fn every_barrier_is_needed() {
             denoise,
             pixel_aovs: true,
             light_layers: true,
+            surface_layers: true,
             max_depth: 3,
             primary: Primary::SoftwareRaster,
             ..RenderOptions::default()
         };
-        let all = steps(&Plan::new(&FrameKind::new(&options, 1)));
+        let all =
+            steps(&Plan::new(&FrameKind::new(&options, &Frame { n_lights: 1, max_depth: 3, ..Frame::default() })));
         let barriers: Vec<_> = (0..all.len()).filter(|&i| matches!(all[i], Step::Barrier { .. })).collect();
         assert!(barriers.len() > 20);
         for &i in &barriers {

@@ -62,7 +62,7 @@ fn the_table_has_every_pass_and_tracing_takes_all_that_find_primary_hits() {
     let world = world_of(&scene);
     let mut names = BTreeSet::new();
     for &primary in primaries(&context) {
-        let options = RenderOptions { primary, pixel_aovs: true, ..options() };
+        let options = RenderOptions { primary, pixel_aovs: true, surface_layers: true, ..options() };
         let mut renderer = renderer(&context, &scene, &options, 8 * N_PIXELS);
         for view in [View::Picture, View::Depth, View::Rays] {
             renderer.set_view(view, 1.0);

@@ -73,7 +73,16 @@ fn pictures_have_the_bits_of_one_device() {
         (RenderOptions { denoise: Denoise::Off, ..of_paths.clone() }, 8),
         (RenderOptions { denoise: paper, crop: Some("3,5,40,33".parse().unwrap()), ..of_paths.clone() }, 48),
         (RenderOptions { denoise: Denoise::Edge, ..of_paths.clone() }, 32),
-        (RenderOptions { denoise: Denoise::Off, pixel_aovs: true, light_layers: true, ..of_paths }, 32),
+        (
+            RenderOptions {
+                denoise: Denoise::Off,
+                pixel_aovs: true,
+                light_layers: true,
+                surface_layers: true,
+                ..of_paths
+            },
+            32,
+        ),
         (RenderOptions { denoise: paper, pixel_aovs: true, ..RenderOptions::default() }, 3),
         (RenderOptions { crop: Some("0,1,48,2".parse().unwrap()), ..RenderOptions::default() }, 1),
     ] {
@@ -84,7 +93,7 @@ fn pictures_have_the_bits_of_one_device() {
         for several in [&contexts[..2], &contexts] {
             for (picture, drawn) in draw(several.to_vec(), &world, &options, n_samples) {
                 assert!(picture == one.0, "{options:?}");
-                assert!(drawn.pixel_aovs == one.1.pixel_aovs && drawn.light == one.1.light, "{options:?}");
+                assert!(drawn.pixel_aovs == one.1.pixel_aovs && drawn.layers == one.1.layers, "{options:?}");
                 assert_eq!(drawn.n_samples, n_samples);
                 let rays = |drawn: &Drawn| drawn.profile.bounces[0].n_rays;
                 match options.denoise {

@@ -41,6 +41,7 @@ fn scene(triangles: &[Triangle]) -> FlatScene {
         name: "variants".into(),
         origin: DVec3::ZERO,
         triangles: triangles.to_vec(),
+        instances: None,
         triangle_materials: vec![0; triangles.len()],
         materials: vec![scenes::diffuse(Vec3::ONE)],
         material_names: vec![String::new()],

@@ -8,6 +8,7 @@
 
 const bool COUNT_COSTS = false;
 const bool TESTS_BLENDED = false;
+const bool FROM_CAMERA = false;
 #include "search/accel.glsl"
 #include "rays/lanes.glsl"
 

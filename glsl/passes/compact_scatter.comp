@@ -26,13 +26,12 @@ void make_children(uint ray_ix, uint kinds, uint child_ix) {
     Surface surface;
     Scattering next = scattering_at(ray, hit, surface);
     if ((kinds & CHILD_REFLECTED) != 0u) {
-        vec3 throughput = ray.throughput * next.reflected_weight;
-        store_ray(child_ix, ray_from(surface, next.reflected, hit.triangle_ix, ray, throughput));
+        store_ray(child_ix, child_ray(surface, next.reflected, hit, ray, next.reflected_weight, true));
         child_ix += 1u;
     }
     if ((kinds & CHILD_TRANSMITTED) != 0u) {
-        vec3 throughput = ray.throughput * next.transmitted_weight;
-        store_ray(child_ix, ray_from(surface, next.transmitted, hit.triangle_ix, ray, throughput));
+        bool uses_level = !next.passes_straight;
+        store_ray(child_ix, child_ray(surface, next.transmitted, hit, ray, next.transmitted_weight, uses_level));
     }
 }
 

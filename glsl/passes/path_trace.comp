@@ -13,6 +13,8 @@
 // Whether the cost of the rays of each pixel's first sample is added to pixel_aovs.
 layout(constant_id = CONSTANT_COUNT_COSTS) const bool COUNT_COSTS = false;
 const bool TESTS_BLENDED = true;
+// Whether the rays are the camera's, which pass through back faces. They have no shadow rays of a bounce before.
+layout(constant_id = CONSTANT_FROM_CAMERA) const bool FROM_CAMERA = false;
 #define STOCHASTIC_ALPHA
 #include "search/accel.glsl"
 #include "rays/paths.glsl"
@@ -51,6 +53,9 @@ void count(PathRay ray) {
 bool traced(uint path_ix, bool is_shadow_ray) {
     PathRay ray = rays[path_ix];
     if (is_shadow_ray) ray = ray_of(shadow_rays[path_ix], ray.pixel_ix);
+    if (has_alpha_test()) {
+        seed_alpha_test(key_of_path(path_ix, pixel_of_path(path_ix)), batch.depth, is_shadow_ray);
+    }
     Hit hit = traverse(ray, 0.0, is_shadow_ray);
     bool ends = !is_suspended(hit.triangle_ix);
     if (COUNT_COSTS && ends && sample_of_path(path_ix) == 0u) count(ray);

@@ -30,7 +30,7 @@ void main() {
     Surface surface;
     Material material;
     shaded_at(ray, hit, surface, material);
-    uint material_ix = load_triangle_materials(hit.triangle_ix);
+    uint material_ix = material_ix_of(hit.triangle_ix);
     pixel_aovs[pixel_ix].position_world = surface.point_world;
     pixel_aovs[pixel_ix].normal_world = surface.shading;
     pixel_aovs[pixel_ix].material_ix = material_ix;

@@ -127,7 +127,10 @@ void main() {
     barrier();
     PixelTests pending = nothing_pending();
     uint triangle_ix = first_triangle + gl_LocalInvocationIndex;
-    if (triangle_ix < frame.n_triangles) pending = rasterize(triangle_at(triangle_ix), triangle_ix);
+    if (triangle_ix < frame.n_triangles) {
+        Triangle t = triangle_at(triangle_ix);
+        if (is_for_camera()) pending = rasterize(t, triangle_ix);
+    }
     barrier();
     for (uint first = 0u; first < n_tests; first += N_TESTS) {
         put_tests(pending, first + N_TESTS);

@@ -73,6 +73,8 @@ void count_shadow_rays(uint ray_ix) {
     }
     for (uint depth = 0u; depth < frame.max_depth; ++depth) {
         uint bounce_ix = batch.bounce_ix + depth;
+        // Then all later bounces have no rays either.
+        if (bounces[bounce_ix].n_rays == 0u) break;
         bool is_of_bounce = ray_ix - bounces[bounce_ix].first_ray < bounces[bounce_ix].n_rays;
         count_shadow_rays(bounce_ix, gl_WorkGroupID.x, is_of_bounce ? n_shadow_rays : 0u);
     }

@@ -10,6 +10,7 @@
 // Whether the shadow rays' cost is added to pixel_aovs.
 layout(constant_id = CONSTANT_COUNT_COSTS) const bool COUNT_COSTS = false;
 const bool TESTS_BLENDED = true;
+const bool FROM_CAMERA = false;
 #include "search/accel.glsl"
 #include "rays/rays.glsl"
 #include "rays/lanes.glsl"

@@ -10,6 +10,8 @@
 // Whether the rays' cost is added to pixel_aovs.
 layout(constant_id = CONSTANT_COUNT_COSTS) const bool COUNT_COSTS = false;
 const bool TESTS_BLENDED = false;
+// Whether the rays are the camera's, which are computed here, not loaded.
+layout(constant_id = CONSTANT_FROM_CAMERA) const bool FROM_CAMERA = false;
 #include "search/accel.glsl"
 #include "rays/rays.glsl"
 #include "rays/lanes.glsl"
@@ -18,8 +20,6 @@ const bool TESTS_BLENDED = false;
 
 // Whether hits are counted.
 layout(constant_id = CONSTANT_COUNTS) const bool COUNTS = true;
-// Whether the rays are the camera's, which are computed here, not loaded.
-layout(constant_id = CONSTANT_FROM_CAMERA) const bool FROM_CAMERA = false;
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };

@@ -13,6 +13,9 @@ layout(location = 0) flat out uint triangle_ix;
 
 void main() {
     triangle_ix = uint(gl_VertexIndex) / 3u;
-    vec3 position_world = load_triangles(uint(gl_VertexIndex)).xyz;
+    place(triangle_ix);
+    vec3 position_world = corner_at(triangle_ix, uint(gl_VertexIndex) % 3u).xyz;
     gl_Position = frame.clip_from_world * vec4(position_world, 1.0);
+    // Behind the far plane, all three corners at one point.
+    if (!is_for_camera()) gl_Position = vec4(0.0, 0.0, 2.0, 1.0);
 }

@@ -126,6 +126,7 @@
 #define TONEMAP_LINEAR 0u
 #define TONEMAP_AGX 1u
 #define TONEMAP_ACES 2u
+#define TONEMAP_NEUTRAL 3u
 
 // `Material.flags`: the material has a Phong highlight.
 #define MATERIAL_SPECULAR 1u
@@ -150,6 +151,8 @@
 // `Material.flags`: for the path tracer, the width of the distribution of microfacets' normals follows from Phong's
 // exponent `ns`, not from `roughness`.
 #define MATERIAL_PHONG_WIDTH 512u
+// `Material.flags`: camera rays pass through the back faces of the surface (shading/back_faces.glsl).
+#define MATERIAL_SINGLE_SIDED 1024u
 
 // Roughness up to which a microfacet surface reflects rays as a mirror does.
 #define MIRROR_ROUGHNESS 0.1
@@ -169,6 +172,8 @@
 // Opacity below which light passes through a blended surface on its way to another hit. A shadow ray cannot be
 // weakened, only stopped.
 #define LEAST_SHADOWING_OPACITY 0.5
+// Opacity below which a blended surface is not there: less than half a step of 8 bits.
+#define LEAST_SEEN_OPACITY 0.00195
 
 // Takes the place of an index in `textures` where a material has no texture.
 #define NO_TEXTURE 0xffffffffu
@@ -234,7 +239,7 @@
 // Slot of a suspended ray that found all slots taken.
 #define NO_SLOT 0x7ffffffeu
 // Rows of four words that a slot takes in `suspended_rays`. One row of counts precedes the slots.
-#define SUSPENDED_RAY_ROWS 3u
+#define SUSPENDED_RAY_ROWS 4u
 // `resume_pass` of a dispatch that takes all rays, from their beginning.
 #define PASS_BEGIN 0u
 // `resume_pass` of a dispatch that takes the rays that were suspended, from the state in their slots.
@@ -259,6 +264,89 @@ struct Triangle {
     vec3 v2;
     uint n2;
 };
+
+// An instance: a geometry's place in the world, 112 bytes. Triangle i of the geometry is triangle `first_triangle` + i
+// of the world.
+//
+// - `axis_x`, `axis_y`, `axis_z`, `translation`: a point p of the geometry is at p.x `axis_x` + p.y `axis_y` +
+//   p.z `axis_z` + `translation` in the world.
+// - `local_x`, `local_y`, `local_z`: the rows of the inverse linear map, from the world to the geometry.
+// - `condition`: the greatest sum of a row of |M| |M^-1|, M the linear map: by how much it magnifies rounding, at
+//   least 1.
+// - `geometry_ix`: index of the geometry. `n_triangles`: of the geometry.
+// - `first_material`: index in the list of the instances' materials of the material of the geometry's slot 0.
+// - `first_row`: the place of the geometry's first triangle in `triangles`.
+// - `flags`: bits of `INSTANCE_MIRRORED` and its like.
+struct Instance {
+    vec3 axis_x;
+    uint first_triangle;
+    vec3 axis_y;
+    uint geometry_ix;
+    vec3 axis_z;
+    uint first_material;
+    vec3 translation;
+    float condition;
+    vec3 local_x;
+    uint flags;
+    vec3 local_y;
+    uint first_row;
+    vec3 local_z;
+    uint n_triangles;
+};
+
+// `Instance.flags`: the linear map is a reflection. The second and the third corner of each triangle are swapped in the
+// world, so that its outside stays outside.
+#define INSTANCE_MIRRORED 1u
+// `Instance.flags`: rays of the camera, shadow rays, and all other rays meet the instance.
+#define INSTANCE_FOR_CAMERA 2u
+#define INSTANCE_FOR_SHADOWS 4u
+#define INSTANCE_FOR_OTHERS 8u
+
+// What a search through a geometry needs beside the arrays, 48 bytes. `box_min`, `box_max`, `plane_epsilon` and
+// `origin_reach` are those of `AccelConstants`, in the geometry's space.
+//
+// - `root_offset`: of the root of the geometry's kd-tree in `kd_nodes`, bytes.
+// - `first_row`, `n_triangles`: the geometry's triangles in `triangles`.
+struct GeometryConstants {
+    vec3 box_min;
+    float plane_epsilon;
+    vec3 box_max;
+    float origin_reach;
+    uint root_offset;
+    uint first_row;
+    uint n_triangles;
+    uint reserved;
+};
+
+// Node of the hierarchy over the instances, 32 bytes. Nodes 2 p and 2 p + 1 are siblings; node 0 is the root, and
+// node 1 is unused.
+//
+// - `box_min`, `box_max`: a box that holds all instances below the node, with a margin (world units).
+// - `link`: number of the pair of the node's children, or of a leaf `TOP_LEAF` and the index of its only instance.
+// - `parent`: index of the node above.
+struct TopNode {
+    vec3 box_min;
+    uint link;
+    vec3 box_max;
+    uint parent;
+};
+
+// `TopNode.link`: the node is a leaf.
+#define TOP_LEAF 0x80000000u
+// Levels below the root of the hierarchy over the instances, at most. One word has a bit for each.
+#define TOP_MAX_DEPTH 32u
+
+// Four words of `instance_rows`, 16 bytes.
+struct InstanceRow {
+    uint x;
+    uint y;
+    uint z;
+    uint w;
+};
+// Rows that an `Instance`, a `GeometryConstants` and a `TopNode` take.
+#define INSTANCE_ROWS 7u
+#define GEOMETRY_ROWS 3u
+#define TOP_NODE_ROWS 2u
 
 // A triangle as a leaf stores it, 48 bytes. A ray's test waits for this one load. With an index in its place, the
 // test would wait for two, the index and then the triangle.
@@ -573,12 +661,16 @@ struct CornerSurface {
 #define MAPS_SHADOW_TEST 2u
 // `MaterialMaps.flags`: rays of paths pass through the surface at random, as often as its opacity says.
 #define MAPS_ALPHA_BLEND 16u
+// `MaterialMaps.flags`: the surface is blended, and rays pass through it where its opacity is below
+// `LEAST_SEEN_OPACITY`, as through a masked one: cards of leaves or hair are mostly holes.
+#define MAPS_CLEAR_TEST 32u
 // `MaterialMaps.flags`: the opacity of the base colour's texture counts.
 #define MAPS_COLOUR_HAS_OPACITY 4u
 // `MaterialMaps.flags`: the opacity of the corners' colours counts.
 #define MAPS_CORNERS_HAVE_OPACITY 8u
 
-// A ray of a picture, 48 bytes. Its hits have t in `(0, t_max]`.
+// A ray of a picture, 48 bytes. Its hits have t in `(0, t_max]`. In frames with `Frame.extra_bounces`, `t_max` also
+// says how many levels of rays the ray has used (shading/children.glsl).
 //
 // - `origin`: world units.
 // - `pixel_ix`: index of the pixel that receives the ray's light, rows from the top of the window.
@@ -649,6 +741,8 @@ struct ShadowRay {
 #define FILTER_TENT 1u
 // A Gaussian of standard deviation 0.5 px, up to 1.5 px from the centre.
 #define FILTER_GAUSSIAN 2u
+// All samples are at the pixel's centre.
+#define FILTER_CENTRE 3u
 // Base-2 logarithm of the number of samples in a block. Parts of a picture's samples begin and end at multiples of it.
 #define SAMPLE_BLOCK_LOG2 4u
 // Base-2 logarithm of the most samples of each pixel that a frame of paths draws.
@@ -664,10 +758,14 @@ struct ShadowRay {
 #define STUDIO_LEAST_PDF 1.0
 // Number of the layers of light (path_layers.comp).
 #define LIGHT_LAYERS 3u
+// Number of the layers of what camera rays hit: albedo and normal (surface_layers.comp).
+#define SURFACE_LAYERS 2u
 // The bounce of a path, counted from 0, from which on it may end by Russian roulette.
 #define ROULETTE_DEPTH 3u
 // The least probability with which a path survives Russian roulette. It bounds the weight of those that survive.
 #define LEAST_SURVIVAL 0.05
+// The most light that a path adds to its pixel at a time, in any colour. The sum of a pixel's samples is then finite.
+#define MOST_ADDED_LIGHT 1.0e30
 // The share of the distance to a light at which a shadow ray ends, so that it does not hit the light itself.
 #define SHADOW_RAY_SHARE 0.9998
 
@@ -683,7 +781,7 @@ struct Hit {
     float v;
 };
 
-// The frame's constants, 272 bytes (a uniform buffer, std140-compatible). The window is the part of the picture that
+// The frame's constants, 288 bytes (a uniform buffer, std140-compatible). The window is the part of the picture that
 // is rendered. The point of the window's pixel (x, y) in the image plane is
 //
 // ```text
@@ -706,7 +804,7 @@ struct Hit {
 // - `exposure`: factor of radiance before the tone curve.
 // - `denoise_threshold`: a pixel is smoothed if the differences between its luminance and those of its four
 //   neighbours add up to more than this.
-// - `max_depth`: levels of rays, of which the camera's are the first.
+// - `max_depth`: bounces, of which the camera's rays are the first: one for each level of rays, and `extra_bounces`.
 // - `queue_capacity`: rays that the ray queue has room for.
 // - `picture_width`, `picture_height`: of the whole picture (pixels).
 // - `window_x`, `window_y`: the picture's pixel at which the window begins. Of paths, `window_x` can also be
@@ -725,6 +823,8 @@ struct Hit {
 //   `samples_reciprocal`: 1 / `n_samples`. The host divides, because devices round quotients in different ways.
 // - `has_studio`: 1 if metals and glass mirror a studio (shading/studio.glsl). `to_viewer`: horizontal unit vector
 //   towards the viewer for whom it was set up, world space.
+// - `extra_bounces`: bounces beside the levels of rays, for rays that pass straight through blended surfaces, which use
+//   no level. 0 if the scene has no such surfaces, and in frames of paths.
 struct Frame {
     mat4 clip_from_world;
     vec3 eye;
@@ -763,6 +863,10 @@ struct Frame {
     float samples_reciprocal;
     vec3 to_viewer;
     uint has_studio;
+    uint extra_bounces;
+    uint reserved0;
+    uint reserved1;
+    uint reserved2;
 };
 
 // The rays of one bounce of one batch, 80 bytes. The host writes the row of a batch's first bounce, and in all rows the
@@ -873,8 +977,10 @@ struct Auxiliary {
 //
 // - `box_min`, `box_max`: the box that holds all triangles, with the structure's rounding margin (world units). In
 //   a grid, `box_min` is the least corner of the first cell.
-// - `plane_epsilon`: `KD_PLANE_EPSILON` times the greatest magnitude of a coordinate of that box (world units).
-// - `n_triangles`: of the scene.
+// - `plane_epsilon`: `KD_PLANE_EPSILON` times the greatest magnitude of a coordinate of that box (world units). In a
+//   world of instances, the share of the distance of a ray's origin by which boxes are too small for it if the origin
+//   is beyond `origin_reach`.
+// - `n_triangles`: that are stored: of the scene, or of all geometries.
 // - `n_cells_x`, `n_cells_y`, `n_cells_z`: cells of a grid's upper level along each axis.
 // - `cell_size`: edge of a cell of a grid's upper level (world units).
 // - `uvs_begin`, `corners_begin`, `material_maps_begin`, `textures_begin`: index in `texture_words` at which the
@@ -898,6 +1004,8 @@ struct Auxiliary {
 // - `origin_reach`: the greatest magnitude of a coordinate of a ray's origin up to which the origin is not moved (world
 //   units). It is `KD_MAX_ORIGIN_DISTANCE` times the greatest magnitude of a coordinate of the box, or less if
 //   the triangles have several scales (src/accel/kdtree/scales.rs).
+// - `geometries_begin`, `top_nodes_begin`, `instance_firsts_begin`, `instance_materials_begin`: rows of
+//   `instance_rows` at which its parts behind the instances begin. 0 without instances.
 // - The rest: the device address of each of the scene's arrays, low word first. 0 if kernels read the array by its
 //   binding.
 struct AccelConstants {
@@ -931,6 +1039,10 @@ struct AccelConstants {
     float environment_turn;
     uint light_nodes_begin;
     float origin_reach;
+    uint geometries_begin;
+    uint top_nodes_begin;
+    uint instance_firsts_begin;
+    uint instance_materials_begin;
 #define ARRAY(name, element, row, number) uvec2 name;
 #include "scene_arrays.glsl"
 #undef ARRAY
@@ -949,7 +1061,7 @@ struct AccelConstants {
 #define CONSTANT_COUNT_COSTS 3u
 // Whether the device runs both sides of a branch for all lanes (predication), as software drivers do.
 #define CONSTANT_PREDICATES_BRANCHES 4u
-// Whether the rays are the camera's, which are not stored.
+// Whether the rays are the camera's.
 #define CONSTANT_FROM_CAMERA 5u
 // Whether the camera is orthographic: its rays are parallel.
 #define CONSTANT_ORTHOGRAPHIC 6u
@@ -985,6 +1097,8 @@ struct AccelConstants {
 // at most `SPINE_MOST_INVOCATIONS`.
 #define CONSTANT_SCAN_SIZE 15u
 
+// The first layer of surfaces in `pixel_radiance`.
+#define CONSTANT_FIRST_SURFACE_LAYER 16u
 // Whether a kernel builds the lower level of a grid.
 #define CONSTANT_LOWER_LEVEL 10u
 // Which counts a prefix sum in a grid's build adds up: `GRID_SCANS_CELLS` and its like. The first three values equal
@@ -1008,6 +1122,11 @@ struct AccelConstants {
 // Whether shadow rays are alpha-tested: whether there are masked or blended materials.
 #define CONSTANT_SHADOW_ALPHA_TEST 23u
 
+// Whether rays can pass through blended surfaces without using a level of rays: whether there are such surfaces.
+#define CONSTANT_BLENDED 20u
+// Whether camera rays pass through back faces: whether there are single-sided materials (shading/back_faces.glsl).
+#define CONSTANT_CULLS_BACK_FACES 21u
+
 // Whether rays pass through triangles with `TRIANGLE_HIDDEN` in `triangle_materials`.
 #define CONSTANT_SKIPS_HIDDEN 28u
 // Levels of cells of the scene's grid, 1 or 2. 0: the scene has a kd-tree.
@@ -1016,6 +1135,8 @@ struct AccelConstants {
 #define CONSTANT_ITERATION_BUDGET 29u
 // Words of the traversal's bit mask, 1 or 2.
 #define CONSTANT_MASK_WORDS 30u
+// Whether the world is geometries and instances of them, not triangles alone.
+#define CONSTANT_INSTANCED 32u
 // How kernels read the scene: `READING_BOUND` and its like.
 #define CONSTANT_READING 31u
 // Kernels read the scene's arrays as bound storage buffers.
@@ -1272,8 +1393,8 @@ struct GridSort {
 // A vec4 for each ray: its radiance, weighted by its throughput.
 #define BIND_RAY_RADIANCE 15u
 // A vec4 for each pixel: the sample's radiance, or the mean of all samples. In frames of paths, it is first the sum of
-// the frame's samples, and w has the same of the samples' squared luminance. If the picture has layers of light, as
-// many elements follow for each of the `LIGHT_LAYERS` layers.
+// the frame's samples, and w has the same of the samples' squared luminance. If the picture has layers of light or of
+// surfaces, as many elements follow for each of the `LIGHT_LAYERS` layers, then for each of the `SURFACE_LAYERS`.
 #define BIND_PIXEL_RADIANCE 16u
 // A vec4 for each pixel: the radiance after noise reduction. With the filter `edge`, as many elements follow: the light
 // on surfaces, and in w the variance of its luminance, between two steps of the filter.

@@ -9,7 +9,7 @@
 //   traversal up to 7 % of its speed on a large GPU.
 //
 // Needs nothing: it includes layout.glsl, and declares all bindings of the scene's arrays. Provides `accel`, the
-// function `load_NAME` for each array, and functions that assemble an element: `triangle_at`, `kd_node_at`,
+// function `load_NAME` for each array, and functions that assemble an element: `stored_triangle_at`, `kd_node_at`,
 // `kd_parent_of`, `leaf_triangle_at`, `corners_of`, `kd_box_of` and `kd_rope_of`.
 #ifndef KDRAY_SCENE
 #define KDRAY_SCENE
@@ -18,6 +18,7 @@
 #extension GL_EXT_buffer_reference_uvec2 : require
 
 #include "layout.glsl"
+#include "octahedral.glsl"
 
 layout(constant_id = CONSTANT_READING) const uint READING = READING_BOUND;
 
@@ -52,12 +53,15 @@ uint uint_texel(usamplerBuffer texels, uint row_ix) {
 #include "scene_arrays.glsl"
 #undef ARRAY
 
-Triangle triangle_at(uint triangle_ix) {
-    vec4 v0 = load_triangles(3u * triangle_ix);
-    vec4 v1 = load_triangles(3u * triangle_ix + 1u);
-    vec4 v2 = load_triangles(3u * triangle_ix + 2u);
+// A triangle as it is stored: of the world, or of a geometry.
+Triangle stored_triangle_at(uint row) {
+    vec4 v0 = load_triangles(3u * row);
+    vec4 v1 = load_triangles(3u * row + 1u);
+    vec4 v2 = load_triangles(3u * row + 2u);
     return Triangle(v0.xyz, floatBitsToUint(v0.w), v1.xyz, floatBitsToUint(v1.w), v2.xyz, floatBitsToUint(v2.w));
 }
+
+#include "instances/placed.glsl"
 
 KdNode kd_node_at(uint node_ix) {
     uvec2 words = load_kd_nodes(node_ix);
@@ -82,15 +86,15 @@ Triangle corners_of(LeafTriangle entry) {
 }
 
 KdBox kd_box_of(uint node_ix) {
-    vec2 a = uintBitsToFloat(load_kd_boxes(3u * node_ix));
-    vec2 b = uintBitsToFloat(load_kd_boxes(3u * node_ix + 1u));
-    vec2 c = uintBitsToFloat(load_kd_boxes(3u * node_ix + 2u));
+    vec2 a = uintBitsToFloat(load_kd_links(3u * node_ix));
+    vec2 b = uintBitsToFloat(load_kd_links(3u * node_ix + 1u));
+    vec2 c = uintBitsToFloat(load_kd_links(3u * node_ix + 2u));
     return KdBox(a.x, a.y, b.x, b.y, c.x, c.y);
 }
 
 // side: 0..5, the face of the node's cell: -x, +x, -y, +y, -z, +z.
 KdRope kd_rope_of(uint node_ix, uint side) {
-    uvec2 words = load_kd_ropes(6u * node_ix + side);
+    uvec2 words = load_kd_links(6u * node_ix + side);
     return KdRope(uintBitsToFloat(words.x), words.y);
 }
 

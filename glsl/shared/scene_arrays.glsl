@@ -19,7 +19,7 @@ ARRAY(triangle_materials, uint, uint, 2u)
 // triangles (shading/texture_words.glsl).
 ARRAY(texture_words, uint, uint, 31u)
 
-// The nodes of the kd-tree.
+// The nodes of the kd-tree, or of all geometries' kd-trees.
 ARRAY(kd_nodes, KdNode, uvec2, 5u)
 // One word for each pair of siblings: the index of their parent.
 ARRAY(kd_parents, uint, uint, 6u)
@@ -36,8 +36,11 @@ ARRAY(leaf_planes, Plane, vec4, 23u)
 // One slab for each node, or no slabs at all. A slab holds the parts of the node's triangles that come near the
 // node's cell. The entries of nodes without KD_HAS_SLAB are unused.
 ARRAY(kd_slabs, Slab, vec4, 27u)
-// One box for each node, or none at all: the node's cell, three rows each. Only some traversals read them.
-ARRAY(kd_boxes, KdBox, uvec2, 21u)
-// Six ropes for each node, one for each face of its cell, or none at all. The faces are in the order -x, +x, -y, +y,
-// -z, +z. Only the traversal by ropes reads them.
-ARRAY(kd_ropes, KdRope, uvec2, 22u)
+// What some traversals read beside the tree, or nothing. The traversal by ropes has six ropes for each node, one for
+// each face of its cell, in the order -x, +x, -y, +y, -z, +z. Those that need the cells of nodes have a `KdBox` for
+// each node, in three rows.
+ARRAY(kd_links, KdRope, uvec2, 22u)
+
+// The instances, the constants of their geometries, the hierarchy over the instances, the first triangle of each
+// instance, and the materials of the instances' slots (instances/placed.glsl). Empty if the world has no instances.
+ARRAY(instance_rows, InstanceRow, vec4, 39u)

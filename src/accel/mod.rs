@@ -7,6 +7,8 @@ pub mod kdtree;
 mod query;
 mod search;
 mod statistics;
+pub(crate) mod top_level;
+pub(crate) mod two_level;
 pub mod wide_bvh;
 
 use glam::Vec3;
@@ -14,6 +16,7 @@ use glam::Vec3;
 use self::{
     grid::{GridLevels, GridOptions, LazyGrid},
     kdtree::{BuildOptions, KdTree},
+    two_level::TwoLevel,
 };
 pub use self::{query::Query, search::Search, statistics::Statistics};
 use crate::layout::Triangle;
@@ -27,6 +30,8 @@ pub enum Accel {
     KdTree(KdTree),
     /// A grid. Each device builds its own grid. The host builds a grid only at the first [`LazyGrid::get`].
     Grid(LazyGrid),
+    /// A kd-tree for each geometry, and a hierarchy over the instances, which the host builds.
+    TwoLevel(Box<TwoLevel>),
 }
 
 /// Build options of an acceleration structure.
@@ -111,28 +116,29 @@ impl Accel {
         }
     }
 
-    /// The kd-tree, or none if the structure is a grid.
+    /// The only kd-tree, or none if the structure is a grid or has two levels.
     pub fn as_kdtree(&self) -> Option<&KdTree> {
         match self {
             Self::KdTree(tree) => Some(tree),
-            Self::Grid(_) => None,
+            Self::Grid(_) | Self::TwoLevel(_) => None,
         }
     }
 
-    /// The kind of the structure.
+    /// The kind of the structure, or of that of each geometry.
     pub fn kind(&self) -> AccelKind {
         match self {
-            Self::KdTree(_) => AccelKind::KdTree,
+            Self::KdTree(_) | Self::TwoLevel(_) => AccelKind::KdTree,
             Self::Grid(grid) if grid.options().levels.n_levels() == 1 => AccelKind::Grid,
             Self::Grid(_) => AccelKind::Grid2,
         }
     }
 
-    /// The number of triangles that the structure was made for.
+    /// The number of stored triangles that the structure was made for.
     pub fn n_triangles(&self) -> usize {
         match self {
             Self::KdTree(tree) => tree.n_triangles(),
             Self::Grid(grid) => grid.n_triangles(),
+            Self::TwoLevel(two) => two.n_stored(),
         }
     }
 
@@ -141,6 +147,7 @@ impl Accel {
         match self {
             Self::KdTree(tree) => tree.bounds(),
             Self::Grid(grid) => grid.bounds(),
+            Self::TwoLevel(two) => two.bounds(),
         }
     }
 
@@ -150,6 +157,7 @@ impl Accel {
         match self {
             Self::KdTree(tree) => tree.constants().origin_reach,
             Self::Grid(grid) => grid.origin_reach(),
+            Self::TwoLevel(two) => two.origin_reach(),
         }
     }
 }

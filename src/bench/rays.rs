@@ -63,15 +63,15 @@ pub fn ray_sets(stage: &Stage) -> [RaySet; 4] {
     let mut hits = vec![Hit::zeroed(); primary.len()];
     trace(&bindings, Traversal::Mask.into(), &primary, &mut hits);
 
-    let triangles = bindings.triangles;
-    let shadow = rays_from_hits(triangles, &primary, &hits, |ray, surface| {
+    let triangle_at = |ix| bindings.triangle(ix);
+    let shadow = rays_from_hits(triangle_at, &primary, &hits, |ray, surface| {
         let to_light = incident_light(&stage.light, surface.point_world);
         PathRay { t_max: to_light.distance, ..leaving(surface, ray, to_light.direction) }
     });
-    let mirror = rays_from_hits(triangles, &primary, &hits, |ray, surface| {
+    let mirror = rays_from_hits(triangle_at, &primary, &hits, |ray, surface| {
         leaving(surface, ray, mirrored(ray.direction, surface))
     });
-    let diffuse = diffuse_rays(triangles, &primary, &hits);
+    let diffuse = diffuse_rays(triangle_at, &primary, &hits);
     let mut sets = RayKind::ALL.into_iter().zip([primary, shadow, mirror, diffuse]);
     std::array::from_fn(|_| sets.next().map(|(kind, rays)| RaySet { kind, rays }).expect("as many sets as kinds"))
 }

@@ -94,7 +94,7 @@ impl KnotStage {
         let accel = self.stage.statistics(variant); // builds a grid if there is none
         let grid_ms = begin.elapsed().as_secs_f64() * 1e3;
         let build_ms = match self.stage.geometry(variant).accel() {
-            Accel::KdTree(_) => self.stage.tree_build_ms,
+            Accel::KdTree(_) | Accel::TwoLevel(_) => self.stage.tree_build_ms,
             Accel::Grid(grid) => grid.device_build().and_then(|build| build.ms).unwrap_or(grid_ms),
         };
         let rays = sets.iter().map(|set| Ok(RayCost::new(&tracers.measure(set, n_times)?)));

@@ -101,7 +101,7 @@ impl Stage {
     /// builds it.
     pub fn statistics(&self, variant: Search) -> Statistics {
         match self.geometry(variant).accel() {
-            Accel::KdTree(_) => self.world.statistics(),
+            Accel::KdTree(_) | Accel::TwoLevel(_) => self.world.statistics(),
             Accel::Grid(grid) => Statistics::Grid(grid.statistics(&self.scene().triangles)),
         }
     }

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use bytemuck::cast_slice;
 use rayon::prelude::*;
 
 use super::{
@@ -9,20 +10,22 @@ use super::{
     scene_arrays::{Content, Contents, SceneAccess, SceneArrays},
     surface_kinds::SurfaceKinds,
     texture_words::TextureWords,
+    two_level::{Joined, instance_rows},
 };
 use crate::{
     accel::{
         Accel,
         grid::{Grid, LazyGrid},
         kdtree::{KdTree, Traversal, TraversalLinks},
+        two_level::TwoLevel,
     },
     gpu::{Binding, Buffer, BufferUse, Constants, Context, GpuError, Timer},
     layout::{
-        AccelConstants, BIND_ACCEL, BIND_SUSPENDED_RAYS, BRUTE_MAX_TRIANGLES, KD_WORD_DEPTH, LeafTriangle, NO_WORDS,
-        Slab, TRIANGLE_HIDDEN, Triangle, constants,
+        AccelConstants, BIND_ACCEL, BIND_SUSPENDED_RAYS, BRUTE_MAX_TRIANGLES, KD_WORD_DEPTH, KdRope, LeafTriangle,
+        NO_WORDS, Slab, TRIANGLE_HIDDEN, Triangle, constants,
     },
     passes::grid::GridBuilder,
-    world::{Emitters, Geometry, World},
+    world::{Emitters, Geometry, Instances, World},
 };
 
 /// Returns the numbers of the bindings of [`AccelBuffers`].
@@ -37,6 +40,8 @@ enum Structure {
     KdTree { mask_words: u32 },
     /// A grid. `n_levels`: the number of levels of cells, 1 or 2.
     Grid { n_levels: u32 },
+    /// A kd-tree for each geometry, and a hierarchy over instances. `mask_words`: as of one kd-tree.
+    TwoLevel { mask_words: u32 },
 }
 
 /// Buffers of triangles, of their acceleration structure and of the constants of both. A clone is a second handle to
@@ -52,6 +57,8 @@ pub struct AccelBuffers {
     structure: Structure,
     /// Whether `arrays` have the emitters, which only paths read.
     has_emitters: bool,
+    /// The number of triangles in the world.
+    pub n_triangles: usize,
     /// Whether rays pass through some of the triangles.
     filters: bool,
     surface_kinds: SurfaceKinds,
@@ -116,13 +123,52 @@ impl AccelBuffers {
     fn with_room(context: &Arc<Context>, geometry: Geometry, n_texture_words: usize) -> Result<Self, GpuError> {
         let triangles = geometry.triangles();
         let common = || Contents::of_triangles(triangles, n_texture_words);
-        match geometry.accel() {
+        let mut made = match geometry.accel() {
             Accel::KdTree(tree) => Self::of_tree(context, triangles, tree, common()),
             Accel::Grid(grid) if GridBuilder::has_room(context, triangles.len()) => {
                 Self::of_device_grid(context, triangles, grid, common())
             }
             Accel::Grid(grid) => Self::of_grid(context, triangles, grid.get(triangles), common()),
-        }
+            Accel::TwoLevel(two) => {
+                let instances = geometry.instances().expect("a structure of two levels is over instances");
+                Self::of_two_level(context, triangles, (two, instances), common())
+            }
+        }?;
+        made.n_triangles = geometry.n_triangles();
+        Ok(made)
+    }
+
+    /// Uploads the triangles and the kd-trees of all geometries, and the instances with their hierarchy.
+    fn of_two_level(
+        context: &Arc<Context>,
+        triangles: &[Triangle],
+        (two, instances): (&TwoLevel, &Instances),
+        common: Contents,
+    ) -> Result<Self, GpuError> {
+        let joined = Joined::new(two, instances);
+        joined.check()?;
+        let mut constants = AccelConstants::default();
+        let rows = instance_rows(two, instances, &mut constants);
+        let (n_nodes, n_entries) = (joined.n_nodes(), joined.n_entries());
+        let n_slabs = if context.predicates_branches() { 0 } else { joined.n_slabs() };
+        let write_entries = |first: usize, part: &mut [LeafTriangle]| joined.write_entries(triangles, first, part);
+        let contents = Contents {
+            instance_rows: Content::Elements(&rows),
+            kd_nodes: Content::Written { len: n_nodes, write: &|first, part| joined.write_nodes(first, part) },
+            kd_parents: match context.loop_limit()? {
+                Some(_) => {
+                    Content::Written { len: n_nodes / 2, write: &|first, part| joined.write_parents(first, part) }
+                }
+                None => Content::Reserved(n_nodes / 2),
+            },
+            leaf_triangles: Content::Written { len: n_entries, write: &write_entries },
+            leaf_planes: Content::Written { len: n_entries, write: &|first, part| joined.write_planes(first, part) },
+            kd_slabs: Content::Written { len: n_slabs, write: &|first, part| joined.write_slabs(first, part) },
+            kd_links: Content::Reserved(6 * n_nodes),
+            ..common
+        };
+        let mask_words = if two.depth() <= KD_WORD_DEPTH { 1 } else { 2 };
+        Self::with(context, contents, &constants, Structure::TwoLevel { mask_words })
     }
 
     /// Uploads triangles and their kd-tree.
@@ -145,8 +191,7 @@ impl AccelBuffers {
             leaf_triangles: Content::Written { len: entries.len(), write: &write_entries },
             leaf_planes: Content::Elements(tree.leaf_planes()),
             kd_slabs: Content::Elements(slabs_for(context, tree)),
-            kd_boxes: Content::Reserved(n_nodes),
-            kd_ropes: Content::Reserved(6 * n_nodes),
+            kd_links: Content::Reserved(6 * n_nodes),
             ..common
         };
         let mask_words = if tree.depth() <= KD_WORD_DEPTH { 1 } else { 2 };
@@ -225,6 +270,7 @@ impl AccelBuffers {
             suspended_rays: SuspendedRays::new(context)?,
             access,
             has_emitters: false,
+            n_triangles: n_triangles as usize,
             filters: false,
             surface_kinds: SurfaceKinds::default(),
             structure,
@@ -253,8 +299,8 @@ impl AccelBuffers {
         self.upload_constants(context)
     }
 
-    /// Uploads the arrays that the traversal reads beside the structure; for a grid there are none. `accel`: the
-    /// structure that is uploaded. Clones of these buffers keep their own arrays. Descriptor sets over these buffers
+    /// Uploads the arrays that the traversal reads beside the structure; for a grid there are none. `geometry`: that
+    /// is uploaded. Clones of these buffers keep their own arrays. Descriptor sets over these buffers
     /// have to be made again.
     ///
     /// # Errors
@@ -263,21 +309,39 @@ impl AccelBuffers {
     pub(crate) fn add_links(
         &mut self,
         context: &Arc<Context>,
-        accel: &Accel,
+        geometry: Geometry,
         traversal: Traversal,
     ) -> Result<(), GpuError> {
-        let Accel::KdTree(tree) = accel else { return Ok(()) };
+        let (accel, instances) = (geometry.accel(), geometry.instances());
+        if let Accel::Grid(_) = accel {
+            return Ok(());
+        }
         let (value, limit) = (self.arrays.triangles.len() as u64, u64::from(BRUTE_MAX_TRIANGLES));
         if traversal == Traversal::Brute && value > limit {
             return Err(GpuError::Limit { what: "triangles without a tree", value, limit });
         }
-        let links = TraversalLinks::new(tree, traversal);
+        let mut links = TraversalLinks::of(accel, traversal);
+        let joined = match (accel, instances) {
+            (Accel::TwoLevel(two), Some(instances)) => Some(Joined::new(two, instances)),
+            _ => None,
+        };
+        if let (Some(joined), false) = (&joined, links.ropes.is_empty()) {
+            joined.move_ropes(&mut links.ropes);
+        }
         let mut next = self.clone();
         if traversal.needs_parents() && self.arrays.kd_parents.is_empty() {
-            next.arrays.kd_parents = Content::Elements(tree.parents()).upload(context, "kd_parents", self.access)?;
+            let write = |first: usize, part: &mut [u32]| match (&joined, accel.as_kdtree()) {
+                (Some(joined), _) => joined.write_parents(first, part),
+                (None, Some(tree)) => part.copy_from_slice(&tree.parents()[first..][..part.len()]),
+                (None, None) => unreachable!("a grid has no links"),
+            };
+            let len = self.arrays.kd_nodes.len() / 2;
+            next.arrays.kd_parents =
+                Content::Written { len, write: &write }.upload(context, "kd_parents", self.access)?;
         }
-        next.arrays.kd_boxes = Content::Elements(&links.boxes).upload(context, "kd_boxes", self.access)?;
-        next.arrays.kd_ropes = Content::Elements(&links.ropes).upload(context, "kd_ropes", self.access)?;
+        // A traversal reads boxes or ropes, not both.
+        let rows: &[KdRope] = if links.ropes.is_empty() { cast_slice(&links.boxes) } else { &links.ropes };
+        next.arrays.kd_links = Content::Elements(rows).upload(context, "kd_links", self.access)?;
         next.upload_constants(context)?;
         *self = next;
         Ok(())
@@ -293,9 +357,14 @@ impl AccelBuffers {
     /// An index is not that of a triangle.
     pub(crate) fn hide(&mut self, context: &Arc<Context>, hidden: &[u32]) -> Result<(), GpuError> {
         let mut next = self.clone();
-        next.add_materials(context, &hidden_words(self.arrays.triangles.len(), hidden))?;
+        next.add_materials(context, &hidden_words(self.n_triangles, hidden))?;
         *self = Self { filters: true, ..next };
         Ok(())
+    }
+
+    /// Whether the triangles are those of geometries.
+    pub fn is_instanced(&self) -> bool {
+        matches!(self.structure, Structure::TwoLevel { .. })
     }
 
     /// The way in which kernels read the arrays.
@@ -306,15 +375,23 @@ impl AccelBuffers {
     /// The specialization constants of all kernels that read the arrays, in frames of paths or elsewhere.
     pub(super) fn constants(&self, of_paths: bool) -> Constants {
         let (mask_words, n_levels) = match self.structure {
-            Structure::KdTree { mask_words } => (mask_words, 0),
+            Structure::KdTree { mask_words } | Structure::TwoLevel { mask_words } => (mask_words, 0),
             Structure::Grid { n_levels } => (1, n_levels),
+        };
+        let is_instanced = self.is_instanced();
+        // One loop more stands around all others, so that more iterations go by in which a lane only waits.
+        let budget = match self.suspended_rays.iteration_budget() {
+            0 => 0,
+            budget if is_instanced => (budget / 8).max(4),
+            budget => budget,
         };
         let constants = Constants::new()
             .set(constants::READING, self.access.constant())
             .set(constants::SKIPS_HIDDEN, self.filters)
             .set(constants::MASK_WORDS, mask_words)
             .set(constants::GRID_LEVELS, n_levels)
-            .set(constants::ITERATION_BUDGET, self.suspended_rays.iteration_budget());
+            .set(constants::INSTANCED, is_instanced)
+            .set(constants::ITERATION_BUDGET, budget);
         self.surface_kinds.set(constants, of_paths)
     }
 

@@ -26,6 +26,7 @@ mod scene_arrays;
 mod surface_kinds;
 mod suspended_rays;
 mod texture_words;
+mod two_level;
 mod vertex_indices;
 
 pub use self::{

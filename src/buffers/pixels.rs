@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::{
     frame::{Denoise, Integrator, Primary, RenderOptions},
     gpu::{Buffer, BufferUse, Context, GpuError, Target, TargetKind},
-    layout::{Auxiliary, Frame, LIGHT_LAYERS, PixelAovs, SAMPLE_BLOCK_LOG2},
+    layout::{Auxiliary, Frame, PixelAovs, SAMPLE_BLOCK_LOG2},
 };
 
 /// Sums of samples for which each pixel of a frame of paths has room at least. They are enough for 4096 samples.
@@ -16,8 +16,8 @@ const SUMS_OF_PATHS: usize = 8;
 #[derive(Clone)]
 pub struct Pixels {
     /// The radiance of the frame's sample, which the kernel `accumulate` replaces by the mean of all samples. There
-    /// are `width * height` elements, as in all buffers here. If the picture has layers of light, as many elements
-    /// follow for each of them.
+    /// are `width * height` elements, as in all buffers here. If the picture has layers of light or of surfaces, as
+    /// many elements follow for each of them.
     pub pixel_radiance: Buffer<[f32; 4]>,
     /// The sums of all samples; none before there is a second sample. Frames of paths have several sums for each
     /// element of `pixel_radiance` (glsl/passes/path_accumulate.comp).
@@ -39,7 +39,7 @@ pub struct Pixels {
     pub triangle_ids: Arc<Target>,
     /// The depth image for `triangle_ids`. None if the options do not use the graphics pipeline.
     pub depth: Option<Arc<Target>>,
-    /// 1, and 1 for each layer of light: the number of elements of `pixel_radiance` for each pixel.
+    /// 1, and 1 for each layer of light or of surfaces: the number of elements of `pixel_radiance` for each pixel.
     pub n_layers: u32,
 }
 
@@ -80,7 +80,7 @@ impl Pixels {
     /// Returns the bytes of a pixel in the widest buffer that the options need.
     pub fn bytes_per_pixel(options: &RenderOptions) -> u64 {
         let widest = if options.pixel_aovs { size_of::<PixelAovs>() } else { 0 };
-        let n_sums = if options.integrator == Integrator::Path { SUMS_OF_PATHS } else { 0 };
+        let n_sums = if options.integrator == Integrator::Path { SUMS_OF_PATHS } else { 1 };
         let sums = n_sums * n_layers(options) as usize * size_of::<[f32; 4]>();
         widest.max(sums).max(size_of::<[f32; 4]>()).max(size_of::<u64>()) as u64
     }
@@ -122,9 +122,9 @@ impl Pixels {
     }
 }
 
-/// The number of elements of `pixel_radiance` for each pixel: the picture's, and those of its layers of light.
+/// The number of elements of `pixel_radiance` for each pixel: the picture's, and those of its layers.
 fn n_layers(options: &RenderOptions) -> u32 {
-    if options.has_light_layers() { 1 + LIGHT_LAYERS } else { 1 }
+    1 + options.mean_layers().len() as u32
 }
 
 /// Whether the graphics pipeline rasterizes the primary rays.

@@ -8,11 +8,11 @@ use super::{
     vertex_indices::{has_indices, vertex_indices},
 };
 use crate::{
-    accel::{Accel, kdtree::Traversal},
+    accel::kdtree::Traversal,
     frame::{Integrator, RenderOptions, for_resources},
     gpu::{Access, Binding, BindingLayout, BindingSet, Buffer, BufferUse, Commands, Context, Dispatch, GpuError},
     layout::{self, Batch, Bounce, COUNTER_COPIES, COUNTER_STRIDE, Counters, Frame, Light, Material},
-    world::{World, path_materials},
+    world::{Geometry, World, path_materials},
 };
 
 /// The size of the longest push constants, bytes.
@@ -102,7 +102,7 @@ impl Resources {
     pub fn new(context: &Arc<Context>, world: &World, needs: &Needs) -> Result<Self, GpuError> {
         let is_of_paths = needs.options.integrator == Integrator::Path;
         let mut accel = AccelBuffers::of_world(context, world, is_of_paths)?;
-        accel.add_links(context, world.accel(), needs.options.traversal)?;
+        accel.add_links(context, world.geometry(), needs.options.traversal)?;
         Self::with_accel(context, world, needs, accel)
     }
 
@@ -120,7 +120,7 @@ impl Resources {
         let is_of_paths = needs.options.integrator == Integrator::Path;
         let mut accel = self.accel.for_integrator(context, world, is_of_paths)?;
         if needs.options.traversal != traversal {
-            accel.add_links(context, world.accel(), needs.options.traversal)?;
+            accel.add_links(context, world.geometry(), needs.options.traversal)?;
         }
         Self::with_accel(context, world, needs, accel)
     }
@@ -133,7 +133,10 @@ impl Resources {
         let is_of_paths = options.integrator == Integrator::Path;
         let kinds: Vec<_> = rows(is_of_paths).map(|row| row.0).chain(accel::bindings()).map(binding).collect();
         let (queue, paths) = new_queues(context, constants, options)?;
-        let upload_indices = || new_vertex_indices(context, &vertex_indices(&scene.triangles));
+        check_drawn(constants, options)?;
+        // The triangles of instances have no vertices in common.
+        let drawn = if scene.instances.is_some() { Vec::new() } else { vertex_indices(&scene.triangles) };
+        let upload_indices = || new_vertex_indices(context, &drawn);
         let mut resources = Self {
             frame: Buffer::with(context, "frame", &[*constants], BufferUse::Uniform)?,
             vertex_indices: uses_graphics_pipeline(options).then(upload_indices).transpose()?,
@@ -176,16 +179,17 @@ impl Resources {
     }
 
     /// Makes the resources for another frame of the same scene. The scene keeps its contents, and so do the pixels if
-    /// their buffers fit the frame. All other contents are undefined. `accel`: the scene's structure if the traversal
+    /// their buffers fit the frame. All other contents are undefined. `links`: the scene's geometry if the traversal
     /// changes, else none.
     ///
     /// # Errors
     /// There are too many triangles for brute force, a buffer is beyond the device's limits, or memory runs out.
-    pub fn for_frame(&self, context: &Arc<Context>, accel: Option<&Accel>, needs: &Needs) -> Result<Self, GpuError> {
+    pub fn for_frame(&self, context: &Arc<Context>, links: Option<Geometry>, needs: &Needs) -> Result<Self, GpuError> {
         let &Needs { constants, options, n_bounces } = needs;
+        check_drawn(constants, options)?;
         self.changed(|next| {
-            if let Some(accel) = accel {
-                next.accel.add_links(context, accel, options.traversal)?;
+            if let Some(geometry) = links {
+                next.accel.add_links(context, geometry, options.traversal)?;
             }
             if uses_graphics_pipeline(options) != next.vertex_indices.is_some() {
                 next.vertex_indices =
@@ -233,7 +237,8 @@ impl Resources {
     /// enough to have indices.
     fn make_vertex_indices(&self, context: &Arc<Context>) -> Result<Buffer<u32>, GpuError> {
         let triangles = &self.accel.arrays.triangles;
-        let triangles = if has_indices(triangles.len()) { triangles.download()? } else { Vec::new() };
+        let has_vertices = !self.accel.is_instanced();
+        let triangles = if has_vertices && has_indices(triangles.len()) { triangles.download()? } else { Vec::new() };
         new_vertex_indices(context, &vertex_indices(&triangles))
     }
 
@@ -412,4 +417,13 @@ fn new_bounces(context: &Arc<Context>, n_bounces: usize) -> Result<Buffer<Bounce
 
 fn new_counters(context: &Arc<Context>, n_bounces: usize) -> Result<Buffer<Counters>, GpuError> {
     Buffer::new(context, "counters", n_bounces * COUNTERS_PER_BOUNCE, BufferUse::Storage)
+}
+
+/// Refuses more triangles than the graphics pipeline has indices of vertices for.
+fn check_drawn(constants: &Frame, options: &RenderOptions) -> Result<(), GpuError> {
+    let (value, limit) = (u64::from(constants.n_triangles), u64::from(u32::MAX / 3));
+    match uses_graphics_pipeline(options) && value > limit {
+        true => Err(GpuError::Limit { what: "triangles that the graphics pipeline draws", value, limit }),
+        false => Ok(()),
+    }
 }

@@ -8,7 +8,7 @@ use bytemuck::Pod;
 use crate::{
     gpu::{AnyBuffer, Binding, Buffer, BufferUse, Context, GpuError, texel_bytes},
     layout::{
-        AccelConstants, BIND_TEXELS, GridCell, KdBox, KdNode, KdRope, LeafTriangle, Plane, READING_ADDRESS,
+        AccelConstants, BIND_TEXELS, GridCell, InstanceRow, KdNode, KdRope, LeafTriangle, Plane, READING_ADDRESS,
         READING_BOUND, READING_TEXELS, Slab, Triangle, for_scene_arrays,
     },
 };

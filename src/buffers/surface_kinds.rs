@@ -26,6 +26,10 @@ pub struct SurfaceKinds {
     has_shadow_alpha_test: bool,
     /// Whether rays of paths do.
     has_path_alpha_test: bool,
+    /// Whether some surfaces are blended.
+    has_blended: bool,
+    /// Whether camera rays pass through the back faces of some materials.
+    has_back_faces: bool,
     /// The lobes that materials have in the path tracer: `LOBE_INTERFACE` and its like.
     lobes: u32,
 }
@@ -59,6 +63,8 @@ impl SurfaceKinds {
             has_alpha_masks: scene.textures.has_alpha_masks(),
             has_shadow_alpha_test: scene.textures.has_shadow_alpha_test(),
             has_path_alpha_test: scene.textures.has_path_alpha_test(),
+            has_blended: scene.has_blended(),
+            has_back_faces: scene.has_single_sided(),
             lobes: path_materials(scene).iter().map(lobes_of).fold(0, |lobes, more| lobes | more),
         }
     }
@@ -72,6 +78,8 @@ impl SurfaceKinds {
             .set(constants::SMOOTH, self.is_smooth)
             .set(constants::LOBES, self.lobes)
             .set(constants::ALPHA_MASKS, self.has_alpha_masks)
+            .set(constants::BLENDED, self.has_blended)
+            .set(constants::CULLS_BACK_FACES, self.has_back_faces)
             .set(
                 constants::SHADOW_ALPHA_TEST,
                 if of_paths { self.has_path_alpha_test } else { self.has_shadow_alpha_test },

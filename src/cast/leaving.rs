@@ -12,22 +12,22 @@ use crate::{
 
 /// Returns one ray for each hit, in the order of the hits, with a pseudorandom direction in the hemisphere above the
 /// hit. The pdf of directions is proportional to the cosine. Misses give no ray.
-pub fn diffuse_rays(triangles: &[Triangle], rays: &[PathRay], hits: &[Hit]) -> Vec<PathRay> {
-    rays_from_hits(triangles, rays, hits, |ray, surface| {
+pub fn diffuse_rays(triangle_at: impl Fn(u32) -> Triangle + Sync, rays: &[PathRay], hits: &[Hit]) -> Vec<PathRay> {
+    rays_from_hits(triangle_at, rays, hits, |ray, surface| {
         leaving(surface, ray, cosine_distributed(surface.geometric, uniform_pair(ray.pixel_ix)))
     })
 }
 
 /// Returns the ray that `next` makes from each hit, in the order of the hits. Misses give no ray.
 pub fn rays_from_hits(
-    triangles: &[Triangle],
+    triangle_at: impl Fn(u32) -> Triangle + Sync,
     rays: &[PathRay],
     hits: &[Hit],
     next: impl Fn(&PathRay, &Surface) -> PathRay + Sync,
 ) -> Vec<PathRay> {
     let of_hit = |(ray, hit): (&PathRay, &Hit)| {
-        let triangle = triangles.get(hit.triangle_ix as usize)?;
-        Some(next(ray, &surface_at(ray, hit, triangle)))
+        let is_hit = hit.triangle_ix != NO_TRIANGLE;
+        is_hit.then(|| next(ray, &surface_at(ray, hit, &triangle_at(hit.triangle_ix))))
     };
     rays.par_iter().zip(hits).filter_map(of_hit).collect()
 }

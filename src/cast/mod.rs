@@ -95,7 +95,7 @@ impl GpuCaster {
         let device = device.into();
         let context = device.inner();
         let mut buffers = AccelBuffers::new(context, geometry)?;
-        buffers.add_links(context, geometry.accel(), traversal)?;
+        buffers.add_links(context, geometry, traversal)?;
         let bindings = CastResources::bindings(context, &buffers)?;
         Ok(Self {
             resources: CastResources::new(context, &bindings, &buffers, 0)?,
@@ -114,7 +114,7 @@ impl GpuCaster {
     /// # Errors
     /// There is no triangle with one of the indices, or the buffers are beyond the device's limits or memory.
     pub fn hiding(mut self, triangles: &[u32]) -> Result<Self, GpuError> {
-        check_indices(self.tree.arrays.triangles.len(), triangles)?;
+        check_indices(self.tree.n_triangles, triangles)?;
         self.tree.hide(&self.context, triangles)?;
         self.bindings = CastResources::bindings(&self.context, &self.tree)?;
         self.resources = CastResources::new(&self.context, &self.bindings, &self.tree, 0)?;
@@ -266,7 +266,7 @@ impl<'a> CpuCaster<'a> {
     /// # Errors
     /// There is no triangle with one of the indices.
     pub fn hiding(self, triangles: &[u32]) -> Result<Self, BadOptions> {
-        let n_triangles = self.geometry.triangles().len();
+        let n_triangles = self.geometry.n_triangles();
         check_indices(n_triangles, triangles)?;
         Ok(Self { hidden: Some(hidden_words(n_triangles, triangles)), ..self })
     }

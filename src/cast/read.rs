@@ -2,7 +2,7 @@
 
 use std::{
     fs::File,
-    io::{self, BufReader, Read, Seek},
+    io::{self, BufReader, Seek},
     path::{Path, PathBuf},
 };
 
@@ -10,7 +10,7 @@ use glam::Vec3;
 use npyz::{NpyFile, NpyHeader, NpyReader, Order};
 
 use super::Ray;
-use crate::util::text::short_line;
+use crate::util::{npy, text::short_line};
 
 /// Error that says why rays could not be read. It displays as one line.
 #[derive(Debug, thiserror::Error)]
@@ -19,13 +19,6 @@ pub struct RayFileError {
     path: PathBuf,
     what: String,
 }
-
-/// Greatest accepted size of a header in bytes. Headers of plain arrays are smaller. The reader allocates as many
-/// bytes as the file claims, so the size is checked first.
-const MAX_HEADER: u32 = 1024;
-/// Deepest accepted nesting of brackets in a header. That of an array of structures is 3, of plain numbers 2. The time
-/// in which the reader parses a header grows exponentially with it: 30 take more than ten seconds.
-const MAX_NESTING: usize = 4;
 
 /// Reads a `.npy` file of float32, K x 8 (origin, direction, t_min, t_max) or K x 6 (origin, direction; t from 0 to
 /// infinity).
@@ -53,9 +46,7 @@ impl RayReader {
             return Err(failed("is a directory".to_owned()));
         }
         let mut file = BufReader::with_capacity(1 << 16, file);
-        let text = read_header(&mut file).map_err(failed)?;
-        let header = NpyHeader::from_reader(text.as_slice());
-        let header = header.map_err(|e| failed(format!("is no .npy file: {e}")))?;
+        let header = npy::read_header(&mut file, "rays are a plain array of float32").map_err(failed)?;
         let (n_rays, n_columns) = check_header(&header).map_err(failed)?;
         if metadata.is_file() {
             let n_bytes = metadata.len().saturating_sub(file.stream_position().map_err(unreadable)?);
@@ -104,47 +95,6 @@ impl RayReader {
         };
         RayFileError { path: self.path.clone(), what }
     }
-}
-
-/// Reads the header of a file, from the file's first byte on. Refuses one that is no plain array's before it is parsed:
-/// see `MAX_HEADER` and `MAX_NESTING`. Every `.npy` file is longer than 12 bytes. A pipe may deliver them one by one.
-fn read_header(file: &mut impl Read) -> Result<Vec<u8>, String> {
-    let mut read = |bytes: &mut [u8]| {
-        file.read_exact(bytes).map_err(|e| match e.kind() {
-            io::ErrorKind::UnexpectedEof => "is no .npy file".to_owned(),
-            _ => format!("cannot be read: {e}"),
-        })
-    };
-    let mut header = vec![0; 12];
-    read(&mut header)?;
-    let (begin, size) = match header[..] {
-        [0x93, b'N', b'U', b'M', b'P', b'Y', 1, _, a, b, ..] => (10, u32::from_le_bytes([a, b, 0, 0])),
-        [0x93, b'N', b'U', b'M', b'P', b'Y', _, _, a, b, c, d] => (12, u32::from_le_bytes([a, b, c, d])),
-        _ => return Err("is no .npy file".to_owned()),
-    };
-    if size > MAX_HEADER {
-        return Err(format!("has a header of {size} bytes: rays are a plain array of float32"));
-    }
-    header.resize((begin + size as usize).max(12), 0);
-    read(&mut header[12..])?;
-    if nesting(&header[begin..]) > MAX_NESTING {
-        return Err("has a header of nested brackets: rays are a plain array of float32".to_owned());
-    }
-    Ok(header)
-}
-
-/// Returns how deep brackets are nested in a text.
-fn nesting(text: &[u8]) -> usize {
-    let (mut depth, mut deepest) = (0_usize, 0);
-    for byte in text {
-        match byte {
-            b'(' | b'[' | b'{' => depth += 1,
-            b')' | b']' | b'}' => depth = depth.saturating_sub(1),
-            _ => {}
-        }
-        deepest = deepest.max(depth);
-    }
-    deepest
 }
 
 /// Returns the numbers of rays and of columns of an array of rays.

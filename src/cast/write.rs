@@ -17,8 +17,8 @@ use zip::{CompressionMethod, ZipWriter, write::SimpleFileOptions};
 use super::{Hit, NO_TRIANGLE};
 use crate::{
     accel::Query,
-    layout::Triangle,
     output::{self, OutputError},
+    world::FlatScene,
 };
 
 /// Number of hits that are read from the spool at a time: 1 MiB.
@@ -55,11 +55,12 @@ impl HitWriter {
         written.map_err(|source| OutputError::Write { path: self.path.clone(), source })
     }
 
-    /// Writes the whole file or nothing, as [`output::write`] does. The hits' indices refer to `triangles`.
+    /// Writes the whole file or nothing, as [`output::write`] does. The hits are of triangles of the
+    /// scene.
     ///
     /// # Errors
     /// The disk is full, or a write fails.
-    pub fn finish(self, triangles: &[Triangle], query: Query) -> Result<(), OutputError> {
+    pub fn finish(self, scene: &FlatScene, query: Query) -> Result<(), OutputError> {
         let mut hits = Hits { spool: self.spool, n: self.n_hits };
         output::write_with(&self.path, |file| {
             let mut archive = ZipWriter::new(FailsOnce { file, failed: false });
@@ -68,7 +69,7 @@ impl HitWriter {
                     hits.write(&mut archive, "t_hit", |hit| [hit.t])?;
                     hits.write(&mut archive, "primitive_ids", |hit| [hit.triangle_ix])?;
                     hits.write(&mut archive, "primitive_uvs", |hit| [hit.u, hit.v])?;
-                    hits.write(&mut archive, "primitive_normals", |hit| normal_at(triangles, hit))?;
+                    hits.write(&mut archive, "primitive_normals", |hit| normal_at(scene, hit))?;
                 }
                 Query::Any => hits.write(&mut archive, "occluded", |hit| [hit.triangle_ix != NO_TRIANGLE])?,
             }
@@ -79,8 +80,11 @@ impl HitWriter {
 }
 
 /// Returns the unit normal of the hit triangle by its winding. It is zero on a miss and for a triangle without area.
-fn normal_at(triangles: &[Triangle], hit: &Hit) -> [f32; 3] {
-    let Some(triangle) = triangles.get(hit.triangle_ix as usize) else { return [0.0; 3] };
+fn normal_at(scene: &FlatScene, hit: &Hit) -> [f32; 3] {
+    if hit.triangle_ix as usize >= scene.n_triangles() {
+        return [0.0; 3];
+    }
+    let triangle = scene.triangle(hit.triangle_ix as usize);
     // In double precision, the squares of the shortest edges do not underflow.
     let [v0, v1, v2] = [triangle.v0, triangle.v1, triangle.v2].map(|v| v.as_dvec3());
     (v1 - v0).cross(v2 - v0).normalize_or_zero().as_vec3().to_array()

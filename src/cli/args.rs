@@ -1,6 +1,10 @@
 //! The arguments of the subcommands, and the defaults of those that are left out.
 
-use std::{path::PathBuf, str::FromStr, time::Duration};
+use std::{
+    path::{Path, PathBuf},
+    str::FromStr,
+    time::Duration,
+};
 
 use clap::{Parser, Subcommand, value_parser};
 use kdray::{
@@ -12,6 +16,7 @@ use kdray::{
     frame::{Aov, Crop, Denoise, Integrator, RenderOptions, SampleRange},
     gpu::DeviceSelector,
     scene::{Scene, packed_path},
+    world::instances::Instancing,
 };
 
 #[cfg(feature = "bench")]
@@ -19,7 +24,8 @@ use super::bench::Suite;
 #[cfg(feature = "view")]
 pub use super::view_args::ViewArgs;
 use super::{
-    device_args::{DeviceList, device},
+    device_args::{DeviceList, Requirement, device},
+    doctor::probe,
     error::CliError,
     file_roles::require_ending,
     load_args::LoadArgs,
@@ -27,8 +33,8 @@ use super::{
     openjd::ProgressKind,
     or_auto::OrAuto,
     picture_args::{
-        PictureArgs, accel_help, accel_long_help, build_help, build_long_help, check_accel, listed, traversal_help,
-        traversal_long_help, with_words,
+        PictureArgs, accel_help, accel_long_help, build_help, build_long_help, check_accel, instances_help, listed,
+        traversal_help, traversal_long_help, with_words,
     },
 };
 
@@ -70,6 +76,9 @@ pub enum Command {
     Devices,
     /// Check whether this machine can render, and whether it can render a scene
     Doctor(DoctorArgs),
+    /// Print what `doctor` asks of drivers in a process of their own
+    #[command(hide = true, name = probe::SUBCOMMAND)]
+    ProbeDrivers,
     /// Describe a scene and its acceleration structure
     Inspect(InspectArgs),
     /// Write a scene file that shows what another file shows, to be edited
@@ -82,11 +91,17 @@ pub enum Command {
 
 #[derive(clap::Args)]
 pub struct RenderArgs {
-    /// Scene file (TOML), mesh file (glTF, OBJ, PLY, STL), or pack
-    pub scene: PathBuf,
+    /// Scene file (TOML), mesh file (glTF, OBJ, PLY, STL), or pack; or several, which are drawn one after the other
+    #[arg(value_name = "SCENE", required_unless_present = "list")]
+    pub scenes: Vec<PathBuf>,
+    /// Draw the scenes that this file names, too: one path a line, without blank lines and lines that begin with #; -
+    /// is standard input
+    #[arg(long, value_name = "FILE")]
+    pub list: Option<PathBuf>,
     /// Picture to write: .png, or .exr for linear radiance; with --path, #### in the name stands for the frame's
-    /// number [default: the scene's name with .png, or with .####.png, in the working directory]
-    #[arg(short, long, value_name = "FILE")]
+    /// number; of several scenes, a folder, or a name in which {} stands for the scene's name, as in out/{}.exr
+    /// [default: the scene's name with .png, or with .####.png, in the working directory]
+    #[arg(short, long, value_name = "FILE|FOLDER")]
     pub output: Option<PathBuf>,
     /// Move the camera along the keyframes of this TOML file, and write one picture per frame
     #[arg(long, value_name = "FILE", conflicts_with = "repeat")]
@@ -105,7 +120,7 @@ pub struct RenderArgs {
     /// Render only the tile I of N, for example 1/4: N tiles of rows make up the picture, and the first is tile 1
     #[arg(long, value_name = "I/N", conflicts_with = "crop")]
     pub tile: Option<Tile>,
-    /// Samples per pixel, 1 to 65536: the first sample is at the pixel's centre, further ones smooth edges [default:
+    /// Samples per pixel, 1 to 65536; with --integrator whitted, the first one is at the pixel's centre [default:
     /// the scene file's, else 1; 4 for a mesh file; 1 with --trace]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=i64::from(SampleRange::MOST)))]
     pub spp: Option<u32>,
@@ -114,6 +129,10 @@ pub struct RenderArgs {
     #[arg(long, value_name = "TIME", value_parser = time)]
     #[arg(conflicts_with_all = ["spp", "samples", "repeat", "trace", "path", "frames", "tile"])]
     pub time: Option<Duration>,
+    /// End each scene after this time from the beginning of its loading, for example 90s: with the samples so far if
+    /// there are any, else without a picture
+    #[arg(long, value_name = "TIME", value_parser = time)]
+    pub time_limit: Option<Duration>,
     /// Draw each tile of 16x16 pixels until its noise is at most this, 0.0001 to 1: 0.01 is an error of a hundredth of
     /// white; --spp is the most samples of a pixel, 32, 64, 128 or a higher power of two [default with --noise: 4096];
     /// for --integrator path, without a noise filter
@@ -145,6 +164,9 @@ pub struct RenderArgs {
     /// else a software driver]
     #[arg(long, value_name = "LIST|all")]
     pub device: Option<DeviceList>,
+    /// Fail at once unless the devices are of this kind: gpu refuses software drivers
+    #[arg(long, value_name = "KIND", conflicts_with = "cpu")]
+    pub require: Option<Requirement>,
     /// Number of times to draw the frame, 1 to 10000; the report shows the frame of median time
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u16).range(1..=10_000))]
     pub repeat: u16,
@@ -182,6 +204,9 @@ pub struct CastArgs {
     /// Find only whether each ray hits anything (occlusion), not the closest hit
     #[arg(long)]
     pub any: bool,
+    /// Whether a mesh that occurs several times is stored once: auto, flatten or keep
+    #[arg(long, value_name = "KIND", long_help = instances_help(), default_value_t)]
+    pub instances: Instancing,
     #[arg(long, value_name = "KIND", help = accel_help(), long_help = accel_long_help(), default_value_t)]
     #[arg(hide_default_value = true)]
     pub accel: AccelKind,
@@ -205,6 +230,9 @@ pub struct CastArgs {
     /// discrete GPU, else an integrated one, else a software driver]
     #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
     pub device: Option<DeviceSelector>,
+    /// Fail at once unless the devices are of this kind: gpu refuses software drivers
+    #[arg(long, value_name = "KIND", conflicts_with = "cpu")]
+    pub require: Option<Requirement>,
     /// Run under the Khronos validation layer, and fail if it reports anything
     #[arg(long)]
     pub validate: bool,
@@ -296,11 +324,11 @@ pub struct MergeArgs {
 
 impl RenderArgs {
     /// Returns the arguments with the path in the scene's pack, if the user wants frames and names no path.
-    pub fn with_packed_path(self) -> Result<Self, CliError> {
+    pub fn with_packed_path(self, scene: &Path) -> Result<Self, CliError> {
         if self.frames.is_none() || self.path.is_some() {
             return Ok(self);
         }
-        match packed_path(&self.scene)? {
+        match packed_path(scene)? {
             Some(path) => Ok(Self { path: Some(path), ..self }),
             None => Err(CliError::Usage("--frames needs --path FILE, or a pack with a path".into())),
         }
@@ -319,6 +347,35 @@ impl RenderArgs {
             return Err(CliError::Usage("--samples needs --output FILE.exr: `kdray merge` joins .exr files".into()));
         }
         Ok(())
+    }
+
+    /// Refuses arguments that are about a single scene or its report.
+    pub fn check_of_several(&self) -> Result<(), CliError> {
+        let refused = [
+            (self.path.is_some(), "--path"),
+            (self.frames.is_some(), "--frames"),
+            (self.samples.is_some(), "--samples"),
+            (self.tile.is_some(), "--tile"),
+            (self.repeat > 1, "--repeat"),
+            (self.profile.is_some(), "--profile"),
+            (self.trace.is_some(), "--trace"),
+        ];
+        match refused.iter().find(|(is_given, _)| *is_given) {
+            Some((_, name)) => Err(CliError::Usage(format!("{name} is for a single scene, without --list"))),
+            None => Ok(()),
+        }
+    }
+
+    /// Whether pictures can end with fewer samples than they should have. Frames of a film cannot, and neither can
+    /// pictures that `--skip-existing` would leave out later, measurements, or parts that are to be joined.
+    pub fn may_end_early(&self) -> bool {
+        let is_film = self.path.is_some() || self.skip_existing;
+        !is_film && self.samples.is_none() && self.repeat == 1
+    }
+
+    /// Refuses devices that are not of the kind that the user requires.
+    pub fn check_kind_of_devices(&self) -> Result<(), CliError> {
+        self.require.map_or(Ok(()), |requirement| requirement.check(self.device.as_ref()))
     }
 
     /// Refuses arguments that several devices cannot serve.
@@ -413,9 +470,10 @@ impl RenderArgs {
         }
         // Passes are timed only if some output shows the times.
         let profile = !self.quiet || self.profile.is_some() || self.trace.is_some();
-        let pixel_aovs = self.aov.iter().any(|aov| !aov.is_of_light());
+        let pixel_aovs = self.aov.iter().any(|aov| !aov.is_of_means());
         let light_layers = self.aov.iter().any(|aov| aov.is_of_light());
-        *options = RenderOptions { crop, pixel_aovs, light_layers, profile, ..options.clone() };
+        let surface_layers = self.aov.iter().any(|aov| Aov::OF_SURFACES.contains(aov));
+        *options = RenderOptions { crop, pixel_aovs, light_layers, surface_layers, profile, ..options.clone() };
         Ok(())
     }
 }
@@ -423,13 +481,25 @@ impl RenderArgs {
 impl CastArgs {
     /// Refuses arguments that contradict each other.
     pub fn check(&self) -> Result<(), CliError> {
-        check_accel(self.accel, self.traversal, self.build)?;
+        check_accel(self.accel, self.traversal, self.build, self.instances)?;
         require_ending(&self.output, "npz", "a file of hits")
     }
 
     /// Returns the user's choice of structure, build and traversal.
     pub fn request(&self) -> Request {
-        Request { accel: self.accel, build: self.build, traversal: self.traversal.pinned(), primary: None }
+        Request {
+            accel: self.accel,
+            build: self.build,
+            traversal: self.traversal.pinned(),
+            primary: None,
+            instances: self.instances,
+        }
+    }
+
+    /// Refuses a device that is not of the kind that the user requires.
+    pub fn check_device(&self) -> Result<(), CliError> {
+        let list = self.device.clone().map(|device| DeviceList::Named(vec![device]));
+        self.require.map_or(Ok(()), |requirement| requirement.check(list.as_ref()))
     }
 
     /// Returns the query: any hit or the closest hit.

@@ -4,8 +4,8 @@ use kdray::{
     cast::{CastResult, Hit, HitWriter, NO_TRIANGLE, RAYS_PER_BATCH, RayReader},
     engine::{Caster, Engine, Loaded, Opened, Work, choices::Choices},
     gpu::ContextOptions,
-    layout::Triangle,
     output,
+    world::FlatScene,
 };
 
 use super::{
@@ -27,6 +27,7 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
     output::check(&args.output)?;
     args.json.as_deref().map_or(Ok(()), output::check)?;
     set_threads(args.threads)?;
+    args.check_device()?;
 
     let rays = RayReader::open(&args.rays)?;
     let progress = Progress::new(args.quiet, 3);
@@ -44,7 +45,7 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
     let casting = format!("casting {} rays", rays.n_rays());
     let traversal = methods.traversal.value;
     let caster = engine.caster(world.geometry(), traversal)?;
-    let (done, cast_ms) = progress.stage(&casting, || cast_all(args, rays, caster, &world.scene().triangles));
+    let (done, cast_ms) = progress.stage(&casting, || cast_all(args, rays, caster, world.scene()));
     let totals = done?;
     drop(progress);
 
@@ -105,12 +106,7 @@ impl Totals {
 }
 
 /// Reads rays, casts them and writes their hits, one batch at a time.
-fn cast_all(
-    args: &CastArgs,
-    mut rays: RayReader,
-    mut caster: Caster,
-    triangles: &[Triangle],
-) -> Result<Totals, CliError> {
+fn cast_all(args: &CastArgs, mut rays: RayReader, mut caster: Caster, scene: &FlatScene) -> Result<Totals, CliError> {
     let (query, n_times) = (args.query(), u32::from(args.repeat));
     let mut totals = Totals { n_rays: 0, n_hits: 0, n_invalid: 0, ms: Some(vec![0.0; n_times as usize]) };
     let mut hits = HitWriter::new(&args.output)?;
@@ -123,6 +119,6 @@ fn cast_all(
         totals.add(&cast);
         hits.push(&cast.hits)?;
     }
-    hits.finish(triangles, query)?;
+    hits.finish(scene, query)?;
     Ok(totals)
 }

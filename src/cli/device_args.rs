@@ -2,9 +2,10 @@
 
 use std::{collections::BTreeSet, str::FromStr};
 
+use clap::ValueEnum;
 use kdray::gpu::{ContextOptions, Device, DeviceInfo, DeviceSelector, GpuError, chosen_device, devices};
 
-use super::progress::Progress;
+use super::{error::CliError, progress::Progress};
 
 /// Value of `--device` of commands that can use several devices.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -26,6 +27,34 @@ impl FromStr for DeviceList {
     }
 }
 
+/// Value of `--require`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Requirement {
+    /// Vulkan devices that are no software drivers
+    Gpu,
+}
+
+impl Requirement {
+    /// Refuses devices that are software drivers, before they are opened. Without a list, it is about the best device.
+    pub fn check(self, list: Option<&DeviceList>) -> Result<(), CliError> {
+        let selectors = match list {
+            None | Some(DeviceList::All) => vec![None],
+            Some(DeviceList::Named(named)) => named.iter().map(Some).collect(),
+        };
+        for selector in selectors {
+            let device = chosen_device(selector)?;
+            if device.is_software() {
+                let best = if selector.is_none() { "no usable GPU found: " } else { "" };
+                let name = device.name;
+                return Err(CliError::NoGpu(format!(
+                    "--require gpu: {best}{name} is a software driver; `kdray doctor` tells why there is no GPU"
+                )));
+            }
+        }
+        Ok(())
+    }
+}
+
 /// Parses a device selector: an index if the word is a number, else a part of a name.
 pub fn device(word: &str) -> Result<DeviceSelector, String> {
     match word.parse() {
@@ -40,10 +69,14 @@ pub fn device(word: &str) -> Result<DeviceSelector, String> {
 pub fn open_device(options: &ContextOptions, progress: &Progress) -> Result<Device, GpuError> {
     let device = Device::open(options)?;
     if options.device.is_none() && device.is_software() {
-        let name = &device.info().name;
-        progress.note(&format!("no GPU found, rendering in software on {name}, which is slower than --cpu"));
+        progress.note(&software_note(&device.info().name));
     }
     Ok(device)
+}
+
+/// Returns the note for a machine whose best device is a software driver: `--cpu` is faster.
+pub fn software_note(name: &str) -> String {
+    format!("no GPU found, rendering in software on {name}, which is slower than --cpu")
 }
 
 /// Opens the devices of the list, or the best device if there is no list. If the devices differ in name or driver, a

@@ -1,6 +1,6 @@
 //! The errors of a command, and their exit codes.
 
-use std::io;
+use std::{io, path::PathBuf, time::Duration};
 
 #[cfg(feature = "view")]
 use kdray::view::ViewError;
@@ -16,6 +16,14 @@ pub enum CliError {
     Usage(String),
     #[error(transparent)]
     Scene(#[from] SceneError),
+    #[error("`{path}`: cannot be read as a list of scenes: {source}", path = path.display())]
+    List { path: PathBuf, source: io::Error },
+    /// The scene has no picture when its time is over.
+    #[error("nothing was drawn within --time-limit {}: it was still {present}", humantime::format_duration(*limit))]
+    TimeLimit { limit: Duration, present: &'static str },
+    /// Some of several scenes have failed. `exit_code` is that of the first one.
+    #[error("{summary}")]
+    Scenes { summary: String, exit_code: u8 },
     #[error(transparent)]
     Rays(#[from] RayFileError),
     #[error(transparent)]
@@ -28,6 +36,8 @@ pub enum CliError {
     Memory(#[from] OutOfMemory),
     #[error("{0}; a smaller --size, a --crop or --primary trace takes less")]
     DeviceMemory(GpuError),
+    #[error("{0}")]
+    NoGpu(String),
     #[cfg(feature = "view")]
     #[error("{0}")]
     Window(String),
@@ -45,14 +55,16 @@ pub enum CliError {
 }
 
 impl CliError {
-    /// Returns the exit code: 2 for usage; 3 for scene, rays or parts, also if they need more memory than there is; 4
-    /// for the device; 5 for output.
+    /// Returns the exit code: 2 for usage; 3 for scene, rays or parts, also if they need more memory or time than there
+    /// is; 4 for the device; 5 for output.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) | Self::Output(OutputError::UnknownEnding { .. }) => 2,
+            Self::Scenes { exit_code, .. } => *exit_code,
+            Self::List { .. } | Self::TimeLimit { .. } => 3,
             Self::Scene(_) | Self::Rays(_) | Self::Merge(_) | Self::Pack(_) | Self::Memory(_) => 3,
             Self::Device(_) | Self::DeviceMemory(_) | Self::Validation(_) => 4,
-            Self::NoProcessor(_) => 4,
+            Self::NoProcessor(_) | Self::NoGpu(_) => 4,
             #[cfg(feature = "bench")]
             Self::WrongHits(_) => 4,
             #[cfg(feature = "view")]

@@ -1,8 +1,11 @@
-//! Prints the library's log events as `note: …`, `warning: …` and `error: …` lines above the progress bar.
+//! Prints the library's log events as `note: …`, `warning: …` and `error: …` lines above the progress bar. Of several
+//! scenes, each line begins with the present one.
 
 use std::{
     fmt,
     io::{self, Write},
+    path::Path,
+    sync::{Mutex, PoisonError},
 };
 
 use indicatif::ProgressBar;
@@ -43,6 +46,22 @@ fn only_events(level: Level) -> impl layer::Filter<Registry> {
     filter.with_max_level_hint(LevelFilter::from_level(level))
 }
 
+/// The scene that is drawn now, if it is one of several.
+static SCENE: Mutex<Option<String>> = Mutex::new(None);
+
+/// Sets the scene that is drawn now, one of several. `None` after the last one.
+pub fn set_scene(scene: Option<&Path>) {
+    *SCENE.lock().unwrap_or_else(PoisonError::into_inner) = scene.map(|scene| scene.display().to_string());
+}
+
+/// Returns the message with the present scene before it, unless it begins with it.
+pub fn of_scene(message: &str) -> String {
+    match &*SCENE.lock().unwrap_or_else(PoisonError::into_inner) {
+        Some(scene) if !message.starts_with(scene) => format!("{scene}: {message}"),
+        _ => message.to_owned(),
+    }
+}
+
 /// Format of an event: `level: message` on one line, with control characters escaped.
 struct Line;
 
@@ -64,7 +83,7 @@ where
         // A message may quote a name from a file.
         let mut remark = String::new();
         context.field_format().format_fields(Writer::new(&mut remark), event)?;
-        writeln!(writer, "{label}: {}", one_line(&remark))
+        writeln!(writer, "{label}: {}", one_line(&of_scene(&remark)))
     }
 }
 

@@ -1,5 +1,6 @@
 //! Arguments that replace the camera, the lights and the background of a scene.
 
+use clap::ValueEnum;
 use glam::{DVec3, Vec3};
 use kdray::scene::{LightChoice, Look, MaterialChoice, Preset, Sky, SkyChoice, Up};
 
@@ -36,6 +37,9 @@ pub struct LookArgs {
     #[arg(long, value_name = "ELEVATION[,AZIMUTH[,TURBIDITY]]", allow_hyphen_values = true, value_parser = sky)]
     #[arg(conflicts_with_all = ["light", "background"])]
     pub sky: Option<SkyChoice>,
+    /// Faces that the camera does not see: the back faces of materials of glTF files that are not doubleSided, or none
+    #[arg(long, value_name = "auto|off", default_value = "auto")]
+    pub cull: CullWord,
     #[arg(long = "material", value_name = "[NAME=]PRESET", help = MATERIAL, long_help = material_long_help())]
     pub materials: Vec<MaterialChoice>,
     /// Background, linear red, green and blue, each at least 0 [default: the scene's]
@@ -46,10 +50,29 @@ pub struct LookArgs {
 impl LookArgs {
     /// Returns the user's choices.
     pub fn look(&self) -> Look {
-        let &Self { up, eye, target, fov, light, sky, background, ref materials } = self;
+        let &Self { up, eye, target, fov, light, sky, background, cull, ref materials } = self;
         let materials = materials.clone();
-        Look { up: up.pinned(), eye, target, vertical_fov_degrees: fov, light, sky, background, materials }
+        Look {
+            up: up.pinned(),
+            eye,
+            target,
+            vertical_fov_degrees: fov,
+            light,
+            sky,
+            background,
+            shows_back_faces: cull == CullWord::Off,
+            materials,
+        }
     }
+}
+
+/// Value of `--cull`.
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+pub enum CullWord {
+    /// As the materials of glTF files say
+    Auto,
+    /// The camera sees both sides of all faces
+    Off,
 }
 
 /// Returns the help text of `--up` with all words explained.

@@ -19,7 +19,7 @@ pub fn run(args: &MergeArgs) -> Result<(), CliError> {
     output::check(&args.output)?;
     // Joining is quick, so only a scheduler is told of it.
     let kind = if args.progress == ProgressKind::Auto { ProgressKind::None } else { args.progress };
-    let progress = Progress::of_kind(kind, args.quiet, &SHARES, None);
+    let progress = Progress::of_kind(kind, args.quiet, (&SHARES, 1), None);
     let noun = if args.parts.len() == 1 { "part" } else { "parts" };
     let joining = format!("joining {} {noun}", args.parts.len());
     let merged = progress.stage(&joining, || merge::merge(&args.parts)).0?;

@@ -15,6 +15,7 @@ mod doctor;
 mod error;
 mod file_roles;
 mod inspect;
+mod interrupt;
 mod load_args;
 mod log;
 mod look_args;
@@ -80,6 +81,7 @@ fn run(args: Args) -> Result<(), CliError> {
         Command::Pack(args) => pack::run(&args),
         Command::Devices => devices::run(),
         Command::Doctor(args) => doctor::run(&args),
+        Command::ProbeDrivers => doctor::probe::print_devices(),
         Command::Inspect(args) => inspect::run(&args),
         Command::Convert(args) => convert::run(&args),
         #[cfg(feature = "bench")]

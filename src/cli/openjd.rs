@@ -110,8 +110,10 @@ fn say(what: &str, message: &str) {
 /// Tells a scheduler the progress of a command that consists of stages.
 pub struct OpenJd {
     percents: Percents,
-    /// The share of the work that each stage is. The sum is 1.
+    /// The share of a scene's work that each stage is. The sum is 1.
     shares: &'static [f64],
+    /// Number of scenes, each of which has all stages.
+    n_scenes: u64,
     state: Mutex<State>,
 }
 
@@ -123,8 +125,8 @@ struct State {
 }
 
 impl OpenJd {
-    pub fn new(percents: Percents, shares: &'static [f64]) -> Self {
-        let begun = Self { percents, shares, state: Mutex::new(State { stages: 0.0, told: None }) };
+    pub fn new(percents: Percents, shares: &'static [f64], n_scenes: u64) -> Self {
+        let begun = Self { percents, shares, n_scenes, state: Mutex::new(State { stages: 0.0, told: None }) };
         begun.set_stages(0.0);
         begun
     }
@@ -152,8 +154,12 @@ impl OpenJd {
 
     /// Returns the percents of the task that are done.
     fn percent(&self, stages: f64) -> f64 {
+        let n_stages = self.shares.len() as f64;
+        let n_drawn = (stages / n_stages).floor();
+        let present = stages - n_drawn * n_stages;
         let shares = self.shares.iter().enumerate();
-        let done: f64 = shares.map(|(stage_ix, share)| share * (stages - stage_ix as f64).clamp(0.0, 1.0)).sum();
+        let of_present: f64 = shares.map(|(stage_ix, share)| share * (present - stage_ix as f64).clamp(0.0, 1.0)).sum();
+        let done = (n_drawn + of_present) / self.n_scenes as f64;
         let Percents { first, last } = self.percents;
         // Rounding up would tell the end before it comes.
         ((first + (last - first) * done.min(ALMOST)) * 10.0).floor() / 10.0
@@ -190,11 +196,14 @@ mod tests {
 
     #[test]
     fn stages_have_their_shares_of_the_percents() {
-        let openjd = OpenJd::new(Percents { first: 0.0, last: 100.0 }, &[0.25, 0.75]);
+        let openjd = OpenJd::new(Percents { first: 0.0, last: 100.0 }, &[0.25, 0.75], 1);
         let percents = [0.0, 0.5, 1.0, 1.5, 2.0].map(|stages| openjd.percent(stages));
         assert_eq!(percents, [0.0, 12.5, 25.0, 62.5, 99.9]);
-        let second_half = OpenJd::new(Percents { first: 50.0, last: 100.0 }, &[1.0]);
+        let second_half = OpenJd::new(Percents { first: 50.0, last: 100.0 }, &[1.0], 1);
         assert_eq!([0.0, 0.5, 1.0].map(|stages| second_half.percent(stages)), [50.0, 75.0, 99.9]);
+        let two_scenes = OpenJd::new(Percents { first: 0.0, last: 100.0 }, &[0.25, 0.75], 2);
+        let percents = [0.0, 1.0, 2.0, 2.5, 4.0].map(|stages| two_scenes.percent(stages));
+        assert_eq!(percents, [0.0, 12.5, 50.0, 56.2, 99.9]);
         // Late reports of other threads do not move it back.
         openjd.set_stages(1.5);
         openjd.set_stages(0.5);

@@ -6,6 +6,7 @@ use kdray::{
     engine::choices::{BuildPolicy, Request},
     frame::{Integrator, PathOptions, PixelFilter, Primary, RenderOptions, Tonemap},
     scene::{DenoiseChoice, PictureChoices},
+    world::instances::Instancing,
 };
 
 use super::{args::Size, error::CliError, or_auto::OrAuto};
@@ -39,8 +40,8 @@ pub struct PictureArgs {
     #[arg(help = with_words(TONEMAP, Some("the scene's"), &Tonemap::words()))]
     #[arg(long_help = listed(TONEMAP, "the scene's", &Tonemap::descriptions()))]
     pub tonemap: Option<Tonemap>,
-    /// Most light that a path adds to its pixel after its first hit, in any colour, above 0; bright specks fade, and so
-    /// does some of the light [default: any amount]
+    /// Most light of each contribution of a path after its first hit, in any colour, above 0; bright specks fade, and
+    /// so does some of the light [default: any amount]
     #[arg(long, value_name = "RADIANCE", value_parser = positive)]
     pub clamp: Option<f32>,
     #[arg(long, value_name = "FILTER", help = with_words(FILTER, Some("tent"), &PixelFilter::words()))]
@@ -54,6 +55,9 @@ pub struct PictureArgs {
     /// that of the camera's target]
     #[arg(long, value_name = "D", value_parser = positive, requires = "aperture")]
     pub focus: Option<f32>,
+    /// Whether a mesh that occurs several times is stored once: auto, flatten or keep
+    #[arg(long, value_name = "KIND", long_help = instances_help(), default_value_t)]
+    pub instances: Instancing,
     #[arg(long, value_name = "KIND", help = accel_help(), long_help = accel_long_help(), default_value_t)]
     #[arg(hide_default_value = true)]
     pub accel: AccelKind,
@@ -92,6 +96,11 @@ const TRAVERSAL: &str = "Algorithm by which rays go through the kd-tree";
 const PRIMARY: &str = "How primary rays find their triangles";
 const BUILD: &str = "Which kd-tree is built";
 
+/// Returns the help text of `--instances` with all words explained.
+pub fn instances_help() -> String {
+    format!("Whether a mesh that occurs several times is stored once:\n{}", Instancing::descriptions())
+}
+
 /// Returns the help text of `--accel`.
 pub fn accel_help() -> String {
     with_words(ACCEL, Some("kdtree"), &AccelKind::words())
@@ -115,8 +124,16 @@ fn primary_long_help() -> String {
 }
 
 /// Refuses arguments for kd-trees if the structure is a grid.
-pub fn check_accel(accel: AccelKind, traversal: OrAuto<Traversal>, build: BuildPolicy) -> Result<(), CliError> {
+pub fn check_accel(
+    accel: AccelKind,
+    traversal: OrAuto<Traversal>,
+    build: BuildPolicy,
+    instances: Instancing,
+) -> Result<(), CliError> {
     check_traversal(accel, traversal.pinned())?;
+    if accel != AccelKind::KdTree && instances == Instancing::Keep {
+        return Err(CliError::Usage(format!("--instances keep needs kd-trees, not --accel {accel}")));
+    }
     if accel != AccelKind::KdTree && build != BuildPolicy::Auto {
         return Err(CliError::Usage(format!("--build chooses a kd-tree: with --accel {accel}, a grid is built")));
     }
@@ -188,7 +205,7 @@ pub fn traversals_of_devices() -> String {
 impl PictureArgs {
     /// Refuses arguments that contradict each other.
     pub fn check(&self) -> Result<(), CliError> {
-        check_accel(self.accel, self.traversal, self.build)?;
+        check_accel(self.accel, self.traversal, self.build, self.instances)?;
         if let (Some(word @ (DenoiseWord::Off | DenoiseWord::Edge)), Some(_)) = (self.denoise, self.denoise_threshold) {
             let word = if word == DenoiseWord::Off { "off" } else { "edge" };
             return Err(CliError::Usage(format!("--denoise-threshold has no meaning with --denoise {word}")));
@@ -203,6 +220,7 @@ impl PictureArgs {
             build: self.build,
             traversal: self.traversal.pinned(),
             primary: self.primary.pinned(),
+            instances: self.instances,
         }
     }
 

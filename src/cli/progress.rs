@@ -27,6 +27,10 @@ const BAR_STEPS: u64 = 1000;
 /// Shows the stages of a command.
 pub struct Progress {
     shown: Shown,
+    /// Number of progress stages per scene.
+    n_stages: u64,
+    /// Number of scenes. If there are several, a line for each stage of each would be too much.
+    n_scenes: u64,
     /// Whether notes are left out.
     quiet: bool,
 }
@@ -82,18 +86,33 @@ impl Progress {
     /// Shows the progress of a command that has `n_stages` stages. The library's warnings and errors appear above the
     /// bar, or as lines of their own.
     pub fn new(quiet: bool, n_stages: u64) -> Self {
-        Self { shown: Self::for_people(quiet, n_stages), quiet }.logging(None)
+        Self { shown: Self::for_people(quiet, n_stages), n_stages, n_scenes: 1, quiet }.logging(None)
     }
 
-    /// Shows the progress of a command as the user wants it. `shares`: the share of the work that each stage is. Also
-    /// collects the library's tracing spans in `spans`.
-    pub fn of_kind(kind: ProgressKind, quiet: bool, shares: &'static [f64], spans: Option<&Spans>) -> Self {
+    /// Shows the progress of a command as the user wants it. `shares`: the share of a scene's work that each stage is;
+    /// all of the `n_scenes` scenes have the same share. Also collects the library's tracing spans in `spans`.
+    pub fn of_kind(
+        kind: ProgressKind,
+        quiet: bool,
+        (shares, n_scenes): (&'static [f64], u64),
+        spans: Option<&Spans>,
+    ) -> Self {
+        let n_stages = shares.len() as u64;
         let shown = match kind {
-            ProgressKind::Auto => Self::for_people(quiet, shares.len() as u64),
-            ProgressKind::OpenJd(percents) => Shown::Meter(Meter::OpenJd(Arc::new(OpenJd::new(percents, shares)))),
+            ProgressKind::Auto => Self::for_people(quiet, n_stages * n_scenes),
+            ProgressKind::OpenJd(percents) => {
+                Shown::Meter(Meter::OpenJd(Arc::new(OpenJd::new(percents, shares, n_scenes))))
+            }
             ProgressKind::None => Shown::Nowhere,
         };
-        Self { shown, quiet }.logging(spans)
+        Self { shown, n_stages, n_scenes, quiet }.logging(spans)
+    }
+
+    /// Notes that the scene of this index begins, whichever stages of the last one were left out.
+    pub fn begin_scene(&self, scene_ix: usize) {
+        if let Some(meter) = self.meter() {
+            meter.set_position(scene_ix as u64 * self.n_stages * BAR_STEPS);
+        }
     }
 
     fn for_people(quiet: bool, n_stages: u64) -> Shown {
@@ -127,6 +146,7 @@ impl Progress {
     pub fn stage<T>(&self, message: &str, work: impl FnOnce() -> T) -> (T, f64) {
         match &self.shown {
             Shown::Nowhere => {}
+            Shown::Lines if self.n_scenes > 1 => {}
             Shown::Lines => print_line("kdray", message),
             Shown::Meter(meter) => meter.begin_stage(message),
         }
@@ -159,10 +179,21 @@ impl Progress {
 
     /// Prints a note: something that the user should know but need not act on.
     pub fn note(&self, message: &str) {
+        if !self.quiet {
+            self.beside(|| print_line("note", &log::of_scene(message)));
+        }
+    }
+
+    /// Prints why the current scene of a list failed.
+    pub fn error(&self, message: &str) {
+        self.beside(|| print_line("error", &log::of_scene(message)));
+    }
+
+    /// Hides the bar while something is printed.
+    pub fn beside<T>(&self, print: impl FnOnce() -> T) -> T {
         match &self.shown {
-            _ if self.quiet => {}
-            Shown::Meter(Meter::Bar(bar)) => bar.suspend(|| print_line("note", message)),
-            _ => print_line("note", message),
+            Shown::Meter(Meter::Bar(bar)) => bar.suspend(print),
+            _ => print(),
         }
     }
 }
@@ -265,7 +296,7 @@ impl StepProgress<'_> {
             Shown::Nowhere => {}
             Shown::Lines if self.last_line.elapsed() >= PAUSE => {
                 self.last_line = Instant::now();
-                print_line("kdray", &self.text());
+                print_line("kdray", &log::of_scene(&self.text()));
             }
             Shown::Lines => {}
             Shown::Meter(meter) => self.move_meter(meter),
@@ -333,7 +364,7 @@ mod tests {
     use super::*;
 
     fn shown(shown: Shown) -> Progress {
-        Progress { shown, quiet: false }
+        Progress { shown, n_stages: 3, n_scenes: 1, quiet: false }
     }
 
     #[test]

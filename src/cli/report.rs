@@ -1,6 +1,6 @@
 //! The report of `kdray render`: the times and rays of a frame, as tables and as JSON.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use kdray::{
     accel::{Statistics, grid::DeviceBuild},
@@ -285,6 +285,22 @@ impl Report {
         text.push('\n');
         text += &self.files_text();
         text
+    }
+
+    /// The report of one of several scenes, a line.
+    pub fn line(&self, scene: &Path) -> String {
+        let Options { width, height, .. } = &self.options;
+        let samples = if self.samples == 1 { "sample" } else { "samples" };
+        let files = self.extra_files.iter().chain(&self.pictures).map(|path| path.display().to_string());
+        format!(
+            "{}: {} triangles, {width}x{height}, {} {samples}, loaded in {:.0} ms, picture after {:.0} ms, wrote {}",
+            scene.display(),
+            self.triangles,
+            self.samples,
+            self.load_ms,
+            self.render_ms,
+            files.collect::<Vec<_>>().join(" and ")
+        )
     }
 
     fn files_text(&self) -> String {

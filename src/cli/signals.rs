@@ -1,7 +1,8 @@
 //! Handles signals.
 //!
-//! On SIGHUP, SIGINT and SIGTERM, the process removes the temporary files of outputs before it ends. A write beyond
-//! the limit on the size of files (`ulimit -f`) returns an error; by default, SIGXFSZ would end the process.
+//! On SIGHUP, SIGINT and SIGTERM, the process removes the temporary files of outputs before it ends. While there is a
+//! picture to write, the first SIGINT lets it be written before ([`interrupt`]). A write beyond the limit on the size
+//! of files (`ulimit -f`) returns an error; by default, SIGXFSZ would end the process.
 
 use std::{
     fs,
@@ -17,6 +18,8 @@ use signal_hook::{
     low_level::emulate_default_handler,
 };
 
+use super::interrupt;
+
 /// Installs the signal handlers. A signal whose handler the system refuses keeps its default.
 pub fn handle() {
     let ending: Vec<_> = [SIGHUP, SIGINT, SIGTERM].into_iter().filter(|signal| !is_ignored(*signal)).collect();
@@ -25,7 +28,7 @@ pub fn handle() {
         let signals = Signals::new(ending);
         // `handle` waits for this message, so that the handlers are installed when it returns.
         let _ = ready.send(());
-        signals.map(end_at_the_first)
+        signals.map(end_by)
     };
     if thread::Builder::new().name("signals".to_owned()).spawn(wait).is_ok() {
         // An error means that the thread has ended, and the handlers with it.
@@ -35,13 +38,26 @@ pub fn handle() {
     let _ = flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)));
 }
 
-/// Waits for a signal, removes temporary files and ends the process as the signal does by default. A shell reports
-/// exit code 128 + signal.
-fn end_at_the_first(mut signals: Signals) {
-    if let Some(signal) = signals.forever().next() {
-        output::remove_temporaries();
-        let _ = emulate_default_handler(signal);
+/// Waits for a signal that ends the process at once, and ends it.
+fn end_by(mut signals: Signals) {
+    for signal in signals.forever() {
+        if signal == SIGINT && interrupt::ask() {
+            tracing::info!("interrupted: kdray ends when the present picture is written; Ctrl-C again ends it at once");
+            continue;
+        }
+        end(signal);
     }
+}
+
+/// Ends the process as Ctrl-C does by default.
+pub fn end_by_interrupt() {
+    end(SIGINT);
+}
+
+/// Removes temporary files and ends the process as the signal does by default. A shell reports exit code 128 + signal.
+fn end(signal: i32) {
+    output::remove_temporaries();
+    let _ = emulate_default_handler(signal);
 }
 
 /// Returns whether the process was started with the signal ignored, as `nohup` does with SIGHUP. Such a signal stays

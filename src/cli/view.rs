@@ -14,6 +14,7 @@ use kdray::{
 use serde::Serialize;
 
 use super::{
+    device_args::software_note,
     error::CliError,
     file_roles::FileRoles,
     print, print_line,
@@ -58,6 +59,7 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
         ViewOptions {
             settings,
             device: ContextOptions::new(args.device.clone(), args.validate),
+            on_cpu: args.cpu,
             overlay: !args.no_overlay,
             tour,
             screenshot: args.screenshot.clone(),
@@ -68,19 +70,33 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
             print: |text| drop(print(text)),
         },
     )?;
-    if let Some(path) = &args.profile {
-        output::write(
-            path,
-            &json(&Profile { schema: SCHEMA, scene: &scene_name, budget_ms: args.budget_ms, vsync, view: &report }),
-        )?;
-    }
-    if !args.quiet {
-        print(&format!("{}\n", report.choices))?;
-    }
-    for message in &report.validation {
-        print_line("validation", message);
-    }
-    if report.validation.is_empty() { Ok(()) } else { Err(CliError::Validation(report.validation.len())) }
+    let tell = || {
+        if let Some(path) = &args.profile {
+            let profile =
+                Profile { schema: SCHEMA, scene: &scene_name, budget_ms: args.budget_ms, vsync, view: &report };
+            output::write(path, &json(&profile))?;
+        }
+        if let Some(choices) = report.choices.as_ref().filter(|_| !args.quiet) {
+            print(&format!("{choices}\n"))?;
+        }
+        report.validation.iter().for_each(|message| print_line("validation", message));
+        match report.validation.len() {
+            0 => Ok(()),
+            n => Err(CliError::Validation(n)),
+        }
+    };
+    if report.is_abandoned { end_at_once(&tell()) } else { tell() }
+}
+
+/// Ends the process without the handlers of its libraries, since a driver that still compiles uses what they release.
+fn end_at_once(outcome: &Result<(), CliError>) -> ! {
+    let code = outcome.as_ref().err().map_or(0, CliError::exit_code);
+    outcome.as_ref().err().into_iter().for_each(|error| print_line("error", &error.to_string()));
+    output::remove_temporaries();
+    #[cfg(unix)]
+    signal_hook::low_level::exit(code.into());
+    #[cfg(not(unix))]
+    std::process::exit(code.into())
 }
 
 /// Returns the function that loads the files which the user opens in the window. The options of pictures on the
@@ -114,7 +130,11 @@ struct Start {
 
 /// Loads the scene and builds its structure, or returns the start of a window that waits for a file.
 fn load(args: &ViewArgs, progress: &Progress) -> Result<Start, CliError> {
-    let processor = Processor::of_device(&chosen_device(args.device.as_ref())?);
+    let device = chosen_device(args.device.as_ref())?;
+    let processor = if args.cpu { Processor::Cpu } else { Processor::of_device(&device) };
+    if processor == Processor::SoftwareDriver && args.device.is_none() {
+        progress.note(&software_note(&device.name));
+    }
     let Some(path) = &args.scene else {
         let settings = load_settings(args, processor, Default::default());
         return Ok(Start { loaded: LoadedScene::none(&settings)?, tour: None });

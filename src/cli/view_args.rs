@@ -62,9 +62,12 @@ pub struct ViewArgs {
     /// Write frame times and input latency to this JSON file
     #[arg(long, value_name = "FILE")]
     pub profile: Option<PathBuf>,
-    /// Number of CPU threads for loading and building, 1 to 1024 [default: one per processor]
+    /// Number of CPU threads for loading, building and --cpu, 1 to 1024 [default: one per processor]
     #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
+    /// Draw on the CPU; Vulkan only shows the pictures
+    #[arg(long, conflicts_with = "shaders")]
+    pub cpu: bool,
     /// Vulkan device to use: its index in `kdray devices`, or a part of its name [default: a
     /// discrete GPU, else an integrated one, else a software driver]
     #[arg(long, value_name = "INDEX|NAME", value_parser = device)]

@@ -100,7 +100,7 @@ mod tests {
             _ => origin,
         };
         let t_max = if i.is_multiple_of(3) { 2.0 * t } else { f32::INFINITY };
-        SearchRay { origin, direction, t_min: 0.0, t_max, source_triangle: 0 }
+        SearchRay { origin, direction, t_min: 0.0, t_max, source_triangle: 0, alpha_seed: 0 }
     }
 
     #[test]

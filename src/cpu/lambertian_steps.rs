@@ -14,7 +14,10 @@ use super::{
     vec3x16::{Vec3sSoa, Vec3x16, get, greater, lesser, set},
 };
 use crate::{
-    layout::{AreaLight, LEAST_SURVIVAL, PathRay, ROULETTE_DEPTH, SHADOW_RAY_SHARE, SHADOW_RAY_WAITS, ShadowRay},
+    layout::{
+        AreaLight, LEAST_SURVIVAL, MOST_ADDED_LIGHT, PathRay, ROULETTE_DEPTH, SHADOW_RAY_SHARE, SHADOW_RAY_WAITS,
+        ShadowRay,
+    },
     reference::{
         emitters::{LIGHT_HIDES_UP_TO, LightSample},
         path_vertex::PAIRS_OF_HIT,
@@ -162,7 +165,7 @@ fn set_shadow_rays<S: Simd>(
     let share = sample_pdf.simd_gt(0.0).select(own * own / (own * own + other * other), one);
     let arriving = throughput.times(value).times(light) * share;
     let arriving = arriving.min(f32x16::splat(simd, bounce.clamp));
-    exist &= value.any_positive() & arriving.all_below(1.0e30) & arriving.any_positive();
+    exist &= value.any_positive() & arriving.all_below(f32::INFINITY) & arriving.any_positive();
     steps.have_shadow_ray = exist.to_bitmask() as LaneMask;
     let offset = surfaces.offset(direction);
     let to_light = direction * distance - offset;
@@ -170,7 +173,8 @@ fn set_shadow_rays<S: Simd>(
     let is_far = distance.simd_eq(f32::INFINITY);
     steps.shadow_ray_origin = (surfaces.point_world + offset).to_arrays();
     steps.shadow_ray_direction = Vec3x16::select(is_far, direction, to_light / length).to_arrays();
-    steps.shadow_ray_light = arriving.max(f32x16::splat(simd, 0.0)).to_arrays();
+    let bounded = arriving.max(f32x16::splat(simd, 0.0)).min(f32x16::splat(simd, MOST_ADDED_LIGHT));
+    steps.shadow_ray_light = bounded.to_arrays();
     steps.shadow_ray_t_max = is_far.select(distance, length * SHADOW_RAY_SHARE).to_array();
 }
 

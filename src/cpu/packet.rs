@@ -55,6 +55,7 @@ pub struct Packet<S: Simd> {
     shears: Shears<S>,
     t_min: f32x16<S>,
     source_triangle: u32x16<S>,
+    alpha_seed: [u32; LANES],
     best: HitColumns<S>,
     /// The t of the rays' `best` hits. It is minus infinity for a ray that is done, so that all its t intervals are
     /// empty.
@@ -115,10 +116,15 @@ fn dot<S: Simd>(normal: Vec3, v: &[f32x16<S>; 3]) -> f32x16<S> {
     normal.x * v[0] + normal.y * v[1] + normal.z * v[2]
 }
 
-/// Returns those of `lanes` whose hits count.
+/// Returns those of `lanes` whose hits pass the alpha test, and are not on hidden triangles.
 #[cold]
-fn accepted<S: Simd>(inputs: &KernelInputs<impl ReadCounter>, found: &HitColumns<S>, lanes: LaneMask) -> LaneMask {
-    let counts = |lane: &usize| lanes >> lane & 1 == 1 && inputs.is_accepted(&found.of_lane(*lane));
+fn solid<S: Simd>(
+    inputs: &KernelInputs<impl ReadCounter>,
+    found: &HitColumns<S>,
+    alpha_seed: &[u32; LANES],
+    lanes: LaneMask,
+) -> LaneMask {
+    let counts = |lane: &usize| lanes >> lane & 1 == 1 && inputs.is_solid_at(&found.of_lane(*lane), alpha_seed[*lane]);
     (0..LANES).filter(counts).fold(0, |mask, lane| mask | 1 << lane)
 }
 
@@ -153,6 +159,7 @@ impl<S: Simd> Packet<S> {
             shears: Shears::of(&origin, &direction),
             t_min,
             source_triangle: u32x16::load_array_ref(simd, &search_rays.source_triangle),
+            alpha_seed: search_rays.alpha_seed,
             best: HitColumns::nothing(t_max),
             t_best: t_max,
         };
@@ -238,13 +245,16 @@ impl<S: Simd> Packet<S> {
             if lanes == 0 {
                 continue;
             }
-            if let Some((found, hit)) = self.shears.intersect_triangle(triangle, triangle_ix, axis, lanes) {
+            if let Some((found, hit, is_back)) = self.shears.intersect_triangle(triangle, triangle_ix, axis, lanes) {
                 let nearer = found.t.simd_lt(self.best.t)
                     | (found.t.simd_eq(self.best.t) & found.triangle_ix.simd_lt(self.best.triangle_ix));
                 let is_new = found.t.simd_gt(self.t_min) & found.triangle_ix.simd_ne(self.source_triangle);
                 let mut is_better = hit & nearer & is_new;
+                if inputs.passes_from_behind(triangle_ix) {
+                    is_better &= !is_back;
+                }
                 if inputs.lets_rays_pass() {
-                    let lanes = accepted(inputs, &found, is_better.to_bitmask() as LaneMask);
+                    let lanes = solid(inputs, &found, &self.alpha_seed, is_better.to_bitmask() as LaneMask);
                     is_better = mask32x16::from_bitmask(self.t_min.simd, lanes.into());
                 }
                 self.best = found.or(self.best, is_better);
@@ -270,6 +280,7 @@ impl<S: Simd> Packet<S> {
                 shear: self.shears.of_lane(lane),
                 t_min: self.t_min.as_array()[lane],
                 source_triangle: self.source_triangle.as_array()[lane],
+                alpha_seed: self.alpha_seed[lane],
             },
             origin: Vec3A::from_vec4(Vec4::from_array(row(&self.origin, lane))),
             direction: Vec3A::from_vec4(Vec4::from_array(row(&self.direction, lane))),

@@ -133,8 +133,8 @@ impl<S: Simd> Shears<S> {
     }
 
     /// Finds what [`Shear::intersect_triangle`] finds for each ray of `lanes`, whose longest axis is `axis`. Returns
-    /// the hits and the lanes in which they are valid, or none if the rounded edge functions already exclude all
-    /// rays.
+    /// the hits, the lanes in which they are valid, and those of them whose rays come from behind the triangle; or none
+    /// if the rounded edge functions already exclude all rays.
     #[inline(always)]
     pub fn intersect_triangle(
         &self,
@@ -142,7 +142,7 @@ impl<S: Simd> Shears<S> {
         triangle_ix: u32,
         axis: usize,
         lanes: LaneMask,
-    ) -> Option<(HitColumns<S>, mask32x16<S>)> {
+    ) -> Option<(HitColumns<S>, mask32x16<S>, mask32x16<S>)> {
         let corners = [
             self.corner(axis_last(triangle.v0.to_array(), axis)),
             self.corner(axis_last(triangle.v1.to_array(), axis)),
@@ -161,33 +161,35 @@ impl<S: Simd> Shears<S> {
         corners: &[[[f32; LANES]; 3]; 3],
         triangle_ixs: u32x16<S>,
         axis: usize,
-    ) -> Option<(HitColumns<S>, mask32x16<S>)> {
+    ) -> Option<(HitColumns<S>, mask32x16<S>, mask32x16<S>)> {
         let [v0, v1, v2] = corners;
         let corners = [self.corners(v0, axis), self.corners(v1, axis), self.corners(v2, axis)];
         self.hits(corners, triangle_ixs, mask32x16::splat(self.x.simd, true))
     }
 
-    /// Returns the hits of triangles by their sheared corners, and those of `lanes` in which they are valid. Returns
-    /// none if the rounded edge functions already exclude all hits.
+    /// Returns the hits of triangles by their sheared corners, those of `lanes` in which they are valid, and those in
+    /// which [`Shear::is_back_face`]. Returns none if the rounded edge functions already exclude all hits.
     #[inline(always)]
     fn hits(
         &self,
         [[x0, y0, z0], [x1, y1, z1], [x2, y2, z2]]: [[f32x16<S>; 3]; 3],
         triangle_ix: u32x16<S>,
         lanes: mask32x16<S>,
-    ) -> Option<(HitColumns<S>, mask32x16<S>)> {
+    ) -> Option<(HitColumns<S>, mask32x16<S>, mask32x16<S>)> {
         let edges = [x2 * y1 - y2 * x1, x0 * y2 - y0 * x2, x1 * y0 - y1 * x0];
         let near = !is_outside(edges) & lanes;
         if near.all_false() {
             return None;
         }
         let errors = [edge_error([x2, y2], [x1, y1]), edge_error([x0, y0], [x2, y2]), edge_error([x1, y1], [x0, y0])];
-        let hit = near & is_inside(with_exact_signs(edges, errors));
+        let signed = with_exact_signs(edges, errors);
+        let hit = near & is_inside(signed);
+        let is_back = !(sum_of(signed).simd_lt(0.0) ^ self.z.simd_gt(0.0));
         let edges = exact_edges(edges, errors);
         let inv_det = 1.0 / sum_of(edges);
         let (u, v) = (edges[1] * inv_det, edges[2] * inv_det);
         let t = (z0 + (u * (z1 - z0) + v * (z2 - z0))) * self.z;
-        Some((HitColumns { t, triangle_ix, u, v }, hit))
+        Some((HitColumns { t, triangle_ix, u, v }, hit, is_back))
     }
 }
 

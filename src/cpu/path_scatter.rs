@@ -125,7 +125,9 @@ impl BounceOfPaths<'_> {
     }
 
     fn is_lambertian(&self, hit: &Hit) -> bool {
-        self.are_lambertian[self.inputs.triangle_materials[hit.triangle_ix as usize] as usize]
+        // Their steps by sixteen know no instances.
+        self.inputs.instanced.is_none()
+            && self.are_lambertian[self.inputs.triangle_materials[hit.triangle_ix as usize] as usize]
     }
 
     fn key_of(&self, path_ix: u32) -> SampleKey {

@@ -19,7 +19,7 @@ use crate::{
         path_compact,
         path_layers::path_layers,
         path_scatter::PathBuffers,
-        path_trace::{closest_hits_by, ray_of, shadow_rays_by},
+        path_trace::{closest_hits_by, ray_of, search_ray_of, shadow_rays_by},
         paths::sample_of_path,
     },
 };
@@ -63,12 +63,13 @@ impl Paths {
 
     /// Finds the hits of the paths that are alive, and tests the shadow rays of the bounce before. Returns the numbers
     /// of hits and of shadow rays.
-    pub fn trace(&mut self, inputs: &KernelInputs, search: CpuSearch, depth: u32, queue: &mut Queue) -> (u32, u32) {
+    pub fn trace(&mut self, inputs: &KernelInputs, batch: &Batch, search: CpuSearch, queue: &mut Queue) -> (u32, u32) {
         let new_tracer = || FastTracer::new(inputs, search);
         let Self { states, shadow_rays, live, with_shadow_ray, .. } = self;
-        let live = &live[depth as usize % 2];
-        let n_hits = closest_hits_by(inputs, new_tracer, live, &queue.rays, &mut queue.hits);
-        shadow_rays_by(inputs, new_tracer, with_shadow_ray, shadow_rays, states);
+        let live = &live[batch.depth as usize % 2];
+        let of_camera = if batch.depth == 0 { inputs.of_camera() } else { *inputs };
+        let n_hits = closest_hits_by(&of_camera, batch, new_tracer, (live, &queue.rays), &mut queue.hits);
+        shadow_rays_by(inputs, batch, new_tracer, with_shadow_ray, (shadow_rays, states));
         (n_hits, with_shadow_ray.len() as u32)
     }
 
@@ -76,22 +77,24 @@ impl Paths {
     pub fn note_costs(
         &self,
         inputs: &KernelInputs,
+        batch: &Batch,
         traversal: Traversal,
-        depth: u32,
         queue: &Queue,
         pixel_aovs: &mut [PixelAovs],
     ) {
         let is_first = |path_ix: &&u32| sample_of_path(inputs.frame(), **path_ix) == 0;
-        let ray = |path_ix: &u32| queue.rays[*path_ix as usize];
-        let shadow_ray = |path_ix: &u32| {
-            let pixel_ix = ray(path_ix).pixel_ix;
-            PathRay { pixel_ix, ..ray_of(&self.shadow_rays[*path_ix as usize]) }
+        let inputs = &inputs.with_stochastic_alpha();
+        let in_pixel = |path_ix: u32, ray: &PathRay, is_shadow_ray| {
+            let search_ray = search_ray_of(inputs, batch, path_ix, ray, is_shadow_ray);
+            (queue.rays[path_ix as usize].pixel_ix, search_ray)
         };
-        let live = &self.live[depth as usize % 2];
+        let ray = |&path_ix: &u32| in_pixel(path_ix, &queue.rays[path_ix as usize], false);
+        let shadow_ray = |&path_ix: &u32| in_pixel(path_ix, &ray_of(&self.shadow_rays[path_ix as usize]), true);
+        let live = &self.live[batch.depth as usize % 2];
         let rays: Vec<_> = live.iter().filter(is_first).map(ray).collect();
         let shadow_rays: Vec<_> = self.with_shadow_ray.iter().filter(is_first).map(shadow_ray).collect();
-        let inputs = &inputs.with_stochastic_alpha();
-        costs::count_rays::<false>(inputs, traversal, &rays, pixel_aovs);
+        let of_camera = if batch.depth == 0 { inputs.of_camera() } else { *inputs };
+        costs::count_rays::<false>(&of_camera, traversal, &rays, pixel_aovs);
         costs::count_rays::<true>(inputs, traversal, &shadow_rays, pixel_aovs);
     }
 

@@ -12,13 +12,13 @@ use super::{
 use crate::{
     accel::kdtree::TraversalLinks,
     frame::{
-        BounceStats, Denoise, FrameKind, FrameRenderer, Integrator, LightLayers, NoiseTiles, Pass, Picture, Plan,
+        BounceStats, Denoise, FrameKind, FrameRenderer, Integrator, MeanLayers, NoiseTiles, Pass, Picture, Plan,
         Primary, Profile, RenderOptions, Watcher, opaque, plan::passes,
     },
     gpu::GpuError,
     layout::{
-        Auxiliary, Batch, Bounce, EdgeStep, Frame, Hit, LIGHT_LAYERS, Material, PathRay, PixelAovs, SAMPLE_BLOCK_LOG2,
-        SCAN_GROUP_SIZE,
+        Auxiliary, Batch, Bounce, EdgeStep, FILTER_CENTRE, Frame, Hit, LIGHT_LAYERS, Material, PathRay, PixelAovs,
+        SAMPLE_BLOCK_LOG2, SCAN_GROUP_SIZE, SURFACE_LAYERS,
     },
     reference::{
         accumulate, atrous_filter, auxiliary,
@@ -28,7 +28,7 @@ use crate::{
         inputs::KernelInputs,
         path_accumulate, path_resolve, pixel_aovs, primary_hit, resolve,
         shade::{self, LitRays},
-        tonemap,
+        surface_layers, tonemap,
     },
     scene::Camera,
     world::{World, path_materials},
@@ -70,7 +70,8 @@ pub struct CpuRenderer {
     pixel_radiance: Vec<[f32; 4]>,
     /// Sums of the samples. Not in use before the second sample of a picture.
     pixel_accumulated: Vec<[f32; 4]>,
-    /// The layers of light, one after the other, as in `pixel_radiance`. Empty unless the options request them.
+    /// The layers of light and of surfaces, one after the other, as in `pixel_radiance`. Empty unless the options
+    /// request them.
     pixel_layers: Vec<[f32; 4]>,
     /// Sums of the samples of the layers.
     layers_accumulated: Vec<[f32; 4]>,
@@ -95,6 +96,8 @@ pub struct CpuRenderer {
     batch_stats: Vec<BounceStats>,
     /// Number of samples of each pixel in the picture.
     n_samples: u32,
+    /// Number of pixels of the pending sample that are drawn; 0 if no sample is pending.
+    n_drawn: u32,
     clock: Clock,
     /// Counts of all batches of the sample, one row for each bounce.
     bounces: Vec<BounceStats>,
@@ -106,7 +109,7 @@ impl CpuRenderer {
     pub fn new(world: &World, options: &RenderOptions, batching: Batching) -> Self {
         let frame = world.frame_constants(options);
         let n_pixels = frame.width as usize * frame.height as usize;
-        let n_layers = if options.has_light_layers() { LIGHT_LAYERS as usize } else { 0 };
+        let n_layers = options.mean_layers().len();
         if options.integrator == Integrator::Path {
             // Makes the hierarchy now, so that the time of the first frame is that of drawing alone.
             search_for(world, options.traversal, true);
@@ -139,6 +142,7 @@ impl CpuRenderer {
             most_rays: 0,
             batch_stats: Vec::new(),
             n_samples: 0,
+            n_drawn: 0,
             clock: Clock::start(),
             bounces: Vec::new(),
             n_batches: 0,
@@ -155,31 +159,67 @@ impl CpuRenderer {
     /// Draws as [`CpuRenderer::draw_sample`] does. After each batch it calls `progress` with the share of the sample's
     /// pixels that are drawn, 0 to 1.
     pub fn draw_sample_with(&mut self, mut progress: impl FnMut(f32)) -> Profile {
-        self.clock = Clock::start();
-        self.bounces.clear();
-        self.n_batches = 0;
-        self.frame.set_view(&self.camera, self.world.bounds(), self.n_samples);
-        let of_paths = self.options.integrator == Integrator::Path;
-        if self.n_samples == 1 && !of_paths {
-            self.pixel_accumulated.clone_from(&self.pixel_radiance);
+        loop {
+            let drawn = self.draw_batch();
+            match drawn {
+                Some(profile) => {
+                    progress(1.0);
+                    return profile;
+                }
+                None => progress(self.progress()),
+            }
         }
-        self.pixel_aovs.fill(PixelAovs::default());
+    }
+
+    /// Draws one batch of the pending sample, or of the next sample if none is pending. Returns the whole sample's
+    /// profile after its last batch, and None before that. Only the last batch changes the displayed picture. A pending
+    /// sample is dropped by [`FrameRenderer::reset_samples`] alone.
+    pub fn draw_batch(&mut self) -> Option<Profile> {
+        let of_paths = self.options.integrator == Integrator::Path;
+        let is_new = self.n_drawn == 0;
+        if is_new {
+            self.clock = Clock::start();
+            self.bounces.clear();
+            self.n_batches = 0;
+            self.frame.set_view(&self.camera, self.world.bounds(), self.n_samples);
+            if self.n_samples == 1 && !of_paths {
+                self.pixel_accumulated.clone_from(&self.pixel_radiance);
+                self.layers_accumulated.clone_from(&self.pixel_layers);
+            }
+            self.pixel_aovs.fill(PixelAovs::default());
+        }
         let plan = Plan::new(&self.frame_kind());
-        passes(&plan.visibility).for_each(|pass| self.run(pass, 0));
+        if is_new {
+            passes(&plan.visibility).for_each(|pass| self.run(pass, 0));
+        }
         let n_pixels = self.pixel_radiance.len() as u32;
         let most_pixels = (self.batching.n_pixels >> self.frame.samples_log2).max(1);
-        for first_pixel in (0..n_pixels).step_by(most_pixels as usize) {
-            let n_pixels_of_batch = most_pixels.min(n_pixels - first_pixel);
-            if of_paths {
-                self.batch_of_paths(&plan, first_pixel, n_pixels_of_batch);
-            } else {
-                self.batch(&plan, first_pixel, n_pixels_of_batch);
-            }
-            progress((first_pixel + n_pixels_of_batch) as f32 / n_pixels as f32);
+        let (first_pixel, n_pixels_of_batch) = (self.n_drawn, most_pixels.min(n_pixels - self.n_drawn));
+        if of_paths {
+            self.batch_of_paths(&plan, first_pixel, n_pixels_of_batch);
+        } else {
+            self.batch(&plan, first_pixel, n_pixels_of_batch);
         }
+        self.n_drawn += n_pixels_of_batch;
+        if self.n_drawn < n_pixels {
+            return None;
+        }
+        self.n_drawn = 0;
         passes(&plan.image).for_each(|pass| self.run(pass, 0));
         self.n_samples = self.frame.n_samples;
-        self.profile()
+        Some(self.profile())
+    }
+
+    /// Returns the share of the pending sample that is drawn; 0 if no sample is pending.
+    pub fn progress(&self) -> f32 {
+        self.n_drawn as f32 / self.pixel_radiance.len() as f32
+    }
+
+    /// Sets the most pixels of a batch, from the next batch on; none for the default.
+    #[cfg(feature = "view")]
+    pub fn limit_batches(&mut self, most_pixels: Option<u32>) {
+        let Batching { n_pixels, .. } = Batching::default();
+        self.batching.n_pixels = most_pixels.map_or(n_pixels, |most| most.clamp(1, n_pixels));
     }
 
     /// Sets the index of the picture's first sample, a multiple of `2^SAMPLE_BLOCK_LOG2`. Only frames of paths know it.
@@ -196,7 +236,7 @@ impl CpuRenderer {
         self.options.noise_tiles = noise_tiles;
         self.set_first_sample(first_sample);
         let n_pixels = self.frame.width as usize * self.frame.height as usize;
-        let n_layers = if self.options.has_light_layers() { LIGHT_LAYERS as usize } else { 0 };
+        let n_layers = self.options.mean_layers().len();
         self.pixel_radiance.resize(n_pixels, [0.0; 4]);
         self.pixel_layers.resize(n_layers * n_pixels, [0.0; 4]);
         self.pixel_display.resize(n_pixels, [0; 4]);
@@ -236,7 +276,7 @@ impl CpuRenderer {
     /// Returns the properties that decide the passes of the next sample. The CPU does not rasterize: for both kinds
     /// of rasterization it runs the pass `visibility` of `Primary::Raster`, which here traces a ray for each pixel.
     fn frame_kind(&self) -> FrameKind {
-        let kind = FrameKind::new(&self.options, self.frame.n_lights);
+        let kind = FrameKind::new(&self.options, &self.frame);
         let primary = if kind.primary == Primary::Trace { Primary::Trace } else { Primary::Raster };
         FrameKind { primary, adds_samples: self.n_samples > 0, ..kind }
     }
@@ -291,6 +331,7 @@ impl CpuRenderer {
             Pass::Visibility => self.visibility(),
             Pass::PrimaryHit | Pass::Trace => self.closest_hits(pass, depth),
             Pass::PixelAovs => self.note_aovs(),
+            Pass::SurfaceLayers => self.surface_layers(),
             Pass::CompactReduce => self.compact_reduce(depth),
             Pass::CompactSpine if self.options.integrator == Integrator::Path => self.path_spine(depth),
             Pass::CompactSpine => self.compact_spine(depth),
@@ -328,13 +369,13 @@ impl CpuRenderer {
     fn path_trace(&mut self, depth: u32) {
         let Self { world, frame, links, paths, queue, path_materials, .. } = self;
         let inputs = KernelInputs::new(world, frame).with_links(links).of_paths(path_materials, world.emitters());
-        let traversal = self.options.traversal;
+        let (batch, traversal) = (&Batch { depth, ..self.batch }, self.options.traversal);
         // Rays are traced a second time to be counted, so later frames, whose counts nobody reads, go without.
         if self.options.pixel_aovs && self.n_samples == 0 {
-            paths.note_costs(&inputs, traversal, depth, queue, &mut self.pixel_aovs);
+            paths.note_costs(&inputs, batch, traversal, queue, &mut self.pixel_aovs);
         }
         let search = search_for(world, traversal, depth > 0);
-        let trace = || paths.trace(&inputs, search, depth, queue);
+        let trace = || paths.trace(&inputs, batch, search, queue);
         let (n_hits, n_shadow_rays) = self.clock.time(Pass::PathTrace, Some(depth), trace);
         if let Some(before) = self.batch_stats.last_mut() {
             before.n_shadow_rays = n_shadow_rays.into();
@@ -383,9 +424,10 @@ impl CpuRenderer {
     }
 
     fn path_layers(&mut self, depth: u32) {
-        let Self { frame, batch, paths, pixel_layers, .. } = self;
+        let Self { frame, batch, paths, pixel_radiance, pixel_layers, .. } = self;
+        let of_light = &mut pixel_layers[..LIGHT_LAYERS as usize * pixel_radiance.len()];
         let bounce = (depth + 1 < LIGHT_LAYERS).then_some(depth);
-        self.clock.time(Pass::PathLayers, bounce, || paths.layers(frame, batch, pixel_layers));
+        self.clock.time(Pass::PathLayers, bounce, || paths.layers(frame, batch, of_light));
     }
 
     fn path_resolve(&mut self) {
@@ -421,6 +463,7 @@ impl CpuRenderer {
     /// Finds the closest hits of the bounce's rays, and counts them.
     fn closest_hits(&mut self, pass: Pass, depth: u32) {
         let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
+        let inputs = if depth == 0 { inputs.of_camera() } else { inputs };
         let Queue { rays, bounces, hits, .. } = &mut self.queue;
         hits.resize(rays.len(), Hit::zeroed());
         let places = bounces[depth as usize].rays();
@@ -446,15 +489,36 @@ impl CpuRenderer {
         self.clock.time(Pass::PixelAovs, Some(0), || pixel_aovs::pixel_aovs(&inputs, first_hits, pixels));
     }
 
+    /// Adds up what the camera rays hit.
+    fn surface_layers(&mut self) {
+        let Self { world, frame, queue, path_materials, pixel_layers, pixel_radiance, options, .. } = self;
+        let inputs = KernelInputs::new(world, frame);
+        let (inputs, samples_log2) = match options.integrator {
+            Integrator::Path => (inputs.of_paths(path_materials, world.emitters()), frame.samples_log2),
+            Integrator::Whitted => (inputs, 0),
+        };
+        let begin = pixel_layers.len() - SURFACE_LAYERS as usize * pixel_radiance.len();
+        let (of_camera, layers) = ((&queue.rays[..], &queue.hits[..]), &mut pixel_layers[begin..]);
+        let sum = || surface_layers::surface_layers(&inputs, samples_log2, of_camera, layers);
+        self.clock.time(Pass::SurfaceLayers, Some(0), sum);
+    }
+
     /// Adds the traversal costs of the rays of all bounces to the AOVs.
     fn note_costs(&mut self) {
         let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
         let (traversal, pixels) = (self.options.traversal, &mut self.pixel_aovs);
         let Queue { rays, bounces, hits, .. } = &self.queue;
-        let n_rasterized = if self.options.primary != Primary::Trace { bounces[0].n_rays as usize } else { 0 };
-        let (rasterized, traced) = rays.split_at(n_rasterized);
-        costs::count_rasterized(rasterized, hits, pixels);
-        costs::count_rays::<false>(&inputs, traversal, traced, pixels);
+        let in_pixel = |ray: &PathRay| (ray.pixel_ix, ray.into());
+        let (of_camera, of_bounces) = rays.split_at(bounces[0].n_rays as usize);
+        match self.options.primary {
+            Primary::Trace => {
+                let of_camera: Vec<_> = of_camera.iter().map(in_pixel).collect();
+                costs::count_rays::<false>(&inputs.of_camera(), traversal, &of_camera, pixels);
+            }
+            _ => costs::count_rasterized(of_camera, hits, pixels),
+        }
+        let of_bounces: Vec<_> = of_bounces.iter().map(in_pixel).collect();
+        costs::count_rays::<false>(&inputs, traversal, &of_bounces, pixels);
         costs::count_shadow(&inputs, traversal, rays, hits, pixels);
     }
 
@@ -536,8 +600,11 @@ impl CpuRenderer {
     }
 
     fn accumulate(&mut self) {
-        let (frame, radiance, sums) = (&self.frame, &mut self.pixel_radiance, &mut self.pixel_accumulated);
-        self.clock.time(Pass::Accumulate, None, || accumulate::accumulate(frame, &[], radiance, sums));
+        let Self { frame, pixel_radiance, pixel_accumulated, pixel_layers, layers_accumulated, .. } = self;
+        self.clock.time(Pass::Accumulate, None, || {
+            accumulate::accumulate(frame, &[], pixel_radiance, pixel_accumulated);
+            accumulate::accumulate(frame, &[], pixel_layers, layers_accumulated);
+        });
     }
 
     fn denoise(&mut self) {
@@ -578,7 +645,7 @@ impl FrameRenderer for CpuRenderer {
     }
 
     fn reset_samples(&mut self) {
-        self.n_samples = 0;
+        (self.n_samples, self.n_drawn) = (0, 0);
     }
 
     fn most_samples_log2(&self) -> u32 {
@@ -607,11 +674,32 @@ impl FrameRenderer for CpuRenderer {
         Ok(self.pixel_aovs())
     }
 
-    fn light_layers(&self) -> Result<LightLayers, GpuError> {
+    fn centre_aovs(&mut self) -> Result<Vec<PixelAovs>, GpuError> {
+        self.frame.set_view(&self.camera, self.world.bounds(), 0);
+        let Self { world, options, batching, links, frame, queue, paths, path_materials, pixel_aovs, .. } = self;
+        let frame = Frame { samples_log2: 0, pixel_filter: FILTER_CENTRE, aperture: 0.0, ..*frame };
+        let scene = KernelInputs::new(world, &frame).with_links(links);
+        let inputs = scene.of_paths(path_materials, world.emitters()).with_noise_tiles(tiles_of(options));
+        let search = search_for(world, options.traversal, false);
+        for first_pixel in (0..pixel_aovs.len() as u32).step_by(batching.n_pixels as usize) {
+            let n_pixels = batching.n_pixels.min(pixel_aovs.len() as u32 - first_pixel);
+            let batch = Batch { first_pixel, n_pixels, ..Batch::default() };
+            paths.begin(&inputs, &batch, n_pixels, queue);
+            paths.trace(&inputs, &batch, search, queue);
+            pixel_aovs::pixel_aovs(&scene, queue.rays.iter().zip(&queue.hits), pixel_aovs);
+        }
+        self.reset_samples();
+        Ok(self.pixel_aovs())
+    }
+
+    fn mean_layers(&self) -> Result<MeanLayers, GpuError> {
         let (window, crop) = (self.options.window(), self.options.crop_or_whole());
-        let mut layers = LightLayers::default();
+        let mut layers = MeanLayers::default();
         let pixels = self.pixel_layers.chunks_exact(self.pixel_radiance.len());
-        layers.0.iter_mut().zip(pixels).for_each(|(layer, pixels)| *layer = window.part(pixels, &crop));
+        layers.0[self.options.mean_layers()]
+            .iter_mut()
+            .zip(pixels)
+            .for_each(|(layer, pixels)| *layer = window.part(pixels, &crop));
         Ok(layers)
     }
 }

@@ -14,6 +14,7 @@ pub struct RaysSoa {
     pub t_min: [f32; LANES],
     pub t_max: [f32; LANES],
     pub source_triangle: [u32; LANES],
+    pub alpha_seed: [u32; LANES],
 }
 
 /// The hits of a packet.
@@ -36,6 +37,7 @@ impl RaysSoa {
         self.t_min[lane] = search_ray.t_min;
         self.t_max[lane] = search_ray.t_max;
         self.source_triangle[lane] = search_ray.source_triangle;
+        self.alpha_seed[lane] = search_ray.alpha_seed;
     }
 
     #[inline(always)]
@@ -53,6 +55,7 @@ impl RaysSoa {
             direction: self.direction(lane),
             t_max: self.t_max[lane],
             source_triangle: self.source_triangle[lane],
+            alpha_seed: self.alpha_seed[lane],
         }
     }
 }

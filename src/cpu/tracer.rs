@@ -15,6 +15,7 @@ use crate::{
     reference::{
         counting::table::ReadCounter,
         inputs::KernelInputs,
+        instances::search_instances,
         search_ray::SearchRay,
         traversal_ray::{TraversalRay, hit_from_near},
         traverser::{Tracer, Traverser},
@@ -73,6 +74,10 @@ impl Tracer for FastTracer<'_> {
         inputs: &KernelInputs<impl ReadCounter>,
         search_ray: &SearchRay,
     ) -> Hit {
+        if let (Some(instanced), None) = (&inputs.instanced, inputs.inside) {
+            let search = |geometry: &KernelInputs<_>, ray: &SearchRay| self.traverse::<ANY_HIT>(geometry, ray);
+            return search_instances::<_, ANY_HIT>(inputs, instanced, search_ray, search);
+        }
         match self {
             Self::Packets(packets) => hit_from_near(inputs, search_ray, |near, best| {
                 packets.traverse_alone::<ANY_HIT>(inputs, &TraversalRay::new(inputs, near), best);
@@ -89,6 +94,9 @@ impl Tracer for FastTracer<'_> {
         search_rays: impl Iterator<Item = (Key, SearchRay)>,
         mut found: impl FnMut(Key, Hit),
     ) {
+        if inputs.instanced.is_some() {
+            return search_rays.for_each(|(key, search_ray)| found(key, self.traverse::<ANY_HIT>(inputs, &search_ray)));
+        }
         let packets = match self {
             Self::Packets(packets) => packets,
             Self::Wide(traverser) => return traverser.trace_all::<ANY_HIT, Key>(inputs, search_rays, found),

@@ -174,7 +174,7 @@ impl<S: Simd> RayColumns<S> {
         best: &mut Hit,
     ) {
         let triangle_ixs = u32x16::load_array_ref(self.t_enter.simd, &block.triangle_ixs);
-        let Some((found, is_hit)) = self.shears.intersect_triangles(&block.corners, triangle_ixs, filter.shear.axis)
+        let Some((found, is_hit, _)) = self.shears.intersect_triangles(&block.corners, triangle_ixs, filter.shear.axis)
         else {
             return;
         };

@@ -18,14 +18,16 @@ use glam::Vec3;
 use super::{
     Engine,
     choices::{ChosenAccel, Methods, Processor, Request, Workload},
+    first_view,
 };
 use crate::{
+    accel::AccelKind,
     cpu::metered_exposure,
     frame::RenderOptions,
     gpu::GpuError,
     scene::{Camera, LoadOptions, Mesh, PictureChoices, Scene, SceneError, Up},
     util::{memory::OutOfMemory, progress::Progress},
-    world::{FlatScene, Mismatch, World},
+    world::{FlatScene, Mismatch, World, instances::Instancing},
 };
 
 /// What is loaded.
@@ -160,7 +162,8 @@ impl Opened {
         let begin = Instant::now();
         let LoadRequest { scene: options, picture, work: _ } = request;
         let aspect = options.aspect.or_else(|| Some(picture.as_ref()?.size?).map(|(w, h)| w as f32 / h as f32));
-        let options = LoadOptions { aspect, ..options.clone() };
+        let integrator = options.integrator.or_else(|| picture.as_ref()?.integrator);
+        let options = LoadOptions { aspect, integrator, ..options.clone() };
         let (scene, file): (Scene, Option<PathBuf>) = match source.into() {
             #[cfg(feature = "files")]
             Source::File(path) => (Scene::load_with(&path, &options)?, Some(path)),
@@ -184,6 +187,19 @@ fn note_of_up(path: &Path, scene: &Scene, stated: Option<Up>) -> Option<String> 
     let is_stl = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("stl"));
     let is_assumed = is_stl && stated.is_none() && scene.camera.up == Up::Z.vector();
     is_assumed.then(|| "+z points up, as in most STL files; --up y turns the picture".to_owned())
+}
+
+/// Returns a note that says which meshes are stored once, if the user has left that open.
+fn note_of_instances(scene: &FlatScene, instancing: Instancing) -> Option<String> {
+    let instances = scene.instances.as_ref().filter(|_| instancing == Instancing::Auto)?;
+    Some(format!(
+        "{} meshes of {} triangles are kept as {} instances, {} triangles in all; --instances flatten stores all of \
+         them",
+        instances.ranges.len(),
+        scene.triangles.len(),
+        instances.list.len(),
+        scene.n_triangles()
+    ))
 }
 
 /// A world with its acceleration structure, ready to be rendered or cast into.
@@ -234,16 +250,22 @@ impl Builder {
         if let Work::Pictures { n_samples, n_at_once, .. } = *work {
             self.require_for_pictures(&options, n_samples, n_at_once)?;
         }
-        let flat = FlatScene::new(&scene)?;
-        let (bounds, workload) = (scene.shown_bounds(), work.workload(&scene, &options));
+        let keeps_instances = self.request.accel == AccelKind::KdTree && self.request.instances.keeps(&scene);
+        let n_built = if keeps_instances { scene.n_stored() } else { scene.n_triangles() };
+        let workload = work.workload(&scene, &options);
+        let accel = self.request.choose_accel(self.processor, scene.n_triangles(), &workload);
+        self.require_for_build(accel, n_built)?;
+        let flat = if keeps_instances { FlatScene::with_instances(&scene)? } else { FlatScene::new(&scene)? };
+        notes.extend(note_of_instances(&flat, self.request.instances));
+        let bounds = scene.shown_bounds();
         // The memory of the scene is freed for the build of the structure.
         drop(scene);
-        let n_triangles = flat.triangles.len();
-        let accel = self.request.choose_accel(self.processor, n_triangles, &workload);
-        self.require_for_build(accel, n_triangles)?;
         let begin = Instant::now();
         let world = World::with_accel_observed(flat, &accel.options(self.processor), &self.progress)?;
         let build_ms = begin.elapsed().as_secs_f64() * 1e3;
+        if let (Work::Pictures { .. }, AccelKind::KdTree) = (work, world.geometry().accel().kind()) {
+            first_view::warn(&world, &options);
+        }
         if is_metered {
             options.exposure = metered_exposure(&world);
             notes.push(format!("exposure {0}, measured in the first view; --exposure {0} pins it", options.exposure));

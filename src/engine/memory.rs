@@ -5,8 +5,8 @@ use super::{
     load::Builder,
 };
 use crate::{
-    frame::{Aov, RenderOptions},
-    layout::PixelAovs,
+    frame::{Integrator, RenderOptions},
+    layout::{PixelAovs, Triangle},
     util::memory::{OutOfMemory, require},
 };
 
@@ -47,14 +47,14 @@ impl Builder {
         require(&what, u64::from(n_at_once) * needed)
     }
 
-    /// Refuses a structure whose build does not fit in the host's memory.
+    /// Refuses triangles and their structure if they, and the build, do not fit in the host's memory.
     pub(super) fn require_for_build(&self, accel: ChosenAccel, n_triangles: usize) -> Result<(), OutOfMemory> {
         let bytes = match accel.tree_kind().map(|chosen| chosen.value) {
             Some(TreeKind::Fast) => BYTES_OF_FAST_BUILD,
             Some(TreeKind::Best) => BYTES_OF_BEST_BUILD,
             None => BYTES_OF_GRID_BUILD,
         };
-        require(&self.describe(n_triangles), n_triangles as u64 * bytes)
+        require(&self.describe(n_triangles), n_triangles as u64 * (size_of::<Triangle>() as u64 + bytes))
     }
 
     /// Names the build of a structure, for progress and errors.
@@ -64,26 +64,29 @@ impl Builder {
 }
 
 /// Returns the bytes per pixel of the CPU renderer's buffers: the index of the visible triangle, the sample, the sum
-/// of samples, the filtered picture and the picture for display. Layers of light have samples and sums of their own.
+/// of samples, the filtered picture and the picture for display. Layers that are means have samples and sums of their
+/// own.
 fn rendered_bytes(options: &RenderOptions, n_samples: u32) -> u64 {
     let sums = if n_samples > 1 { RADIANCE } else { 0 };
     let layers = layer_bytes(options) * (1 + sums / RADIANCE);
     size_of::<u32>() as u64 + RADIANCE + sums + RADIANCE + DISPLAY + aovs_bytes(options) + layers
 }
 
-/// Returns the bytes of a pixel in the layers of light.
+/// Returns the bytes of a pixel in the layers that are means.
 fn layer_bytes(options: &RenderOptions) -> u64 {
-    if options.has_light_layers() { Aov::OF_LIGHT.len() as u64 * RADIANCE } else { 0 }
+    options.mean_layers().len() as u64 * RADIANCE
 }
 
+/// Returns the bytes of a pixel's first hits. Those of paths are kept beside those of the pixel's centre.
 fn aovs_bytes(options: &RenderOptions) -> u64 {
-    if options.pixel_aovs { size_of::<PixelAovs>() as u64 } else { 0 }
+    let n_copies = if options.integrator == Integrator::Path { 2 } else { 1 };
+    if options.pixel_aovs { n_copies * size_of::<PixelAovs>() as u64 } else { 0 }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{engine::choices::Request, frame::Integrator};
+    use crate::engine::choices::Request;
 
     #[test]
     fn a_pixel_s_buffers_are_counted_and_a_usual_picture_is_not_refused() {

@@ -8,6 +8,7 @@
 
 mod caster;
 pub mod choices;
+mod first_view;
 mod group;
 mod load;
 mod memory;

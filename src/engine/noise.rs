@@ -15,17 +15,15 @@ use rayon::prelude::*;
 use crate::{
     cpu,
     frame::{
-        BadOptions, Crop, Drawn, DrawnTiles, LightLayers, NoiseTiles, Picture, Profile, RenderOptions, SampleRange,
+        BadOptions, Crop, Drawn, DrawnTiles, MeanLayers, NoiseTiles, Picture, Profile, RenderOptions, SampleRange,
         TileSamples, check::check,
     },
     gpu::GpuError,
-    layout::{LIGHT_LAYERS, PixelAovs, SAMPLE_BLOCK_LOG2},
+    layout::{PixelAovs, SAMPLE_BLOCK_LOG2},
 };
 
 /// Number of pixels of a tile.
 const N_PIXELS: usize = NoiseTiles::N_PIXELS;
-/// Number of the layers of light.
-const N_LAYERS: usize = LIGHT_LAYERS as usize;
 
 /// How low the noise of a picture has to be.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -95,12 +93,12 @@ fn n_parts(n_tiles: usize, n_devices: usize, samples: SampleRange) -> u32 {
 }
 
 /// Draws a picture of the options' crop until the goal is met. `draw` shares the tiles among `n_devices`. `progress` is
-/// called with the share of the work that is done, as far as the noise tells it.
+/// called with the share of the work that is done, as far as the noise tells it, and returns whether the picture ends.
 pub(super) fn draw_until(
     goal: NoiseGoal,
     options: &RenderOptions,
     (draw, n_devices): (&mut DrawTiles, usize),
-    mut progress: impl FnMut(f32),
+    mut progress: impl FnMut(f32) -> bool,
 ) -> Result<NoisePicture, GpuError> {
     let mut tiles: Vec<Tile> = NoiseTiles::places_of(&options.crop_or_whole()).into_iter().map(Tile::new).collect();
     let mut profile = Profile::default();
@@ -118,7 +116,7 @@ pub(super) fn draw_until(
         };
         let DrawnTiles { drawn, means } = draw(&noisy.iter().flat_map(parts_of).collect::<Vec<_>>())?;
         profile.add(&drawn.profile);
-        let layers = drawn.light.0.iter().filter(|layer| !layer.is_empty()).map(Vec::as_slice);
+        let layers = drawn.layers.0.iter().filter(|layer| !layer.is_empty()).map(Vec::as_slice);
         let layers: Vec<&[[f32; 4]]> = [&means[..]].into_iter().chain(layers).collect();
         let len_of_tile = n_parts as usize * N_PIXELS;
         noisy.into_par_iter().enumerate().for_each(|(tile_ix, tile)| {
@@ -130,7 +128,9 @@ pub(super) fn draw_until(
             tile.add(block, sums, options);
         });
         let shares = tiles.iter().map(|tile| tile.share_of(goal)).sum::<f32>();
-        progress(shares / tiles.len() as f32);
+        if progress(shares / tiles.len() as f32) {
+            break;
+        }
     }
     Ok(joined(&tiles, goal, options, profile))
 }
@@ -141,8 +141,7 @@ struct Tile {
     place: UVec2,
     /// Number of samples of each pixel.
     n_samples: u32,
-    /// The sums of the samples, and of their squared luminance. The sums of the layers of light follow, if there are
-    /// any.
+    /// The sums of the samples, and of their squared luminance. The sums of the layers follow, if there are any.
     sums: Vec<[f32; 4]>,
     /// What the first sample of each pixel shows; empty unless the options ask for it.
     pixel_aovs: Vec<PixelAovs>,
@@ -222,9 +221,9 @@ fn add(sums: &mut [[f32; 4]], others: &[[f32; 4]]) {
 fn joined(tiles: &[Tile], goal: NoiseGoal, options: &RenderOptions, profile: Profile) -> NoisePicture {
     let crop = options.crop_or_whole();
     let n_pixels = crop.width() as usize * crop.height() as usize;
-    let has_layers = tiles.iter().any(|tile| tile.sums.len() > N_PIXELS);
     let mut radiance = vec![[0.0; 4]; n_pixels];
-    let mut light = LightLayers(std::array::from_fn(|_| vec![[0.0; 4]; if has_layers { n_pixels } else { 0 }]));
+    let mut layers = MeanLayers::default();
+    layers.0[options.mean_layers()].fill(vec![[0.0; 4]; n_pixels]);
     let mut pixel_aovs = vec![PixelAovs::default(); if options.pixel_aovs { n_pixels } else { 0 }];
     let mut n_samples = 0.0;
     for tile in tiles {
@@ -238,8 +237,8 @@ fn joined(tiles: &[Tile], goal: NoiseGoal, options: &RenderOptions, profile: Pro
                 pixel_aovs[ix] = *aovs;
                 pixel_aovs[ix].set_noise([r, g, b, squared], tile.n_samples);
             }
-            if has_layers {
-                (0..N_LAYERS).for_each(|layer| light.0[layer][ix] = mean((1 + layer) * N_PIXELS + pixel_ix));
+            for (nth, layer) in (1..).zip(&mut layers.0[options.mean_layers()]) {
+                layer[ix] = mean(nth * N_PIXELS + pixel_ix);
             }
         }
     }
@@ -247,7 +246,7 @@ fn joined(tiles: &[Tile], goal: NoiseGoal, options: &RenderOptions, profile: Pro
     let most = tiles.iter().map(|tile| tile.n_samples).max().unwrap_or(0);
     NoisePicture {
         picture: Picture { width: crop.width(), height: crop.height(), radiance, display },
-        drawn: Drawn { pixel_aovs, light, profile, n_samples: most },
+        drawn: Drawn { pixel_aovs, layers, profile, n_samples: most },
         mean_samples: n_samples / n_pixels as f64,
         n_tiles: tiles.len(),
         n_noisy: tiles.iter().filter(|tile| tile.noise > goal.noise).count(),

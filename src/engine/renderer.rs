@@ -10,7 +10,7 @@ use crate::{
     cpu::{self, Batching},
     frame::{
         BadOptions, Denoise, Drawn, DrawnTiles, FrameRenderer, Goal, Integrator, NoiseTiles, Picture, RangeSums,
-        RenderOptions, SampleRange, TileSamples, Watcher,
+        RenderOptions, SampleRange, TileSamples, Unending, Watcher,
     },
     gpu::{Context, DeviceInfo, ExternalImage, GpuError, TimelinePoint},
     render::BandedRenderer,
@@ -64,8 +64,9 @@ impl Renderer {
         }
     }
 
-    /// Draws what a camera sees. The watcher is notified of each
-    /// sample of each band. If it uses [`Watcher::part`], it is also notified of the progress within a sample.
+    /// Draws what a camera sees. The watcher is notified of each sample of each band. If it uses [`Watcher::part`], it
+    /// is also notified of the progress within a sample. It can end the picture with fewer samples than the goal
+    /// ([`Watcher::ends`]).
     ///
     /// # Errors
     /// The camera shows no picture, the goal is more than [`SampleRange::MOST`] samples, a call fails, one pixel alone
@@ -76,7 +77,7 @@ impl Renderer {
 
     /// Draws the samples of a range with the path tracer, one aligned block after the other. Returns their sums, from
     /// which [`SampleSums::mean`](crate::frame::SampleSums::mean) makes the picture. The AOVs are those of the
-    /// first block, with the noise of all. The layers of light are those of all blocks.
+    /// first block, with the noise of all. Layers that are means are those of all blocks.
     ///
     /// # Errors
     /// Fails as [`Renderer::draw`] does, or as [`SampleRange::check`] does.
@@ -94,8 +95,9 @@ impl Renderer {
                 Backend::Group(group) => group.set_first_sample(block.first),
                 Backend::Cpu(renderer) => renderer.set_first_sample(block.first),
             }
-            let next = self.draw_watched(camera, Goal::Samples(block.len()), &mut watcher)?;
-            sums.push_mean(block, &self.picture()?.radiance, &next.light);
+            let goal = Goal::Samples(block.len());
+            let next = self.draw_watched(camera, goal, &mut Unending(&mut watcher))?;
+            sums.push_mean(block, &self.picture()?.radiance, &next.layers);
             match &mut drawn {
                 None => drawn = Some(next),
                 Some(all) => {
@@ -105,12 +107,13 @@ impl Renderer {
                 }
             }
         }
-        let drawn = Drawn { light: sums.mean_of_light(), ..drawn.unwrap_or_default() };
+        let drawn = Drawn { layers: sums.mean_of_layers(), ..drawn.unwrap_or_default() };
         Ok((drawn, sums))
     }
 
     /// Draws what a camera sees until the noise of each tile of the picture is low, or the tile has the most samples.
-    /// The watcher is notified as if the whole picture were one sample, which [`Renderer::draw`] draws band by band.
+    /// The watcher is notified as if the whole picture were one sample, which [`Renderer::draw`] draws band by band. It
+    /// can end the picture while some tiles have more noise ([`Watcher::ends`]).
     ///
     /// # Errors
     /// Fails as [`Renderer::draw`] and [`NoiseGoal::check`] do, or if the options do not ask for paths, have a noise
@@ -221,11 +224,13 @@ struct BandProgress<'a, W> {
 
 impl<W: Watcher> BandProgress<'_, W> {
     /// Notes which share of the picture is done, 0 to 1. A share that is less than before tells the watcher of no band.
-    fn set(&mut self, share: f32) {
+    /// Returns whether the watcher ends the picture.
+    fn set(&mut self, share: f32) -> bool {
         let n_done = share * self.n_bands as f32;
         // The last band is done when the picture is.
         self.tell_bands((n_done as u32).min(self.n_bands - 1));
         self.watcher.part((n_done - self.n_told as f32).clamp(0.0, 1.0));
+        self.watcher.ends()
     }
 
     fn end(&mut self) {

@@ -2,22 +2,24 @@
 //! file.
 
 use super::{noise, variance_of_joined};
-use crate::layout::{LIGHT_LAYERS, PixelAovs};
+use crate::layout::{LIGHT_LAYERS, PixelAovs, SURFACE_LAYERS};
 
 /// An output variable, in world space and world units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Aov {
-    /// Distance from the eye to the first hit along the camera's view direction; infinity for a miss.
+    /// Distance from the eye to what the ray through the pixel's centre hits, along the camera's view direction;
+    /// infinity for a miss.
     Depth,
-    /// The shading normal of the first hit, unit length, towards the eye; 0 for a miss.
+    /// Mean of the samples' shading normals at the first hit, towards the eye; 0 for a miss or a lamp.
     Normal,
-    /// The point of the first hit; 0 for a miss.
+    /// The point that the same ray hits; 0 for a miss.
     Position,
-    /// Kd of the material at the first hit, linear; 0 for a miss.
+    /// Mean of the samples' albedos at the first hit, linear, 0 to 1: what the surface reflects, or lets pass. 0 for a
+    /// miss or a lamp.
     Albedo,
-    /// Index of the first hit's triangle, in the scene's order; 4294967295 for a miss.
+    /// Index of the triangle that it hits, in the scene's order; 4294967295 for a miss.
     Id,
-    /// Index of the first hit's material; 4294967295 for a miss.
+    /// Index of the material that it hits; 4294967295 for a miss.
     Material,
     /// Number of the rays of the pixel's first sample: primary, secondary and shadow rays.
     Rays,
@@ -39,9 +41,9 @@ pub enum Aov {
 
 named_enum!(Aov {
     Depth = "depth": "distance along the camera's view; infinity where nothing is hit",
-    Normal = "normal": "shading normal, world space",
+    Normal = "normal": "mean of the samples' shading normals, world space",
     Position = "position": "point that is hit, world space",
-    Albedo = "albedo": "diffuse reflectance (Kd), linear",
+    Albedo = "albedo": "mean of the samples' reflectances, of glass its tint, linear, 0 to 1",
     Id = "id": "index of the triangle; 4294967295 where nothing is hit",
     Material = "material": "index of the material; 4294967295 where nothing is hit",
     Rays = "rays": "number of primary, secondary and shadow rays of the pixel's first sample",
@@ -90,6 +92,12 @@ impl Aov {
     /// The layers of light, whose sum is the radiance of a picture without noise filter.
     pub const OF_LIGHT: [Self; LIGHT_LAYERS as usize] = [Self::Emission, Self::Direct, Self::Indirect];
 
+    /// The layers of the surfaces that camera rays hit.
+    pub const OF_SURFACES: [Self; SURFACE_LAYERS as usize] = [Self::Albedo, Self::Normal];
+
+    /// The layers that are means of all samples, as the picture is: of light, then of surfaces.
+    pub const OF_MEANS: [Self; 5] = [Self::Emission, Self::Direct, Self::Indirect, Self::Albedo, Self::Normal];
+
     /// Whether only pictures of paths have the output.
     pub fn is_of_paths(self) -> bool {
         matches!(self, Self::Variance | Self::Samples) || self.is_of_light()
@@ -100,7 +108,18 @@ impl Aov {
         Self::OF_LIGHT.contains(&self)
     }
 
-    /// Returns the output's channels, from a picture's AOVs. Those of light are none of them.
+    /// Whether the output is a mean of all samples, as the picture is ([`Aov::OF_MEANS`]).
+    pub fn is_of_means(self) -> bool {
+        Self::OF_MEANS.contains(&self)
+    }
+
+    /// The names of the components of a layer of three.
+    #[cfg(feature = "files")]
+    pub(crate) fn components(self) -> [&'static str; 3] {
+        if matches!(self, Self::Normal | Self::Position) { ["X", "Y", "Z"] } else { ["R", "G", "B"] }
+    }
+
+    /// Returns the output's channels, from a picture's AOVs. Layers that are means of all samples are none of them.
     pub fn channels(self, pixel_aovs: &[PixelAovs]) -> Vec<Channel> {
         let float = |component: &str, value: fn(&PixelAovs) -> f32| Channel {
             name: format!("{self}.{component}"),
@@ -112,26 +131,18 @@ impl Aov {
         };
         match self {
             Self::Depth => vec![float("Z", |f| f.depth)],
-            Self::Normal => vec![
-                float("X", |f| f.normal_world.x),
-                float("Y", |f| f.normal_world.y),
-                float("Z", |f| f.normal_world.z),
-            ],
             Self::Position => vec![
                 float("X", |f| f.position_world.x),
                 float("Y", |f| f.position_world.y),
                 float("Z", |f| f.position_world.z),
             ],
-            Self::Albedo => {
-                vec![float("R", |f| f.albedo.x), float("G", |f| f.albedo.y), float("B", |f| f.albedo.z)]
-            }
             Self::Id => vec![uint("ID", |f| f.triangle_ix)],
             Self::Material => vec![uint("ID", |f| f.material_ix)],
             Self::Rays => vec![uint("N", |f| f.n_rays)],
             Self::Cost => vec![uint("N", |f| f.n_steps)],
             Self::Variance => vec![float("Y", |f| f.variance)],
             Self::Samples => vec![uint("N", |f| f.n_samples)],
-            Self::Emission | Self::Direct | Self::Indirect => Vec::new(),
+            Self::Emission | Self::Direct | Self::Indirect | Self::Albedo | Self::Normal => Vec::new(),
         }
     }
 }

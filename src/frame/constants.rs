@@ -39,7 +39,7 @@ impl Frame {
             }
         };
         (self.width, self.height) = (window.width(), window.height());
-        self.max_depth = options.n_bounces();
+        self.max_depth = options.n_bounces() + self.extra_bounces;
         self.pixel_filter = match options.paths.filter {
             PixelFilter::Box => FILTER_BOX,
             PixelFilter::Tent => FILTER_TENT,

@@ -1,16 +1,16 @@
 //! Results of drawing a picture, and the watcher that follows its progress.
 
-use super::{LightLayers, Profile};
+use super::{MeanLayers, Profile};
 use crate::layout::PixelAovs;
 
 /// Results of drawing, beside the picture.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Drawn {
-    /// What the primary ray of each pixel hits in the first sample, and what all rays of that sample cost. Empty
+    /// What the ray through the centre of each pixel hits, and what all rays of its first sample cost. Empty
     /// unless the options ask for AOVs.
     pub pixel_aovs: Vec<PixelAovs>,
-    /// The layers of the picture's light, the means of all samples. Empty unless the options ask for them.
-    pub light: LightLayers,
+    /// The layers that are means of all samples. Empty unless the options ask for them.
+    pub layers: MeanLayers,
     /// Times and counts of all samples of all bands.
     pub profile: Profile,
     /// Number of samples of each pixel.
@@ -31,7 +31,7 @@ impl DrawnTiles {
     pub(crate) fn append(&mut self, mut next: Self) {
         self.drawn.profile.add(&next.drawn.profile);
         self.drawn.pixel_aovs.append(&mut next.drawn.pixel_aovs);
-        self.drawn.light.append(next.drawn.light);
+        self.drawn.layers.append(next.drawn.layers);
         self.means.append(&mut next.means);
     }
 }
@@ -49,6 +49,30 @@ pub trait Watcher {
 
     /// Is called when a sample of a band has been drawn.
     fn sample(&mut self);
+
+    /// Whether the drawing should end now, with the samples so far. Renderers ask only when these samples are a whole
+    /// picture: after each frame, or if the picture has a goal of noise, after each round of its tiles. They do not ask
+    /// while they draw a range of samples, several bands, or on several devices without a goal of noise.
+    fn ends(&mut self) -> bool {
+        false
+    }
+}
+
+/// Passes on the progress of a drawing that has to reach its end.
+pub(crate) struct Unending<'a, W>(pub &'a mut W);
+
+impl<W: Watcher> Watcher for Unending<'_, W> {
+    fn sees_parts(&self) -> bool {
+        self.0.sees_parts()
+    }
+
+    fn part(&mut self, share: f32) {
+        self.0.part(share);
+    }
+
+    fn sample(&mut self) {
+        self.0.sample();
+    }
 }
 
 impl<F: FnMut()> Watcher for F {

@@ -1,7 +1,7 @@
 //! The frames of a picture, one after the other, as a device and the CPU draw them.
 
 use super::{
-    Drawn, DrawnTiles, Goal, Integrator, LightLayers, NoiseTiles, Pacer, Profile, RenderOptions, TileSamples, Watcher,
+    Drawn, DrawnTiles, Goal, Integrator, MeanLayers, NoiseTiles, Pacer, Profile, RenderOptions, TileSamples, Watcher,
 };
 use crate::{
     gpu::GpuError,
@@ -54,12 +54,22 @@ pub trait FrameRenderer {
     /// A copy fails.
     fn pixel_aovs(&self) -> Result<Vec<PixelAovs>, GpuError>;
 
-    /// Returns the layers of the picture's light, which are empty if the options do not ask for them. The last sample
-    /// must be complete.
+    /// Finds what the ray through the centre of each pixel hits, without a lens. Returns the AOVs, whose costs have no
+    /// meaning. Drops all samples.
+    ///
+    /// # Panics
+    /// The options do not ask for AOVs, or not for paths.
+    ///
+    /// # Errors
+    /// Fails as [`FrameRenderer::draw_frame`] does.
+    fn centre_aovs(&mut self) -> Result<Vec<PixelAovs>, GpuError>;
+
+    /// Returns the layers that are means of all samples, which are empty if the options do not ask for them. The last
+    /// sample must be complete.
     ///
     /// # Errors
     /// A copy fails.
-    fn light_layers(&self) -> Result<LightLayers, GpuError>;
+    fn mean_layers(&self) -> Result<MeanLayers, GpuError>;
 
     /// Sets the number of samples that the next frame of paths draws: `2^log2`, at most `2^MOST_SAMPLES_LOG2`. The
     /// number of samples so far must be a multiple of it. The picture does not depend on it. Other frames draw one.
@@ -72,13 +82,15 @@ pub trait FrameRenderer {
         *self.samples_log2() = log2;
     }
 
-    /// Draws a new picture of the window, and reports its progress to the watcher.
+    /// Draws a new picture of the window, and reports its progress to the watcher, which can end it after any frame.
     ///
     /// # Errors
     /// Fails as [`FrameRenderer::draw_frame`] does.
     fn draw_window(&mut self, goal: Goal, watcher: &mut impl Watcher) -> Result<Drawn, GpuError> {
         self.reset_samples();
         let RenderOptions { integrator, pixel_aovs, .. } = *self.options();
+        // The samples of paths are at random places of their pixels.
+        let at_centres = if pixel_aovs && integrator == Integrator::Path { self.centre_aovs()? } else { Vec::new() };
         let (mut pacer, mut drawn) = (Pacer::new(goal, integrator, self.most_samples_log2()), Drawn::default());
         while let Some(log2) = pacer.next(drawn.n_samples) {
             if integrator == Integrator::Path {
@@ -89,15 +101,21 @@ pub trait FrameRenderer {
             drawn.profile.add(&profile);
             if drawn.n_samples == 0 && pixel_aovs {
                 drawn.pixel_aovs = self.pixel_aovs()?;
+                drawn.pixel_aovs.iter_mut().zip(&at_centres).for_each(|(aovs, at_centre)| {
+                    *aovs = PixelAovs { n_rays: aovs.n_rays, n_steps: aovs.n_steps, ..*at_centre };
+                });
             }
             drawn.n_samples = self.n_samples();
+            if watcher.ends() {
+                break;
+            }
         }
         if pixel_aovs && integrator == Integrator::Path {
             let options = self.options();
             let means = options.window().part(self.window_mean()?, &options.crop_or_whole());
             drawn.pixel_aovs.iter_mut().zip(means).for_each(|(aovs, mean)| aovs.set_noise(mean, drawn.n_samples));
         }
-        drawn.light = self.light_layers()?;
+        drawn.layers = self.mean_layers()?;
         Ok(drawn)
     }
 

@@ -12,7 +12,7 @@
 //!   resource   the buffers and images that passes write
 //! bounce     sizes of a bounce's dispatches
 //! frame_renderer  the loop over a picture's frames, on a device or on the CPU
-//! results    drawn; profile and counts; aov, light_layers and view: what there is beside the picture
+//! results    drawn; profile and counts; aov, mean_layers and view: what there is beside the picture
 //! ```
 
 mod aov;
@@ -24,7 +24,7 @@ mod crop;
 mod drawn;
 mod frame_renderer;
 mod goal;
-mod light_layers;
+mod mean_layers;
 #[doc(hidden)]
 pub mod noise;
 mod noise_tiles;
@@ -38,13 +38,12 @@ mod view;
 
 #[doc(hidden)]
 pub use self::frame_renderer::FrameRenderer;
-pub(crate) use self::resource::for_resources;
 pub use self::{
     aov::{Aov, Channel, Samples},
     crop::Crop,
     drawn::{Drawn, DrawnTiles, Watcher},
     goal::{Goal, Pacer},
-    light_layers::{LightLayers, RangeSums},
+    mean_layers::{MeanLayers, RangeSums},
     noise_tiles::{NoiseTiles, TileSamples},
     pass::{Pass, Role, Scope},
     plan::{Access, FrameKind, Plan, Section, Step},
@@ -53,6 +52,9 @@ pub use self::{
     sample_range::{BlockSum, SampleRange, SampleSums, variance_of_joined},
     view::View,
 };
+pub(crate) use self::{drawn::Unending, resource::for_resources};
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use crate::{accel::kdtree::Traversal, layout};
@@ -72,8 +74,8 @@ pub struct RenderOptions {
     pub noise_tiles: Option<NoiseTiles>,
     /// How light is computed.
     pub integrator: Integrator,
-    /// Number of bounces, the primary rays included, 1 to [`RenderOptions::MOST_DEPTH`]: 1 is ray casting with shadows
-    /// (Algorithm 1's `maximumDepth`).
+    /// Levels of rays, the primary rays included, 1 to [`RenderOptions::MOST_DEPTH`]: 1 is ray casting with shadows
+    /// (Algorithm 1's `maximumDepth`). To pass straight through an alpha-blended surface takes no level.
     pub max_depth: u32,
     /// Factor by which radiance is multiplied before it is encoded for display, finite and above 0.
     pub exposure: f32,
@@ -92,6 +94,9 @@ pub struct RenderOptions {
     /// Whether the picture has layers of its light: emission, direct and indirect light ([`Aov::OF_LIGHT`]). Only
     /// frames of [`Integrator::Path`] have them. They take three times the memory of the pixels' samples in addition.
     pub light_layers: bool,
+    /// Whether the picture has layers of the surfaces that camera rays hit: albedo and normal ([`Aov::OF_SURFACES`]).
+    /// They take twice the memory of the pixels' samples in addition.
+    pub surface_layers: bool,
     /// Whether [`Integrator::Whitted`] approximates the light of the environment, of area lights and of emissive
     /// surfaces by an ambient term.
     pub approximates_ambient: bool,
@@ -105,8 +110,12 @@ pub struct RenderOptions {
 pub struct BadOptions(pub(crate) String);
 
 impl RenderOptions {
-    /// Returns the number of bounces of a frame. Paths have one more than `max_depth`, in which the rays from the last
-    /// hits only meet light.
+    /// The bounces that a scene with alpha-blended surfaces adds to those of `max_depth`, in frames of
+    /// [`Integrator::Whitted`]. A ray that passes straight through such a surface uses a bounce, but no level of rays.
+    pub const EXTRA_BOUNCES: u32 = 32;
+
+    /// Returns the number of bounces of a frame, without [`RenderOptions::EXTRA_BOUNCES`]. Paths have one more than
+    /// `max_depth`, in which the rays from the last hits only meet light.
     pub fn n_bounces(&self) -> u32 {
         match self.integrator {
             Integrator::Whitted => self.max_depth,
@@ -117,6 +126,13 @@ impl RenderOptions {
     /// Whether frames have layers of light.
     pub fn has_light_layers(&self) -> bool {
         self.light_layers && self.integrator == Integrator::Path
+    }
+
+    /// Returns which of [`MeanLayers`] frames have.
+    pub(crate) fn mean_layers(&self) -> Range<usize> {
+        let (n_of_light, n_layers) = (Aov::OF_LIGHT.len(), Aov::OF_MEANS.len());
+        let begin = if self.has_light_layers() { 0 } else { n_of_light };
+        begin..if self.surface_layers { n_layers } else { n_of_light }
     }
 
     /// Returns the noise filter that frames have: that of the options, but none in place of [`Denoise::Edge`] unless
@@ -137,8 +153,9 @@ pub struct PathOptions {
     pub first_sample: u32,
     /// The density of samples around the centre of their pixel.
     pub filter: PixelFilter,
-    /// The most light that a path adds to its pixel after its first hit, in any colour (radiance). It makes pictures
-    /// darker than they should be. It is above 0. Infinity: any amount.
+    /// The most light of each contribution of a path after its first hit, in any colour (radiance): of each light that
+    /// it samples or meets. The sum may be more. It makes pictures darker than they should be. It is above 0.
+    /// Infinity: any amount.
     pub clamp: f32,
     /// Radius of the camera's lens, world units. 0: everything is sharp.
     pub aperture: f32,
@@ -169,6 +186,7 @@ impl Default for RenderOptions {
             profile: true,
             pixel_aovs: false,
             light_layers: false,
+            surface_layers: false,
             approximates_ambient: false,
             paths: PathOptions::default(),
         }
@@ -206,6 +224,8 @@ pub enum Tonemap {
     Agx,
     /// The film-like curve of the Academy Color Encoding System.
     Aces,
+    /// Khronos PBR Neutral: base colours as they are, bright ones compressed.
+    Neutral,
 }
 
 impl Tonemap {
@@ -215,6 +235,7 @@ impl Tonemap {
             Self::Linear => layout::TONEMAP_LINEAR,
             Self::Agx => layout::TONEMAP_AGX,
             Self::Aces => layout::TONEMAP_ACES,
+            Self::Neutral => layout::TONEMAP_NEUTRAL,
         }
     }
 }
@@ -286,6 +307,7 @@ named_enum!(Tonemap {
     Linear = "linear": "radiance as it is; what is above white is clipped",
     Agx = "agx": "AgX: bright colours fade to white, dark ones keep their hue",
     Aces = "aces": "the ACES curve of films: more contrast",
+    Neutral = "neutral": "Khronos PBR Neutral: products in their own colours",
 });
 named_enum!(Integrator {
     Whitted = "whitted": "the paper's ray tracing: point lights, hard shadows, mirrors, glass, constant ambient light",
@@ -294,7 +316,7 @@ named_enum!(Integrator {
 named_enum!(PixelFilter {
     Box = "box": "the square of the pixel",
     Tent = "tent": "a tent that ends at the centres of the neighbouring pixels",
-    Gaussian = "gaussian": "a Gaussian of standard deviation half a pixel",
+    Gaussian = "gaussian": "a Gaussian of standard deviation half a pixel, cut off at 1.5 pixels from the centre",
 });
 named_enum!(Primary {
     Raster = "raster": "the device's graphics pipeline rasterizes the triangles; best if they are fewer than pixels",

@@ -34,8 +34,8 @@ pub enum Scope {
     /// Once for each batch, for the rays of all its bounces together.
     Batch,
     /// Once for a bounce of a batch, in each bounce that has the pass. Not all bounces have it: `primary_hit`,
-    /// `pixel_aovs` and `auxiliary` run for bounce 0 only, and the last bounce has no compaction. `path_layers` runs
-    /// for the bounces 0 and 1, and once for all others together.
+    /// `pixel_aovs`, `surface_layers` and `auxiliary` run for bounce 0 only, and the last bounce has no compaction.
+    /// `path_layers` runs for the bounces 0 and 1, and once for all others together.
     Bounce,
 }
 
@@ -55,6 +55,8 @@ pub enum Pass {
     Trace,
     /// Writes what each pixel's primary ray hits: depth, normal, position, albedo and indices.
     PixelAovs,
+    /// Adds up the albedos and the normals that each pixel's camera rays hit.
+    SurfaceLayers,
     /// Counts the rays that go on from the hits, the child rays, for each block of rays.
     CompactReduce,
     /// Turns the blocks' counts into prefix sums, and sizes the next bounce.
@@ -111,7 +113,7 @@ struct Info {
 }
 
 /// A row for each pass, in the order of [`Pass`].
-const TABLE: [Info; 26] = [
+const TABLE: [Info; 27] = [
     Info {
         pass: Pass::Visibility,
         name: "visibility",
@@ -170,6 +172,16 @@ const TABLE: [Info; 26] = [
         color: [60, 160, 90],
         reads: &[Rays, Hits, PixelAovs],
         writes: &[PixelAovs],
+        indirect: None,
+    },
+    Info {
+        pass: Pass::SurfaceLayers,
+        name: "surface_layers",
+        role: Role::Image,
+        scope: Scope::Bounce,
+        color: [90, 130, 60],
+        reads: &[Rays, Hits],
+        writes: &[PixelRadiance],
         indirect: None,
     },
     Info {

@@ -15,7 +15,7 @@ use super::{
     },
     {Denoise, Integrator, Primary, RenderOptions},
 };
-use crate::layout::{EDGE_STEPS, LIGHT_LAYERS};
+use crate::layout::{EDGE_STEPS, Frame, LIGHT_LAYERS};
 
 /// How the passes before or after a barrier access its resources.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,6 +63,8 @@ pub struct FrameKind {
     pub pixel_aovs: bool,
     /// Whether the picture has layers of light. Only frames that trace paths have them.
     pub light_layers: bool,
+    /// Whether the picture has layers of what camera rays hit: albedo and normal.
+    pub surface_layers: bool,
     /// Whether hits are lit. They are not if the frame displays an AOV, such as depth, that depends on the hits of
     /// primary rays only.
     pub is_lit: bool,
@@ -79,15 +81,16 @@ pub struct FrameKind {
 impl FrameKind {
     /// Returns the kind of a frame with the most passes that frames of these options can have: the frame is lit, and
     /// its sample is added to earlier ones. It displays the picture. To display an AOV takes no more passes.
-    pub fn new(options: &RenderOptions, n_lights: u32) -> Self {
+    pub fn new(options: &RenderOptions, constants: &Frame) -> Self {
         Self {
             integrator: options.integrator,
             primary: options.primary,
-            n_bounces: options.n_bounces(),
+            n_bounces: constants.max_depth,
             pixel_aovs: options.pixel_aovs,
             light_layers: options.has_light_layers(),
+            surface_layers: options.surface_layers,
             is_lit: true,
-            has_lights: n_lights > 0,
+            has_lights: constants.n_lights > 0,
             adds_samples: true,
             denoise: options.noise_filter(),
             shows_aovs: false,
@@ -194,6 +197,7 @@ fn bounce_of_paths(kind: &FrameKind, depth: u32) -> Section {
     if depth == 0 && kind.pixel_aovs {
         bounce.extend([Step::Run(Pass::PixelAovs), barrier(Access::Write, Access::Update, &[PixelAovs])]);
     }
+    bounce.extend(surface_layers(kind, depth));
     if kind.is_lit {
         bounce.extend([
             Step::Run(Pass::PathScatter),
@@ -220,6 +224,14 @@ fn bounce_of_paths(kind: &FrameKind, depth: u32) -> Section {
     bounce
 }
 
+/// Returns the steps that add up what camera rays hit, if the frame has them and `depth` is the bounce of these rays.
+fn surface_layers(kind: &FrameKind, depth: u32) -> Section {
+    if depth > 0 || !kind.is_lit || !kind.surface_layers {
+        return Section::new();
+    }
+    vec![Step::Run(Pass::SurfaceLayers), barrier(Access::Write, Access::Update, &[PixelRadiance])]
+}
+
 /// Returns the steps that add up a layer of light.
 fn layer() -> [Step; 2] {
     [Step::Run(Pass::PathLayers), barrier(Access::Write, Access::Update, &[PathSnapshots, PixelRadiance])]
@@ -232,6 +244,7 @@ fn bounce(kind: &FrameKind, depth: u32) -> Section {
     if depth == 0 && kind.pixel_aovs {
         bounce.extend([Step::Run(Pass::PixelAovs), barrier(Access::Write, Access::Update, &[PixelAovs])]);
     }
+    bounce.extend(surface_layers(kind, depth));
     if depth + 1 < kind.n_bounces {
         bounce.extend(next_rays());
     }

@@ -39,17 +39,25 @@ pub fn tiles(parts: Vec<Part>) -> Result<Vec<Tile>, MergeError> {
         .map(|crop| format!("the pixels of --crop {crop}"))
         .chain(tiles.iter().flat_map(|tile| missing_samples(tile, samples)))
         .collect();
-    match missing.len() {
-        0 => Ok(tiles),
-        n if n > MOST_NAMED => {
-            Err(MergeError::Missing(format!("{} and {} more", missing[..MOST_NAMED].join("; "), n - MOST_NAMED)))
-        }
-        _ => Err(MergeError::Missing(missing.join("; "))),
+    if missing.is_empty() {
+        return Ok(tiles);
     }
+    let files: Vec<_> = tiles.iter().flatten().map(|part| part.path.display().to_string()).collect();
+    let message = format!("the parts have gaps: {} (the parts are {})", listed(&missing, "; "), listed(&files, ", "));
+    Err(MergeError::Missing(message))
 }
 
-/// The most gaps that an error names.
+/// The most gaps, and the most files with parts, that an error names.
 const MOST_NAMED: usize = 8;
+
+/// Returns the first names of a list, and how many there are beside them.
+fn listed(names: &[String], separator: &str) -> String {
+    let named = names[..names.len().min(MOST_NAMED)].join(separator);
+    match names.len().saturating_sub(MOST_NAMED) {
+        0 => named,
+        n => format!("{named} and {n} more"),
+    }
+}
 
 /// Returns the names of a part's channels beside colour, and whether each has whole numbers, in the order of the file,
 /// which is that of the names.

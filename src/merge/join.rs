@@ -71,11 +71,11 @@ pub fn join(tiles: Vec<Tile>) -> Merged {
     for tile in tiles {
         let crop = tile[0].record.crop;
         all.place(&mut radiance, &crop, &mean_of(&tile, |part| &part.picture));
-        let light: Vec<_> = (0..tile[0].light.len())
-            .map(|layer_ix| (tile[0].light[layer_ix].0, mean_of(&tile, |part| &part.light[layer_ix].1)))
+        let means: Vec<_> = (0..tile[0].means.len())
+            .map(|layer_ix| (tile[0].means[layer_ix].0, mean_of(&tile, |part| &part.means[layer_ix].1)))
             .collect();
         for (channel_ix, whole) in channels.iter_mut().enumerate() {
-            let joined = channel_of_light(&light, &whole.name).unwrap_or_else(|| joined_channel(&tile, channel_ix));
+            let joined = channel_of_mean(&means, &whole.name).unwrap_or_else(|| joined_channel(&tile, channel_ix));
             match (&mut whole.samples, joined) {
                 (Samples::Float(whole), Samples::Float(part)) => all.place(whole, &crop, &part),
                 (Samples::Uint(whole), Samples::Uint(part)) => all.place(whole, &crop, &part),
@@ -104,10 +104,10 @@ fn mean_of(tile: &Tile, mean: impl Fn(&Part) -> &Mean) -> Vec<[f32; 4]> {
     }
 }
 
-/// Returns a channel of a layer of light, if it is one. `light`: the layers of a tile.
-fn channel_of_light(light: &[(Aov, Vec<[f32; 4]>)], name: &str) -> Option<Samples> {
-    let (_, mean) = light.iter().find(|(aov, _)| is_of(name, *aov))?;
-    let component = ["R", "G", "B"].iter().position(|component| name.ends_with(component))?;
+/// Returns a channel of a layer that is a mean of all samples, if it is one. `means`: these layers of a tile.
+fn channel_of_mean(means: &[(Aov, Vec<[f32; 4]>)], name: &str) -> Option<Samples> {
+    let (aov, mean) = means.iter().find(|(aov, _)| is_of(name, *aov))?;
+    let component = aov.components().iter().position(|component| name.ends_with(component))?;
     Some(Samples::Float(mean.iter().map(|pixel| pixel[component]).collect()))
 }
 

@@ -51,8 +51,8 @@ pub enum MergeError {
         /// What both have.
         common: String,
     },
-    /// Pixels or samples are in no file.
-    #[error("the parts have gaps: {0}")]
+    /// Pixels or samples are in no file. The text names the files and the gaps.
+    #[error("{0}")]
     Missing(String),
 }
 

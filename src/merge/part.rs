@@ -29,9 +29,9 @@ pub struct Part {
     pub record: Record,
     /// The mean of its samples.
     pub(super) picture: Mean,
-    /// The layers of light that it has, each with its name.
-    pub(super) light: Vec<(Aov, Mean)>,
-    /// Its channels beside colour, with the means of the layers of light.
+    /// The layers that are means of all samples and that it has, each with its name.
+    pub(super) means: Vec<(Aov, Mean)>,
+    /// Its channels beside colour, with these means.
     pub channels: Vec<Channel>,
 }
 
@@ -89,20 +89,28 @@ impl Part {
         let blocks: Vec<_> = record.samples.blocks().collect();
         let is_whole = record.samples == SampleRange::whole(record.whole.n_samples);
         let blocks = if is_whole || blocks.len() == 1 { Vec::new() } else { blocks };
-        let picture = mean_of(&channels, "", &blocks)?;
-        let mut light = Vec::new();
-        for aov in Aov::OF_LIGHT {
+        let picture = mean_of(&channels, ("", COLOUR), &blocks)?;
+        let mut means = Vec::new();
+        for aov in Aov::OF_MEANS {
             let prefix = format!("{aov}.");
             if channels.iter().any(|channel| channel.name.starts_with(&prefix)) {
-                light.push((aov, mean_of(&channels, &prefix, &blocks)?));
+                let mean = mean_of(&channels, (&prefix, aov.components()), &blocks);
+                let mean = mean.map_err(|what| match Aov::OF_SURFACES.contains(&aov) {
+                    true => format!("{what}: earlier versions wrote {aov} of the first sample, so render it again"),
+                    false => what,
+                });
+                means.push((aov, mean?));
             }
         }
         let is_sum = |name: &str| name.starts_with("sum ") || name.contains(".sum ");
-        let is_colour = |name: &str| ["R", "G", "B"].contains(&name);
+        let is_colour = |name: &str| COLOUR.contains(&name);
         let channels = channels.into_iter().filter(|Channel { name, .. }| !is_sum(name) && !is_colour(name)).collect();
-        Ok(Self { path: path.to_owned(), record, picture, light, channels })
+        Ok(Self { path: path.to_owned(), record, picture, means, channels })
     }
 }
+
+/// The components of a colour.
+const COLOUR: [&str; 3] = ["R", "G", "B"];
 
 /// The longest side of a file's tiles, pixels. The decoder allocates whole tiles; those that kdray writes are smaller.
 const MOST_TILE_SIDE: usize = 1024;
@@ -145,17 +153,21 @@ fn channel_of(channel: &AnyChannel<FlatSamples>) -> Channel {
     Channel { name: channel.name.to_string(), samples }
 }
 
-/// Returns the mean of samples, and the sums of its blocks, whose channels' names begin with `prefix`.
-fn mean_of(channels: &[Channel], prefix: &str, blocks: &[SampleRange]) -> Result<Mean, String> {
-    let radiance = colours(channels, prefix)?.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect();
-    let sum = |&samples: &SampleRange| {
-        Ok(BlockSum { samples, sums: colours(channels, &output::sum_prefix(prefix, samples))? })
-    };
+/// Returns the mean of samples, and the sums of its blocks, whose channels' names begin with `prefix` and end with
+/// `components`.
+fn mean_of(
+    channels: &[Channel],
+    (prefix, components): (&str, [&str; 3]),
+    blocks: &[SampleRange],
+) -> Result<Mean, String> {
+    let values = |prefix: &str| values_of(channels, prefix, components);
+    let radiance = values(prefix)?.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect();
+    let sum = |&samples: &SampleRange| Ok(BlockSum { samples, sums: values(&output::sum_prefix(prefix, samples))? });
     Ok(Mean { radiance, sums: blocks.iter().map(sum).collect::<Result<_, String>>()? })
 }
 
-/// Returns the colours of the channels whose names begin with `prefix`.
-fn colours(channels: &[Channel], prefix: &str) -> Result<Vec<[f32; 3]>, String> {
+/// Returns the values of the channels whose names begin with `prefix` and end with `components`.
+fn values_of(channels: &[Channel], prefix: &str, components: [&str; 3]) -> Result<Vec<[f32; 3]>, String> {
     let channel = |component: &str| {
         let name = format!("{prefix}{component}");
         match channels.iter().find(|channel| channel.name == name).map(|channel| &channel.samples) {
@@ -163,6 +175,6 @@ fn colours(channels: &[Channel], prefix: &str) -> Result<Vec<[f32; 3]>, String> 
             _ => Err(format!("it lacks the channel `{name}`")),
         }
     };
-    let [r, g, b] = ["R", "G", "B"].map(channel);
+    let [r, g, b] = components.map(channel);
     Ok(r?.iter().zip(g?).zip(b?).map(|((r, g), b)| [*r, *g, *b]).collect())
 }

@@ -22,18 +22,18 @@ pub struct Layers<'a> {
     pub aovs: &'a [Aov],
     /// An entry for each pixel; may be empty without AOVs.
     pub pixel_aovs: &'a [PixelAovs],
-    /// The layers of light. Those that `aovs` lists have the pixels of the picture.
-    pub light: [&'a [[f32; 4]]; Aov::OF_LIGHT.len()],
+    /// The layers that are means of all samples. Those that `aovs` lists have the pixels of the picture.
+    pub means: [&'a [[f32; 4]]; Aov::OF_MEANS.len()],
     /// Sums of blocks of samples, for parts of a picture whose means do not tell the sums.
     pub sums: &'a [BlockSum],
-    /// The same sums of the layers of light.
-    pub light_sums: [&'a [BlockSum]; Aov::OF_LIGHT.len()],
+    /// The same sums of these layers.
+    pub mean_sums: [&'a [BlockSum]; Aov::OF_MEANS.len()],
     /// What the picture shows. It places a crop in the whole picture.
     pub record: Option<&'a Record>,
 }
 
-/// The three channels of a colour, each with its index.
-const COLOUR: [(&str, usize); 3] = [("R", 0), ("G", 1), ("B", 2)];
+/// The three channels of a colour.
+const COLOUR: [&str; 3] = ["R", "G", "B"];
 
 /// Writes an OpenEXR file with the radiance as R, G and B, and with further layers. The file is written whole or not
 /// at all. Counts and indices are 32-bit integers, all other values are 32-bit floats. With a record, the file's data
@@ -80,12 +80,13 @@ fn write_channels(
 }
 
 fn channels(picture: &Picture, layers: &Layers) -> Vec<Channel> {
-    let mut channels = colours("", &picture.radiance, layers.sums);
+    let mut channels = components("", COLOUR, &picture.radiance, layers.sums);
     let is_first = |(i, aov): &(usize, &Aov)| !layers.aovs[..*i].contains(aov);
     for (_, aov) in layers.aovs.iter().enumerate().filter(is_first) {
-        match Aov::OF_LIGHT.iter().position(|layer| layer == aov) {
+        match Aov::OF_MEANS.iter().position(|layer| layer == aov) {
             Some(layer_ix) => {
-                channels.extend(colours(&format!("{aov}."), layers.light[layer_ix], layers.light_sums[layer_ix]));
+                let (mean, sums) = (layers.means[layer_ix], layers.mean_sums[layer_ix]);
+                channels.extend(components(&format!("{aov}."), aov.components(), mean, sums));
             }
             None => channels.extend(aov.channels(layers.pixel_aovs)),
         }
@@ -94,15 +95,15 @@ fn channels(picture: &Picture, layers: &Layers) -> Vec<Channel> {
 }
 
 /// Returns the channels of a mean of samples, and of the sums of its blocks. `prefix`: the layer and a dot, or nothing.
-fn colours(prefix: &str, mean: &[[f32; 4]], sums: &[BlockSum]) -> Vec<Channel> {
-    fn channels<const N: usize>(prefix: &str, pixels: &[[f32; N]]) -> [Channel; 3] {
-        COLOUR.map(|(name, ix)| Channel {
-            name: format!("{prefix}{name}"),
+fn components(prefix: &str, names: [&str; 3], mean: &[[f32; 4]], sums: &[BlockSum]) -> Vec<Channel> {
+    fn channels<const N: usize>(prefix: &str, names: [&str; 3], pixels: &[[f32; N]]) -> [Channel; 3] {
+        std::array::from_fn(|ix| Channel {
+            name: format!("{prefix}{}", names[ix]),
             samples: Samples::Float(pixels.iter().map(|pixel| pixel[ix]).collect()),
         })
     }
-    let sums = sums.iter().flat_map(|block| channels(&sum_prefix(prefix, block.samples), &block.sums));
-    channels(prefix, mean).into_iter().chain(sums).collect()
+    let sums = sums.iter().flat_map(|block| channels(&sum_prefix(prefix, block.samples), names, &block.sums));
+    channels(prefix, names, mean).into_iter().chain(sums).collect()
 }
 
 /// Returns what the names of the channels begin with that have the sums of a block of samples. `prefix`: what those of

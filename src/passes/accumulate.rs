@@ -23,6 +23,6 @@ impl Accumulate {
     /// `bounces`. Leaves the sum of all samples in `pixel_accumulated` and their mean in `pixel_radiance`. If a
     /// bounce of the frame has overflowed, it leaves both as they are.
     pub fn record(&self, commands: &Commands, resources: &Resources) {
-        commands.dispatch(&self.kernel, None, &Batch::default(), resources.pixel_dispatch());
+        commands.dispatch(&self.kernel, None, &Batch::default(), resources.layer_dispatch());
     }
 }

@@ -31,7 +31,7 @@ impl Cast {
         traversal: Traversal,
         query: Query,
     ) -> Result<Self, GpuError> {
-        let shader = searching("cast", bindings, traversal, None);
+        let shader = searching("cast", bindings, traversal, []);
         let constants = search_constants(context)?.set(constants::ANY_HIT, query == Query::Any);
         let n_lanes = context.n_lanes()?;
         Ok(Self { kernel: kernel(context, bindings, "cast", shader, &constants)?, n_lanes })

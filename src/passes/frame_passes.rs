@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{
     AtrousFilter, Auxiliary, Demodulate, Denoise, FalseColor, Inputs, Passes, PathAccumulate, PathBegin, PathCompact,
-    PathLayers, PathResolve, PathScatter, PathTrace, PixelAovs, Tonemap, record::record_steps,
+    PathLayers, PathResolve, PathScatter, PathTrace, PixelAovs, SurfaceLayers, Tonemap, record::record_steps,
 };
 use crate::{
     buffers::Resources,
@@ -90,6 +90,8 @@ pub struct PathPasses {
     pub path_compact: Arc<PathCompact>,
     /// None unless the options ask for layers of light.
     pub path_layers: Option<Arc<PathLayers>>,
+    /// None unless the options ask for these layers.
+    pub surface_layers: Option<Arc<SurfaceLayers>>,
     pub path_resolve: Arc<PathResolve>,
     pub path_accumulate: Arc<PathAccumulate>,
     pub pixel_aovs: Arc<PixelAovs>,
@@ -115,6 +117,7 @@ impl PathPasses {
             path_scatter: PathScatter::new(context, bindings)?.into(),
             path_compact: PathCompact::new(context, bindings)?.into(),
             path_layers: path_layers(context, bindings, options)?,
+            surface_layers: SurfaceLayers::new(context, bindings, options)?,
             path_resolve: PathResolve::new(context, bindings)?.into(),
             path_accumulate: PathAccumulate::new(context, bindings)?.into(),
             pixel_aovs: PixelAovs::new(context, bindings)?.into(),
@@ -143,6 +146,9 @@ impl PathPasses {
         if from.light_layers != to.light_layers {
             next.path_layers = path_layers(context, bindings, to)?;
         }
+        if from.mean_layers() != to.mean_layers() {
+            next.surface_layers = SurfaceLayers::new(context, bindings, to)?;
+        }
         Ok(next)
     }
 
@@ -165,6 +171,9 @@ impl PathPasses {
             Pass::PathCompact => self.path_compact.record(commands, resources, batch),
             Pass::PathLayers => {
                 self.path_layers.as_ref().expect("the options ask for layers of light").record(commands, batch);
+            }
+            Pass::SurfaceLayers => {
+                self.surface_layers.as_ref().expect("the options ask for these layers").record(commands, batch);
             }
             Pass::PathResolve => self.path_resolve.record(commands, batch),
             Pass::PathAccumulate => self.path_accumulate.record(commands, resources),

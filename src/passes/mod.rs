@@ -55,6 +55,7 @@ mod resolve;
 mod shade;
 mod shadow;
 mod spine;
+mod surface_layers;
 mod tonemap;
 mod trace;
 mod visibility;
@@ -83,6 +84,7 @@ pub use self::{
     resolve::Resolve,
     shade::Shade,
     shadow::Shadow,
+    surface_layers::SurfaceLayers,
     tonemap::Tonemap,
     trace::Trace,
     visibility::Visibility,
@@ -109,6 +111,8 @@ pub struct Passes {
     pub primary_hit: Arc<PrimaryHit>,
     pub trace: Arc<Trace>,
     pub pixel_aovs: Arc<PixelAovs>,
+    /// None unless the options ask for these layers.
+    pub surface_layers: Option<Arc<SurfaceLayers>>,
     pub shadow: Arc<Shadow>,
     pub shade: Arc<Shade>,
     pub compact: Arc<Compact>,
@@ -135,6 +139,7 @@ impl Passes {
             primary_hit: PrimaryHit::new(context, bindings, options)?.into(),
             trace: Trace::new(context, bindings, options)?.into(),
             pixel_aovs: PixelAovs::new(context, bindings)?.into(),
+            surface_layers: SurfaceLayers::new(context, bindings, options)?,
             shadow: Shadow::new(context, bindings, options)?.into(),
             shade: Shade::new(context, bindings, options)?.into(),
             compact: Compact::new(context, bindings)?.into(),
@@ -206,6 +211,9 @@ impl Passes {
         if from.tonemap != to.tonemap {
             next.tonemap = Tonemap::new(context, bindings, to.tonemap)?.into();
         }
+        if from.surface_layers != to.surface_layers {
+            next.surface_layers = SurfaceLayers::new(context, bindings, to)?;
+        }
         if from.primary != to.primary {
             next.visibility = Self::new_visibility(context, bindings, to)?;
             next.rasterize = Self::new_rasterize(context, bindings, to)?;
@@ -228,13 +236,18 @@ pub(crate) fn modules_of(kernel: &str) -> impl Iterator<Item = Shader> {
         .filter(move |module| module.file.strip_prefix(kernel).is_some_and(|rest| rest.starts_with('_')))
 }
 
+/// Returns whether one of the constants is true for the scene.
+fn is_set(bindings: &BindingLayout, any_of: impl IntoIterator<Item = Constant<bool>>) -> bool {
+    any_of.into_iter().any(|constant| bindings.value(constant) != 0)
+}
+
 /// Returns the module of a kernel that finds hits: in the scene's grid, or in its kd-tree by the traversal.
-/// `alpha_test` is the constant that tells whether the kernel's rays are alpha-tested. Without it, they never are.
+/// `tests` are the constants that tell whether the kernel's rays pass through parts of triangles or back faces.
 fn searching(
     kernel: &str,
     bindings: &BindingLayout,
     traversal: Traversal,
-    alpha_test: Option<Constant<bool>>,
+    tests: impl IntoIterator<Item = Constant<bool>>,
 ) -> Shader {
     let accel = match bindings.value(constants::GRID_LEVELS) {
         0 => AccelKind::KdTree,
@@ -242,8 +255,12 @@ fn searching(
         _ => AccelKind::Grid2,
     };
     let search = Search::of(accel, traversal).module().expect("kernels have all searches of devices");
-    let alpha = if alpha_test.is_some_and(|it| bindings.value(it) != 0) { "_alpha" } else { "" };
-    let file = format!("{kernel}_{search}{alpha}.comp");
+    let kind = match is_set(bindings, [constants::INSTANCED]) {
+        true => "_instances", // which have all tests
+        false if is_set(bindings, tests) => "_alpha",
+        false => "",
+    };
+    let file = format!("{kernel}_{search}{kind}.comp");
     *SEARCHING.iter().find(|module| module.file == file).unwrap_or_else(|| panic!("build.rs makes no {file}"))
 }
 
@@ -295,7 +312,8 @@ mod tests {
     fn every_traversal_has_its_modules() {
         for (kernel, n_of_each) in [("cast", 1), ("path_trace", 2), ("shadow", 2), ("trace", 2)] {
             let modules: Vec<_> = modules_of(kernel).map(|module| module.file).collect();
-            assert_eq!(modules.len(), n_of_each * (Traversal::ALL.len() + 1), "{kernel}: those of the grid, too");
+            let n_modules = n_of_each * (Traversal::ALL.len() + 1) + Traversal::ALL.len();
+            assert_eq!(modules.len(), n_modules, "{kernel}: those of the grid, too, and of instances");
             for search in Search::all(false) {
                 let file = format!("{kernel}_{}.comp", search.module().unwrap());
                 assert!(modules.contains(&&*file), "{file}");

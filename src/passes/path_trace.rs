@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{kernel, search_constants, searching};
+use super::{is_set, kernel, search_constants, searching};
 use crate::{
     buffers::Resources,
     frame::RenderOptions,
@@ -10,9 +10,11 @@ use crate::{
     layout::{Batch, constants},
 };
 
-/// The pipeline of the pass.
+/// The pipelines of the pass.
 pub struct PathTrace {
     kernel: ComputePipeline,
+    /// The kernel of camera rays, if they pass through back faces.
+    from_camera: Option<ComputePipeline>,
 }
 
 impl PathTrace {
@@ -21,11 +23,17 @@ impl PathTrace {
         bindings: &Arc<BindingLayout>,
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
-        let shader = searching("path_trace", bindings, options.traversal, Some(constants::SHADOW_ALPHA_TEST));
         let constants = search_constants(context)?
             .set(constants::COUNTS, options.profile)
             .set(constants::COUNT_COSTS, options.pixel_aovs);
-        Ok(Self { kernel: kernel(context, bindings, "path_trace", shader, &constants)? })
+        let from = |camera: bool| {
+            let tests = [constants::SHADOW_ALPHA_TEST].into_iter().chain(camera.then_some(constants::CULLS_BACK_FACES));
+            let shader = searching("path_trace", bindings, options.traversal, tests);
+            let constants = constants.clone().set(constants::FROM_CAMERA, camera);
+            kernel(context, bindings, "path_trace", shader, &constants)
+        };
+        let from_camera = is_set(bindings, [constants::CULLS_BACK_FACES]).then(|| from(true)).transpose()?;
+        Ok(Self { kernel: from(false)?, from_camera })
     }
 
     /// Needs `rays` of the paths that are alive, `shadow_rays`, and in `live_paths` the lists of this bounce and of the
@@ -34,6 +42,7 @@ impl PathTrace {
     /// hit, a shadow ray in place of its state. `batch.resume_pass`: which of them are traced, all or those that were
     /// suspended.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
-        commands.dispatch(&self.kernel, Some(batch.depth), batch, resources.trace_dispatch(batch));
+        let of_camera = self.from_camera.as_ref().filter(|_| batch.depth == 0);
+        commands.dispatch(of_camera.unwrap_or(&self.kernel), Some(batch.depth), batch, resources.trace_dispatch(batch));
     }
 }

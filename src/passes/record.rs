@@ -47,6 +47,9 @@ impl Passes {
             Pass::PrimaryHit => self.primary_hit.record(commands, batch),
             Pass::Trace => self.trace.record(commands, resources, batch),
             Pass::PixelAovs => self.pixel_aovs.record(commands, batch),
+            Pass::SurfaceLayers => {
+                self.surface_layers.as_ref().expect("the options ask for these layers").record(commands, batch);
+            }
             Pass::CompactReduce => self.compact.reduce(commands, resources, batch),
             Pass::CompactSpine => self.compact.spine.record(commands, batch),
             Pass::CompactScatter => self.compact.scatter(commands, resources, batch),

@@ -22,7 +22,7 @@ impl Shadow {
         bindings: &Arc<BindingLayout>,
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
-        let shader = searching("shadow", bindings, options.traversal, Some(constants::SHADOW_ALPHA_TEST));
+        let shader = searching("shadow", bindings, options.traversal, [constants::SHADOW_ALPHA_TEST]);
         // `COUNTS` is not set, since the pass shade counts the shadow rays.
         let constants = search_constants(context)?.set(constants::COUNT_COSTS, options.pixel_aovs);
         Ok(Self { kernel: kernel(context, bindings, "shadow", shader, &constants)? })

@@ -23,11 +23,12 @@ impl Trace {
         bindings: &Arc<BindingLayout>,
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
-        let shader = searching("trace", bindings, options.traversal, Some(constants::ALPHA_MASKS));
         let constants = search_constants(context)?
             .set(constants::COUNTS, options.profile)
             .set(constants::COUNT_COSTS, options.pixel_aovs);
         let from = |camera: bool| {
+            let tests = [constants::ALPHA_MASKS].into_iter().chain(camera.then_some(constants::CULLS_BACK_FACES));
+            let shader = searching("trace", bindings, options.traversal, tests);
             let constants = constants.clone().set(constants::FROM_CAMERA, camera);
             kernel(context, bindings, "trace", shader, &constants)
         };

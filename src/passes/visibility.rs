@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::spirv;
+use super::{is_set, spirv};
 use crate::{
     buffers::Resources,
     gpu::{Area, BindingLayout, Commands, Context, DrawDesc, GpuError, RasterDesc, RasterPipeline, RasterTargets},
@@ -19,7 +19,7 @@ impl Visibility {
         let desc = RasterDesc {
             name: "visibility",
             vertex: spirv!("visibility.vert"),
-            fragment: match bindings.value(constants::ALPHA_MASKS) != 0 {
+            fragment: match is_set(bindings, [constants::ALPHA_MASKS, constants::CULLS_BACK_FACES]) {
                 true => spirv!("visibility_alpha_test.frag"),
                 false => spirv!("visibility.frag"),
             },

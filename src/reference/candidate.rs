@@ -11,6 +11,7 @@ pub struct HitFilter {
     pub shear: Shear,
     pub t_min: f32,
     pub source_triangle: u32,
+    pub alpha_seed: u32,
 }
 
 impl HitFilter {
@@ -18,7 +19,7 @@ impl HitFilter {
     #[inline(always)]
     pub fn of(ray: &SearchRay) -> Self {
         let shear = Shear::of(ray.origin.to_array(), ray.direction.to_array());
-        Self { shear, t_min: ray.t_min, source_triangle: ray.source_triangle }
+        Self { shear, t_min: ray.t_min, source_triangle: ray.source_triangle, alpha_seed: ray.alpha_seed }
     }
 
     /// Keeps a hit in `best` if it counts and is nearer. Of two hits at the same t, the one with the lower triangle
@@ -27,7 +28,7 @@ impl HitFilter {
     pub fn keep_nearest(&self, inputs: &KernelInputs<impl ReadCounter>, hit: &Hit, best: &mut Hit) {
         let nearer = hit.t < best.t || (hit.t == best.t && hit.triangle_ix < best.triangle_ix);
         let is_of_ray = hit.t > self.t_min && hit.triangle_ix != self.source_triangle;
-        if is_of_ray && nearer && inputs.is_accepted(hit) {
+        if is_of_ray && nearer && inputs.is_accepted(&self.shear, hit, self.alpha_seed) {
             *best = *hit;
         }
     }

@@ -49,14 +49,21 @@ fn scales_of(direction: Vec3) -> [f32; 2] {
 #[inline(always)]
 fn scaled(ray: &Ray) -> SearchRay {
     let [scale, inv_scale] = scales_of(ray.direction);
-    let nowhere =
-        SearchRay { origin: Vec3::ZERO, t_min: 1.0, direction: Vec3::X, t_max: 0.0, source_triangle: NO_TRIANGLE };
+    let nowhere = SearchRay {
+        origin: Vec3::ZERO,
+        t_min: 1.0,
+        direction: Vec3::X,
+        t_max: 0.0,
+        source_triangle: NO_TRIANGLE,
+        alpha_seed: 0,
+    };
     let scaled = SearchRay {
         origin: ray.origin,
         t_min: ray.t_min * inv_scale,
         direction: ray.direction * scale,
         t_max: min(ray.t_max, f32::MAX) * inv_scale,
         source_triangle: NO_TRIANGLE,
+        alpha_seed: 0,
     };
     if is_ray(ray) { scaled } else { nowhere }
 }

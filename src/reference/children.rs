@@ -9,12 +9,20 @@ use super::{
     microfacet::is_microfacet,
     surface::Surface,
 };
-use crate::layout::{CHILD_REFLECTED, CHILD_TRANSMITTED, Hit, LEAST_THROUGHPUT, Material, NO_TRIANGLE, PathRay};
+use crate::layout::{CHILD_REFLECTED, CHILD_TRANSMITTED, Frame, Hit, LEAST_THROUGHPUT, Material, NO_TRIANGLE, PathRay};
 
 /// The weight of a child ray, or 0 if its throughput is negligible in all colours.
 fn kept_weight(ray: &PathRay, material: &Material, weight: Vec3) -> Vec3 {
     let least = if is_microfacet(material) { LEAST_THROUGHPUT } else { 0.0 };
     if (ray.throughput * weight).cmpgt(Vec3::splat(least)).any() { weight } else { Vec3::ZERO }
+}
+
+/// Whether the ray is on the last level of rays, and has no children that use a further one. In frames with bounces
+/// beside the levels, the `t_max` of a ray says how many levels the ray has used: as many floats lie between it and
+/// infinity.
+fn is_on_last_level(frame: &Frame, ray: &PathRay) -> bool {
+    let n_used = || f32::INFINITY.to_bits() - ray.t_max.to_bits();
+    frame.extra_bounces > 0 && n_used() + 1 >= frame.max_depth - frame.extra_bounces
 }
 
 fn scattering_at(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> (Surface, Scattering) {
@@ -23,6 +31,10 @@ fn scattering_at(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> (Surface, S
     let transmitted = transmittance(&material, &surface, hit.t);
     next.reflected_weight = kept_weight(ray, &material, next.reflected_weight * transmitted);
     next.transmitted_weight = kept_weight(ray, &material, next.transmitted_weight * transmitted);
+    if is_on_last_level(inputs.frame(), ray) {
+        next.reflected_weight = Vec3::ZERO;
+        next.transmitted_weight = if next.passes_straight { next.transmitted_weight } else { Vec3::ZERO };
+    }
     (surface, next)
 }
 
@@ -46,12 +58,15 @@ pub fn children_of(inputs: &KernelInputs, ray: &PathRay, hit: &Hit, kinds: u32) 
     let scattering = (kinds != 0).then(|| scattering_at(inputs, ray, hit));
     let children = scattering.map(|(surface, next)| {
         [
-            (CHILD_REFLECTED, next.reflected, next.reflected_weight),
-            (CHILD_TRANSMITTED, next.transmitted, next.transmitted_weight),
+            (CHILD_REFLECTED, next.reflected, next.reflected_weight, true),
+            (CHILD_TRANSMITTED, next.transmitted, next.transmitted_weight, !next.passes_straight),
         ]
-        .map(|(kind, direction, weight)| {
-            let throughput = ray.throughput * weight;
-            (kinds & kind != 0).then(|| surface.ray_from(direction, hit.triangle_ix, ray, throughput))
+        .map(|(kind, direction, weight, uses_level)| {
+            (kinds & kind != 0).then(|| {
+                let child = surface.ray_from(direction, hit.triangle_ix, ray, ray.throughput * weight);
+                let uses_level = uses_level && inputs.frame().extra_bounces > 0;
+                PathRay { t_max: if uses_level { ray.t_max.next_down() } else { ray.t_max }, ..child }
+            })
         })
     });
     children.into_iter().flatten().flatten()

@@ -4,17 +4,19 @@ use glam::Vec3;
 
 use super::alpha_test::fails_alpha_test;
 use super::counting::table::{Counted, CountedSlice, NoCounter, ReadCounts};
+use super::triangle::Shear;
 use crate::{
     accel::{
         Accel,
         grid::{Grid, Lattice},
         kdtree::{KdTree, TraversalLinks},
+        two_level::TwoLevel,
     },
     layout::{
-        AccelConstants, Frame, GridCell, Hit, KdBox, KdNode, KdRope, Light, Material, Plane, Slab, TRIANGLE_HIDDEN,
-        Triangle,
+        AccelConstants, Frame, GridCell, Hit, INSTANCE_FOR_CAMERA, INSTANCE_FOR_OTHERS, INSTANCE_FOR_SHADOWS, Instance,
+        KdBox, KdNode, KdRope, Light, Material, Plane, Slab, TRIANGLE_HIDDEN, Triangle,
     },
-    world::{Emitters, Geometry, Textures, World},
+    world::{Emitters, Geometry, Instances, Textures, World, instances::Stored},
 };
 
 /// The scene, its acceleration structure and the frame's constants. `R` counts reads of the structure.
@@ -46,6 +48,10 @@ pub struct KernelInputs<'a, R = NoCounter> {
     pub tests_blended: bool,
     /// Whether rays pass through blended surfaces at random, as often as their opacity says.
     pub stochastic_alpha: bool,
+    /// Whether the rays are the camera's.
+    pub is_of_camera: bool,
+    /// Whether rays pass through the back faces of single-sided materials, as camera rays do.
+    pub culls_back_faces: bool,
     pub lights: &'a [Light],
     /// What the path tracer samples lights from; `None` for rays that do not belong to a frame.
     pub emitters: Option<&'a Emitters>,
@@ -69,6 +75,43 @@ pub struct KernelInputs<'a, R = NoCounter> {
     pub grid_cells: CountedSlice<'a, GridCell, R>,
     /// The levels of a grid's cells, 1 or 2; 0 for a kd-tree.
     pub n_grid_levels: u32,
+    /// The instances of which the world consists; `None` if it is flat.
+    pub instanced: Option<Instanced<'a>>,
+    /// The instance whose geometry is searched: the arrays of the structure, `box_min`, `box_max`, `origin_reach` and
+    /// `triangles` are the geometry's, and the indices of triangles are those within it.
+    pub inside: Option<&'a Instance>,
+}
+
+/// The instances of a world, and their structure.
+#[derive(Clone, Copy, Debug)]
+pub struct Instanced<'a> {
+    pub instances: &'a Instances,
+    pub two: &'a TwoLevel,
+}
+
+impl<'a, R: Copy> KernelInputs<'a, R> {
+    /// Returns the inputs of the search through an instance's geometry.
+    pub fn of_instance(&self, Instanced { instances, two }: &Instanced<'a>, instance: &'a Instance) -> Self {
+        let geometry_ix = instance.geometry_ix as usize;
+        let tree = &two.trees()[geometry_ix];
+        let nodes = two.node_begins()[geometry_ix]..two.node_begins()[geometry_ix + 1];
+        let constants = tree.constants();
+        Self {
+            box_min: constants.box_min,
+            box_max: constants.box_max,
+            origin_reach: constants.origin_reach,
+            triangles: instances.ranges[geometry_ix].of(self.triangles),
+            kd_nodes: self.kd_nodes.with_items(tree.nodes()),
+            kd_parents: self.kd_parents.with_items(tree.parents()),
+            leaf_triangles: self.leaf_triangles.with_items(tree.leaf_triangles()),
+            leaf_planes: tree.leaf_planes(),
+            kd_slabs: self.kd_slabs.with_items(tree.slabs()),
+            kd_boxes: self.kd_boxes.part(nodes.clone()),
+            kd_ropes: self.kd_ropes.part(6 * nodes.start..6 * nodes.end),
+            inside: Some(instance),
+            ..*self
+        }
+    }
 }
 
 impl<'a, R> KernelInputs<'a, R> {
@@ -81,24 +124,91 @@ impl<'a, R> KernelInputs<'a, R> {
         self.frame.expect("rays of a frame")
     }
 
-    /// Returns whether a hit counts: rays pass through hidden triangles, and where the alpha test fails.
+    /// Returns whether a hit counts: rays pass through hidden triangles, where the alpha test fails, and those of the
+    /// camera through back faces. `shear` is the ray's.
     #[inline(always)]
-    pub fn is_accepted(&self, hit: &Hit) -> bool {
-        !self.lets_rays_pass() || self.is_solid_at(hit)
+    pub fn is_accepted(&self, shear: &Shear, hit: &Hit, alpha_seed: u32) -> bool {
+        (!self.culls_back_faces || !self.is_culled(shear, hit))
+            && (!self.lets_rays_pass() || self.is_solid_at(hit, alpha_seed))
     }
 
-    /// Returns whether triangles may let a ray pass, so that [`KernelInputs::is_accepted`] has to be asked.
+    /// Returns a hit of the search through a geometry as one of the world.
+    #[inline(always)]
+    pub fn in_world(&self, hit: &Hit) -> Hit {
+        let Some(instance) = self.inside else { return *hit };
+        let (u, v) = if instance.is_mirrored() { (hit.v, hit.u) } else { (hit.u, hit.v) };
+        Hit { triangle_ix: instance.first_triangle + hit.triangle_ix, u, v, ..*hit }
+    }
+
+    /// Returns where a triangle of the world is stored.
+    #[inline(always)]
+    pub fn stored(&self, triangle_ix: u32) -> Stored<'a> {
+        match (self.instanced, self.inside) {
+            (None, _) => Stored { row: triangle_ix as usize, instance: None },
+            (Some(instanced), None) => instanced.instances.stored(triangle_ix as usize),
+            (Some(_), Some(instance)) => instance.stored(triangle_ix),
+        }
+    }
+
+    /// Returns a triangle of the world.
+    #[inline(always)]
+    pub fn triangle(&self, triangle_ix: u32) -> Triangle {
+        let Stored { row, instance } = self.stored(triangle_ix);
+        instance.map_or(self.triangles[row], |it| it.triangle(&self.triangles[row]))
+    }
+
+    /// Returns the index of the material of a triangle of the world.
+    #[inline(always)]
+    pub fn material_ix_of(&self, triangle_ix: u32) -> u32 {
+        let Stored { row, instance } = self.stored(triangle_ix);
+        match (instance, self.instanced) {
+            (Some(it), Some(all)) => {
+                all.instances.materials[(it.first_material + self.triangle_materials[row]) as usize]
+            }
+            _ => self.triangle_materials[row],
+        }
+    }
+
+    /// Returns the kind of the rays, as a bit of [`Instance::flags`].
+    pub(super) fn kind_of_rays(&self, any_hit: bool) -> u32 {
+        match self.tests_blended && any_hit {
+            _ if self.is_of_camera => INSTANCE_FOR_CAMERA,
+            true => INSTANCE_FOR_SHADOWS,
+            false => INSTANCE_FOR_OTHERS,
+        }
+    }
+
+    /// Returns whether rays pass from behind through the triangle of a hit of the search.
+    #[inline(always)]
+    pub fn passes_from_behind(&self, triangle_ix: u32) -> bool {
+        self.culls_back_faces && self.is_single_sided(triangle_ix)
+    }
+
+    fn is_single_sided(&self, triangle_ix: u32) -> bool {
+        let triangle_ix = self.inside.map_or(triangle_ix, |it| it.first_triangle + triangle_ix);
+        self.materials[self.material_ix_of(triangle_ix) as usize].is_single_sided()
+    }
+
+    fn is_culled(&self, shear: &Shear, hit: &Hit) -> bool {
+        self.passes_from_behind(hit.triangle_ix) && shear.is_back_face(&self.triangles[hit.triangle_ix as usize])
+    }
+
+    /// Returns whether parts of triangles may let a ray pass, from both sides.
     #[inline(always)]
     pub fn lets_rays_pass(&self) -> bool {
         self.filters || self.alpha_masks.is_some()
     }
 
     #[cold]
-    fn is_solid_at(&self, hit: &Hit) -> bool {
-        let word = self.triangle_materials[hit.triangle_ix as usize];
+    pub fn is_solid_at(&self, hit: &Hit, alpha_seed: u32) -> bool {
+        let hit = &self.in_world(hit);
         match self.alpha_masks {
-            Some(textures) => !fails_alpha_test(textures, word, hit, self.tests_blended, self.stochastic_alpha),
-            None => word & TRIANGLE_HIDDEN == 0,
+            Some(textures) => {
+                let (at, material_ix) = (self.stored(hit.triangle_ix), self.material_ix_of(hit.triangle_ix));
+                let alpha_seed = self.stochastic_alpha.then_some(alpha_seed);
+                !fails_alpha_test(textures, material_ix, (hit, &at), self.tests_blended, alpha_seed)
+            }
+            None => self.triangle_materials[hit.triangle_ix as usize] & TRIANGLE_HIDDEN == 0,
         }
     }
 }
@@ -126,6 +236,13 @@ impl<'a> KernelInputs<'a> {
         match geometry.accel() {
             Accel::KdTree(tree) => Self::of_tree(triangles, tree),
             Accel::Grid(grid) => Self::of_grid(triangles, grid.get(triangles)),
+            Accel::TwoLevel(two) => {
+                let [box_min, box_max] = two.bounds();
+                let origin_reach = two.origin_reach();
+                let constants = AccelConstants { box_min, box_max, origin_reach, ..AccelConstants::default() };
+                let instanced = geometry.instances().map(|instances| Instanced { instances, two });
+                Self { instanced, ..Self::without_accel(triangles, &constants) }
+            }
         }
     }
 
@@ -170,6 +287,8 @@ impl<'a> KernelInputs<'a> {
             path_alpha_test: None,
             tests_blended: false,
             stochastic_alpha: false,
+            is_of_camera: false,
+            culls_back_faces: false,
             lights: &[],
             emitters: None,
             kd_nodes: CountedSlice::from(&[][..]),
@@ -182,6 +301,8 @@ impl<'a> KernelInputs<'a> {
             lattice: None,
             grid_cells: CountedSlice::from(&[][..]),
             n_grid_levels: 0,
+            instanced: None,
+            inside: None,
         }
     }
 
@@ -202,6 +323,8 @@ impl<'a> KernelInputs<'a> {
             path_alpha_test: self.path_alpha_test,
             tests_blended: self.tests_blended,
             stochastic_alpha: self.stochastic_alpha,
+            is_of_camera: self.is_of_camera,
+            culls_back_faces: self.culls_back_faces,
             lights: self.lights,
             emitters: self.emitters,
             kd_nodes: self.kd_nodes.with_counter(Counted(&counts.n_nodes)),
@@ -214,6 +337,8 @@ impl<'a> KernelInputs<'a> {
             lattice: self.lattice,
             grid_cells: self.grid_cells.with_counter(Counted(&counts.n_nodes)),
             n_grid_levels: self.n_grid_levels,
+            instanced: self.instanced,
+            inside: self.inside,
         }
     }
 
@@ -222,7 +347,7 @@ impl<'a> KernelInputs<'a> {
     /// # Panics
     /// Nothing was hit.
     pub fn material_at(&self, hit: &Hit) -> &'a Material {
-        &self.materials[self.triangle_materials[hit.triangle_ix as usize] as usize]
+        &self.materials[self.material_ix_of(hit.triangle_ix) as usize]
     }
 
     /// Returns the same inputs, but rays pass through triangles whose word is `TRIANGLE_HIDDEN`. There is one word
@@ -235,6 +360,12 @@ impl<'a> KernelInputs<'a> {
     /// `LEAST_SHADOWING_OPACITY`.
     pub fn with_blended_tested(self) -> Self {
         Self { tests_blended: true, ..self }
+    }
+
+    /// Returns the inputs of camera rays, which pass through the back faces of single-sided materials.
+    pub fn of_camera(self) -> Self {
+        let culls_back_faces = self.materials.iter().any(Material::is_single_sided);
+        Self { is_of_camera: true, culls_back_faces, ..self }
     }
 
     /// Returns the inputs of paths: with the materials that [`path_materials`](crate::world::path_materials) returns,

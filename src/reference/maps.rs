@@ -7,7 +7,7 @@ use glam::{Vec3, Vec4};
 use super::{
     inputs::KernelInputs,
     microfacet::is_microfacet,
-    surface::{Surface, decode_normal, surface_at},
+    surface::{Surface, decode_normal, surface_of},
     texture::{sample_texture, scalar_of, uv_set_of},
 };
 use crate::{
@@ -15,13 +15,13 @@ use crate::{
         FLAT_NORMAL, Frame, Hit, LEAST_COSINE, LEAST_NORMAL_SQUARED, MAPS_ALPHA_MASK, MAPS_COLOUR_HAS_OPACITY,
         MAPS_CORNERS_HAVE_OPACITY, Material, MaterialMaps, NO_TEXTURE, PathRay, Texture, Triangle,
     },
-    world::Textures,
+    world::{Textures, instances::Stored},
 };
 
 /// A hit, as textures are looked up at it.
 struct TextureHit<'a> {
     textures: &'a Textures,
-    triangle_ix: u32,
+    at: Stored<'a>,
     u: f32,
     v: f32,
     log_width: LogWidth<'a>,
@@ -34,7 +34,7 @@ struct LogWidth<'a> {
     frame: &'a Frame,
     ray: &'a PathRay,
     hit: &'a Hit,
-    t: &'a Triangle,
+    t: Triangle,
     geometric: Vec3,
 }
 
@@ -50,7 +50,7 @@ fn cone_width(frame: &Frame, ray: &PathRay, hit: &Hit) -> f32 {
 impl LogWidth<'_> {
     fn get(&self) -> f32 {
         *self.cell.get_or_init(|| {
-            let t = self.t;
+            let t = &self.t;
             let (e1, e2) = (t.v1 - t.v0, t.v2 - t.v0);
             let scale = 1.0 / e1.abs().max_element().max(e2.abs().max_element());
             let doubled_area = (e1 * scale).cross(e2 * scale).length();
@@ -68,14 +68,14 @@ impl<'a> TextureHit<'a> {
         (ray, hit): (&'a PathRay, &'a Hit),
         geometric: Vec3,
     ) -> Self {
-        let t = &inputs.triangles[hit.triangle_ix as usize];
+        let t = inputs.triangle(hit.triangle_ix);
         let log_width = LogWidth { cell: OnceCell::new(), frame: inputs.frame(), ray, hit, t, geometric };
-        Self { textures, triangle_ix: hit.triangle_ix, u: hit.u, v: hit.v, log_width }
+        Self { textures, at: inputs.stored(hit.triangle_ix), u: hit.u, v: hit.v, log_width }
     }
 
     /// The mip level of a texture whose texels are as large as the cone on the surface.
     fn mip_of(&self, map: &Texture) -> f32 {
-        let [a, b, c] = self.textures.uvs_of(self.triangle_ix, uv_set_of(map));
+        let [a, b, c] = self.textures.uvs_of(&self.at, uv_set_of(map));
         let (e1, e2) = (b - a, c - a);
         let scale = (map.m00 * map.m11 - map.m01 * map.m10).abs();
         let (width, height) = ((map.size & 0xffff) as f32, (map.size >> 16) as f32);
@@ -85,7 +85,7 @@ impl<'a> TextureHit<'a> {
 
     fn map_at(&self, texture_ix: u32) -> Vec4 {
         let map = &self.textures.textures[texture_ix as usize];
-        let uv = self.textures.uv_at(self.triangle_ix, uv_set_of(map), self.u, self.v);
+        let uv = self.textures.uv_at(&self.at, uv_set_of(map), self.u, self.v);
         let mip = if self.textures.has_uvs() { self.mip_of(map) } else { 0.0 };
         sample_texture(&self.textures.texels, map, uv, mip)
     }
@@ -105,15 +105,16 @@ impl<'a> TextureHit<'a> {
 
     /// The shading normal that the normal map gives, on the side of the interpolated normal.
     fn mapped_normal(&self, maps: &MaterialMaps, surface: &Surface) -> Vec3 {
-        let corners = self.textures.corners.get(self.triangle_ix as usize);
+        let corners = self.textures.corners.get(self.at.row);
         let Some(corners) = corners.filter(|_| maps.normal != NO_TEXTURE) else { return surface.interpolated };
-        if corners.iter().any(|corner| corner.tangent == FLAT_NORMAL) {
+        let tangents = self.at.corners(corners.map(|corner| self.at.tangent(corner.tangent)));
+        if tangents.contains(&FLAT_NORMAL) {
             return surface.interpolated;
         }
         let weights = [1.0 - self.u - self.v, self.u, self.v];
-        let weighted = weights.iter().zip(corners).map(|(weight, corner)| *weight * decode_normal(corner.tangent & !1));
+        let weighted = weights.iter().zip(tangents).map(|(weight, tangent)| *weight * decode_normal(tangent & !1));
         let tangent: Vec3 = weighted.fold(Vec3::ZERO, |sum, tangent| sum + tangent);
-        let side = if corners[2].tangent & 1 != 0 { 1.0 } else { -1.0 };
+        let side = if tangents[2] & 1 != 0 { 1.0 } else { -1.0 };
         let front = if surface.is_reversed { -1.0 } else { 1.0 };
         let normal = front * surface.interpolated;
         let tangent = tangent - tangent.dot(normal) * normal;
@@ -133,7 +134,7 @@ impl<'a> TextureHit<'a> {
     /// The colour by which textures and the colours of the triangle's corners multiply the material's. The colours of
     /// the corners and of the texture follow, with their opacity.
     fn base_colour(&self, maps: &MaterialMaps) -> (Vec3, Vec4, Vec4) {
-        let corner_colour = self.textures.corner_colour_at(self.triangle_ix, self.u, self.v);
+        let corner_colour = self.textures.corner_colour_at(&self.at, self.u, self.v);
         let map_colour = if maps.base_colour == NO_TEXTURE { Vec4::ONE } else { self.map_at(maps.base_colour) };
         (corner_colour.truncate() * map_colour.truncate().max(Vec3::ZERO), corner_colour, map_colour)
     }
@@ -171,14 +172,19 @@ fn squared_tangent(cosine: f32) -> f32 {
     (1.0 - cosine * cosine).max(0.0) / (cosine * cosine)
 }
 
+/// Whether a normal map has bent the shading normal. It has not where a normal is not a number.
+pub fn is_bent(surface: &Surface) -> bool {
+    (surface.shading - surface.interpolated).abs().cmpgt(Vec3::ZERO).any()
+}
+
 /// The share of a light that reaches a bent normal, whose bumps shadow one another: 1 from the direction of the
 /// interpolated normal, 0 at the horizon of the interpolated surface.
-pub fn bump_shadowing(inputs: &KernelInputs, surface: &Surface, to_light: Vec3) -> f32 {
-    if inputs.textures.is_none() || surface.shading == surface.interpolated {
+pub fn bump_shadowing(surface: &Surface, to_light: Vec3) -> f32 {
+    if !is_bent(surface) {
         return 1.0;
     }
     let cos_bend = surface.interpolated.dot(surface.shading).abs().max(LEAST_COSINE);
-    let cos_light = surface.interpolated.dot(to_light).max(LEAST_COSINE);
+    let cos_light = surface.interpolated.dot(to_light).abs().max(LEAST_COSINE);
     let squared_width = (0.125 * squared_tangent(cos_bend)).min(1.0);
     2.0 / (1.0 + (1.0 + squared_width * squared_tangent(cos_light)).sqrt())
 }
@@ -188,10 +194,8 @@ pub fn bump_shadowing(inputs: &KernelInputs, surface: &Surface, to_light: Vec3) 
 /// # Panics
 /// Nothing was hit.
 pub fn shaded_at(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> (Surface, Material) {
-    let triangle_ix = hit.triangle_ix as usize;
-    let t = &inputs.triangles[triangle_ix];
-    let material_ix = inputs.triangle_materials[triangle_ix] as usize;
-    let mut surface = surface_at(ray, hit, t);
+    let material_ix = inputs.material_ix_of(hit.triangle_ix) as usize;
+    let mut surface = surface_of(ray, hit, &inputs.triangle(hit.triangle_ix), &inputs.stored(hit.triangle_ix));
     let mut material = inputs.materials[material_ix];
     if let Some(textures) = inputs.textures {
         let maps = &textures.material_maps[material_ix];
@@ -207,7 +211,7 @@ pub fn shaded_at(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> (Surface, M
 /// # Panics
 /// Nothing was hit.
 pub fn colour_at(inputs: &KernelInputs, ray: &PathRay, hit: &Hit, geometric: Vec3) -> Vec3 {
-    let material_ix = inputs.triangle_materials[hit.triangle_ix as usize] as usize;
+    let material_ix = inputs.material_ix_of(hit.triangle_ix) as usize;
     let kd = inputs.materials[material_ix].kd;
     let Some(textures) = inputs.textures else { return kd };
     kd * TextureHit::new(inputs, textures, (ray, hit), geometric).base_colour(&textures.material_maps[material_ix]).0

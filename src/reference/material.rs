@@ -24,6 +24,8 @@ pub struct Scattering {
     pub reflected_weight: Vec3,
     pub transmitted: Vec3,
     pub transmitted_weight: Vec3,
+    /// Whether what is transmitted goes straight on through a blended surface.
+    pub passes_straight: bool,
 }
 
 /// The weight of the light that the surface itself reflects and emits. A see-through material (d < 1) covers only a
@@ -136,6 +138,7 @@ fn scatter_by_microfacets(material: &Material, surface: &Surface, direction: Vec
             false => direction,
         },
         transmitted_weight: material.d * through * (1.0 - dielectric.max_element()) * tint + (1.0 - material.d),
+        passes_straight: material.d < 1.0 && (!is_solid || total),
     }
 }
 
@@ -153,6 +156,7 @@ pub fn scatter(material: &Material, surface: &Surface, direction: Vec3) -> Scatt
             reflected_weight: Vec3::ZERO,
             transmitted: direction,
             transmitted_weight: Vec3::splat(1.0 - material.d),
+            passes_straight: true,
         };
     }
     if is_microfacet(material) {
@@ -163,11 +167,13 @@ pub fn scatter(material: &Material, surface: &Surface, direction: Vec3) -> Scatt
         reflected_weight: Vec3::ZERO,
         transmitted: direction,
         transmitted_weight: Vec3::ZERO,
+        passes_straight: false,
     };
     let reflects = material.flags & MATERIAL_REFLECT != 0;
     let refracts = material.flags & MATERIAL_REFRACT != 0;
     if !reflects && !refracts {
         s.transmitted_weight = Vec3::splat(1.0 - material.d);
+        s.passes_straight = true;
         return s;
     }
     let eta = if surface.from_inside { material.ni } else { 1.0 / material.ni };

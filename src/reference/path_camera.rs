@@ -5,7 +5,7 @@ use glam::{UVec2, Vec2, Vec3, vec2};
 use super::{
     camera::pixel_ix_of, inputs::KernelInputs, noise_tiles::picture_pixel_of, tent::tent, turns::sin_cos_of_turns,
 };
-use crate::layout::{FILTER_BOX, FILTER_TENT, Frame, NO_TRIANGLE, PathRay};
+use crate::layout::{FILTER_BOX, FILTER_CENTRE, FILTER_TENT, Frame, NO_TRIANGLE, PathRay};
 
 /// The direction of an angle that is the share `turn` of a full turn.
 fn on_circle(turn: f32) -> Vec2 {
@@ -16,6 +16,7 @@ fn on_circle(turn: f32) -> Vec2 {
 /// The offset of a sample from the centre of its pixel, pixels. Its pdf is the pixel's filter.
 pub fn filter_offset(frame: &Frame, u: Vec2) -> Vec2 {
     match frame.pixel_filter {
+        FILTER_CENTRE => Vec2::ZERO,
         FILTER_BOX => u - 0.5,
         FILTER_TENT => vec2(tent(u.x), tent(u.y)),
         _ => {
@@ -62,5 +63,33 @@ pub fn path_camera_ray(inputs: &KernelInputs, pixel: UVec2, in_pixel: Vec2, in_l
         source_triangle: NO_TRIANGLE,
         throughput: Vec3::ONE,
         t_max: f32::INFINITY,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::layout::FILTER_GAUSSIAN;
+
+    /// The filter `gaussian` is as wide as the help says: it has standard deviation 0.5 px before it is cut off at
+    /// 1.5 px from the centre.
+    #[test]
+    fn a_gaussian_is_cut_off() {
+        const N: usize = 400;
+        let frame = Frame { pixel_filter: FILTER_GAUSSIAN, ..Frame::default() };
+        let unit = |i: usize| (i as f32 + 0.5) / N as f32;
+        let offsets: Vec<_> = (0..N * N).map(|i| filter_offset(&frame, vec2(unit(i % N), unit(i / N)))).collect();
+        let weight = |x: f32, y: f32| if x.hypot(y) < 1.5 { (-2.0 * (x * x + y * y)).exp() } else { 0.0 };
+        let at = |i: usize| 3.0 * unit(i) - 1.5;
+        let integral = |most: f32| -> f32 {
+            let columns = (0..N).filter(|&i| at(i) < most);
+            columns.map(|i| (0..N).map(|k| weight(at(i), at(k))).sum::<f32>()).sum()
+        };
+        for most in [-1.2, -0.6, 0.0, 0.9] {
+            let found = offsets.iter().filter(|offset| offset.x < most).count() as f32 / (N * N) as f32;
+            let expected = integral(most) / integral(2.0);
+            assert!((found - expected).abs() < 0.003 * expected.max(0.1), "{most}: {found}, not {expected}");
+        }
+        assert!(offsets.iter().all(|offset| offset.length() < 1.5 + 1e-5));
     }
 }

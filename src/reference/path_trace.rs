@@ -5,40 +5,60 @@ use rayon::prelude::*;
 
 use super::{
     RAYS_PER_TASK,
+    alpha_test::alpha_seed_of,
     inputs::KernelInputs,
     live_paths::{Part, parts},
+    paths::{key_of_path, pixel_of_path},
     search_ray::SearchRay,
     traverser::{Tracer, Traverser},
 };
 use crate::{
     accel::kdtree::Traversal,
-    layout::{Hit, NO_TRIANGLE, PathRay, PathState, SHADOW_RAY_NONE, ShadowRay},
+    layout::{Batch, Hit, NO_TRIANGLE, PathRay, PathState, SHADOW_RAY_NONE, ShadowRay},
 };
+
+/// Returns the ray of a path in the form in which it is traced.
+pub(crate) fn search_ray_of(
+    inputs: &KernelInputs,
+    batch: &Batch,
+    path_ix: u32,
+    ray: &PathRay,
+    is_shadow_ray: bool,
+) -> SearchRay {
+    let mut search_ray = SearchRay::from(ray);
+    // No other scene needs it.
+    if inputs.lets_rays_pass() {
+        let key = key_of_path(inputs, path_ix, pixel_of_path(inputs.frame(), batch, path_ix));
+        search_ray.alpha_seed = alpha_seed_of(key, batch.depth, is_shadow_ray);
+    }
+    search_ray
+}
 
 /// Writes the closest hits of the paths `live`, which are in ascending order, to `hits`. Returns how many of them hit
 /// something.
 pub fn closest_hits(
     inputs: &KernelInputs,
+    batch: &Batch,
     traversal: Traversal,
-    live: &[u32],
-    rays: &[PathRay],
+    (live, rays): (&[u32], &[PathRay]),
     hits: &mut [Hit],
 ) -> u32 {
-    closest_hits_by(inputs, || Traverser::new(inputs, traversal), live, rays, hits)
+    closest_hits_by(inputs, batch, || Traverser::new(inputs, traversal), (live, rays), hits)
 }
 
 /// Does what [`closest_hits`] does, by tracers that `new_tracer` makes, at least one for each thread that works.
 pub fn closest_hits_by<T: Tracer>(
     inputs: &KernelInputs,
+    batch: &Batch,
     new_tracer: impl Fn() -> T + Sync + Send,
-    live: &[u32],
-    rays: &[PathRay],
+    (live, rays): (&[u32], &[PathRay]),
     hits: &mut [Hit],
 ) -> u32 {
     let inputs = &inputs.with_stochastic_alpha();
     let trace = |tracer: &mut T, live: &[u32], mut hits: Part<Hit>| {
         let mut n_hits = 0;
-        let search_rays = live.iter().map(|&path_ix| (path_ix, SearchRay::from(&rays[path_ix as usize])));
+        let search_ray = |path_ix| search_ray_of(inputs, batch, path_ix, &rays[path_ix as usize], false);
+        let search_rays = live.iter().map(|&path_ix| (path_ix, search_ray(path_ix)));
         tracer.trace_all::<false, _>(inputs, search_rays, |path_ix, closest| {
             n_hits += u32::from(closest.triangle_ix != NO_TRIANGLE);
             *hits.of_path(path_ix) = closest;
@@ -53,25 +73,28 @@ pub fn closest_hits_by<T: Tracer>(
 /// the paths' states, and the shadow rays are removed.
 pub fn shadow_rays(
     inputs: &KernelInputs,
+    batch: &Batch,
     traversal: Traversal,
     with_shadow_ray: &[u32],
-    shadow_rays: &mut [ShadowRay],
-    states: &mut [PathState],
+    of_paths: (&mut [ShadowRay], &mut [PathState]),
 ) {
-    shadow_rays_by(inputs, || Traverser::new(inputs, traversal), with_shadow_ray, shadow_rays, states);
+    shadow_rays_by(inputs, batch, || Traverser::new(inputs, traversal), with_shadow_ray, of_paths);
 }
 
 /// Does what [`shadow_rays`] does, by tracers that `new_tracer` makes, at least one for each thread that works.
 pub fn shadow_rays_by<T: Tracer>(
     inputs: &KernelInputs,
+    batch: &Batch,
     new_tracer: impl Fn() -> T + Sync + Send,
     with_shadow_ray: &[u32],
-    shadow_rays: &mut [ShadowRay],
-    states: &mut [PathState],
+    (shadow_rays, states): (&mut [ShadowRay], &mut [PathState]),
 ) {
     let inputs = &inputs.with_stochastic_alpha();
     let test = |tracer: &mut T, list: &[u32], mut shadow_rays: Part<ShadowRay>, mut states: Part<PathState>| {
-        let search_ray = |&path_ix: &u32| (path_ix, SearchRay::from(&ray_of(shadow_rays.of_path(path_ix))));
+        let search_ray = |&path_ix: &u32| {
+            let ray = ray_of(shadow_rays.of_path(path_ix));
+            (path_ix, search_ray_of(inputs, batch, path_ix, &ray, true))
+        };
         let search_rays: Vec<_> = list.iter().map(search_ray).collect();
         tracer.trace_all::<true, _>(inputs, search_rays.into_iter(), |path_ix, hit| {
             let shadow_ray = shadow_rays.of_path(path_ix);

@@ -8,15 +8,15 @@ use super::{
         LightSample, ambient_radiance, emission_at, emission_pdf, sample_light_with, seen_environment, seen_light,
     },
     inputs::KernelInputs,
-    maps::shaded_at,
+    maps::{is_bent, shaded_at},
     material::{emitted, is_unlit, transmittance},
     sampler::{SampleKey, random_pair},
     studio::studio_radiance,
-    surface::Surface,
+    surface::{Surface, lit_point},
 };
 use crate::layout::{
-    Hit, LEAST_SURVIVAL, NO_TRIANGLE, PathRay, PathState, ROULETTE_DEPTH, SHADOW_RAY_NONE, SHADOW_RAY_SHARE,
-    SHADOW_RAY_WAITS, STUDIO_LEAST_PDF, ShadowRay,
+    Hit, LEAST_SURVIVAL, MOST_ADDED_LIGHT, NO_TRIANGLE, PathRay, PathState, ROULETTE_DEPTH, SHADOW_RAY_NONE,
+    SHADOW_RAY_SHARE, SHADOW_RAY_WAITS, STUDIO_LEAST_PDF, ShadowRay,
 };
 
 /// The number of pairs of random numbers that come before those of the first hit: in the pixel and in the lens.
@@ -55,11 +55,11 @@ fn mis_weight(state: &PathState, light_pdf: f32) -> f32 {
     if state.pdf > 0.0 { power_heuristic(state.pdf, light_pdf) } else { 1.0 }
 }
 
-/// Light that is added to the path: bounded after the first hit, and nothing if it is not a number.
+/// Light that is added to the path: bounded, after the first hit as the options say, and nothing if it is not finite.
 fn added_light(inputs: &KernelInputs, light: Vec3, depth: u32) -> Vec3 {
     let light = if depth > 0 { light.min(Vec3::splat(inputs.frame().clamp)) } else { light };
-    let is_finite = light.cmplt(Vec3::splat(1.0e30)).all();
-    if is_finite { light.max(Vec3::ZERO) } else { Vec3::ZERO }
+    let is_finite = light.cmplt(Vec3::INFINITY).all();
+    if is_finite { light.clamp(Vec3::ZERO, Vec3::splat(MOST_ADDED_LIGHT)) } else { Vec3::ZERO }
 }
 
 /// The light of an environment that a ray meets.
@@ -90,13 +90,25 @@ struct Vertex<'a> {
     depth: u32,
     surface: &'a Surface,
     terms: &'a BsdfTerms<'a>,
-    triangle_ix: u32,
+    hit: &'a Hit,
     throughput: Vec3,
+}
+
+/// The vector from a hit to the start of a ray in a direction to which lobes with a pdf scatter light.
+fn to_start(inputs: &KernelInputs, surface: &Surface, hit: &Hit, direction: Vec3) -> Vec3 {
+    let is_mapped = is_bent(surface);
+    let is_below = direction.dot(if is_mapped { surface.interpolated } else { surface.geometric }) < 0.0;
+    let offset = (if is_below { -surface.origin_offset } else { surface.origin_offset }) * surface.geometric;
+    if !is_mapped || is_below {
+        return offset;
+    }
+    let t = &inputs.triangle(hit.triangle_ix);
+    offset + (lit_point(surface, hit, t, direction) - surface.point_world)
 }
 
 /// The shadow ray to a light that is sampled at a hit.
 fn shadow_ray_to_light(inputs: &KernelInputs, choices: &HitChoices, vertex: &Vertex) -> ShadowRay {
-    let &Vertex { depth, surface, terms, triangle_ix, throughput } = vertex;
+    let &Vertex { depth, surface, terms, hit, throughput } = vertex;
     if is_smooth(terms.material) {
         return NO_SHADOW_RAY;
     }
@@ -115,14 +127,12 @@ fn shadow_ray_to_light(inputs: &KernelInputs, choices: &HitChoices, vertex: &Ver
     if !light.cmpgt(Vec3::ZERO).any() {
         return NO_SHADOW_RAY;
     }
-    let side =
-        if sample.direction.dot(surface.geometric) < 0.0 { -surface.origin_offset } else { surface.origin_offset };
-    let offset = side * surface.geometric;
+    let offset = to_start(inputs, surface, hit, sample.direction);
     let mut shadow_ray = ShadowRay {
         origin: surface.point_world + offset,
         state: SHADOW_RAY_WAITS,
         direction: sample.direction,
-        source_triangle: triangle_ix,
+        source_triangle: hit.triangle_ix,
         light,
         t_max: sample.distance,
     };
@@ -196,7 +206,7 @@ pub fn step_past_lights(
     let terms = bsdf_terms(&mut material, &surface, -ray.direction);
     let choices = choices();
     let [_, survival, to_next, lobe] = choices.pairs;
-    let vertex = Vertex { depth, surface: &surface, terms: &terms, triangle_ix: hit.triangle_ix, throughput };
+    let vertex = Vertex { depth, surface: &surface, terms: &terms, hit, throughput };
     let shadow_ray = shadow_ray_to_light(inputs, &choices, &vertex);
     let next = sample_bsdf(&terms, &surface, vec3(to_next.x, to_next.y, lobe.x));
     throughput *= next.weight;
@@ -204,6 +214,9 @@ pub fn step_past_lights(
         return (false, shadow_ray);
     }
     *ray = surface.ray_from(next.direction, hit.triangle_ix, ray, throughput);
+    if is_bent(&surface) && !next.is_delta {
+        ray.origin = surface.point_world + to_start(inputs, &surface, hit, next.direction);
+    }
     state.pdf = if next.is_delta { 0.0 } else { next.pdf };
     (true, shadow_ray)
 }

@@ -27,7 +27,7 @@ fn aovs_of(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> PixelAovs {
         position_world: surface.point_world,
         triangle_ix: hit.triangle_ix,
         normal_world: surface.shading,
-        material_ix: inputs.triangle_materials[hit.triangle_ix as usize],
+        material_ix: inputs.material_ix_of(hit.triangle_ix),
         albedo: material.kd,
         depth: (surface.point_world - inputs.frame().eye).dot(inputs.frame().forward),
         ..PixelAovs::default()

@@ -43,7 +43,7 @@ pub fn primary_hit(inputs: &KernelInputs, triangle_ids: &[u32], rays: &[PathRay]
             *hit = Hit { t: f32::INFINITY, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
             if triangle_ix != NO_TRIANGLE {
                 let shear = Shear::of(ray.origin.to_array(), ray.direction.to_array());
-                *hit = shear.clamp_to_triangle(&inputs.triangles[triangle_ix as usize], triangle_ix);
+                *hit = shear.clamp_to_triangle(&inputs.triangle(triangle_ix), triangle_ix);
                 n_hits += 1;
             }
         }

@@ -15,12 +15,14 @@ pub struct SearchRay {
     pub t_max: f32,
     /// The triangle that the ray never hits, or `NO_TRIANGLE`.
     pub source_triangle: u32,
+    /// Seed of the random decisions by which a path's ray passes through blended triangles.
+    pub alpha_seed: u32,
 }
 
 impl From<&PathRay> for SearchRay {
     fn from(ray: &PathRay) -> Self {
         let &PathRay { origin, direction, t_max, source_triangle, .. } = ray;
-        Self { origin, t_min: 0.0, direction, t_max, source_triangle }
+        Self { origin, t_min: 0.0, direction, t_max, source_triangle, alpha_seed: 0 }
     }
 }
 

@@ -52,7 +52,7 @@ fn local_radiance(
         }
         let to_light = incident_light(light, surface.point_world);
         let reflectance = reflectance_of(material, surface.shading, -ray.direction, to_light.direction);
-        radiance += reflectance * bump_shadowing(inputs, surface, to_light.direction) * to_light.irradiance;
+        radiance += reflectance * bump_shadowing(surface, to_light.direction) * to_light.irradiance;
     }
     radiance * local_weight(material)
 }

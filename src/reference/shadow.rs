@@ -31,7 +31,7 @@ pub(crate) fn shadow_ray_of(inputs: &KernelInputs, ray: &PathRay, hit: &Hit, lig
     if !can_show(&material, surface.shading, -ray.direction, to_light.direction) {
         return None;
     }
-    let from = lit_point(&surface, hit, &inputs.triangles[hit.triangle_ix as usize], to_light.direction);
+    let from = lit_point(&surface, hit, &inputs.triangle(hit.triangle_ix), to_light.direction);
     let origin = from + surface.origin_offset * surface.geometric;
     Some(PathRay {
         origin,

@@ -6,6 +6,10 @@ use crate::layout::Frame;
 
 /// Radiance of the ceiling in the zenith.
 const CEILING: f32 = 0.5;
+/// Share of the background's radiance that the floor lacks.
+const FLOOR: f32 = 0.6;
+/// Sine of the angle below the horizon from which on the floor lacks that share.
+const HORIZON: f32 = 0.1;
 /// Width of a box's soft edge, as a tangent from the box's middle.
 const EDGE: f32 = 0.08;
 
@@ -31,7 +35,8 @@ fn radiance_of_box(local: Vec3, (angles, half_size, radiance): (Vec4, Vec2, f32)
     radiance * share.x * share.y
 }
 
-/// The radiance that a ray which leaves the scene after its first hit sees beside that of the background.
+/// The radiance that the studio adds to that of the background, for a ray that leaves the scene after its first hit.
+/// The floor is darker than the background, so it adds a negative radiance.
 pub fn studio_radiance(frame: &Frame, direction: Vec3) -> Vec3 {
     if frame.has_studio == 0 {
         return Vec3::ZERO;
@@ -43,7 +48,7 @@ pub fn studio_radiance(frame: &Frame, direction: Vec3) -> Vec3 {
     for it in BOXES {
         sum += radiance_of_box(local, it);
     }
-    Vec3::splat(sum)
+    Vec3::splat(sum) - FLOOR * (-local.y / HORIZON).clamp(0.0, 1.0) * frame.background
 }
 
 #[cfg(test)]
@@ -67,5 +72,15 @@ mod tests {
             }
         }
         assert_eq!(studio_radiance(&Frame::default(), Vec3::Y), Vec3::ZERO);
+    }
+
+    /// A box mirrors the floor at its sides, and stands out from the background.
+    #[test]
+    fn the_floor_is_darker_than_the_background() {
+        let background = vec3(0.3, 0.4, 0.5);
+        let frame = Frame { has_studio: 1, up_axis: 2, to_viewer: Vec3::X, background, ..Frame::default() };
+        let seen = |z: f32| background + studio_radiance(&frame, vec3(-(1.0 - z * z).sqrt(), 0.0, z));
+        assert_eq!(seen(0.0), background);
+        assert!(seen(-0.05).abs_diff_eq(0.7 * background, 1e-6) && seen(-0.9).abs_diff_eq(0.4 * background, 1e-6));
     }
 }

@@ -2,9 +2,12 @@
 
 use glam::{Vec2, Vec3};
 
-use crate::layout::{
-    CURVED_START_COSINE, FLAT_NORMAL, Hit, LEAST_NORMAL_SQUARED, LEAST_ORIGIN_OFFSET_SHARE, LEAST_WEIGHT,
-    ORIGIN_OFFSET, PLANE_START_COSINE, PathRay, Triangle,
+use crate::{
+    layout::{
+        CURVED_START_COSINE, FLAT_NORMAL, Hit, LEAST_NORMAL_SQUARED, LEAST_ORIGIN_OFFSET_SHARE, LEAST_WEIGHT,
+        ORIGIN_OFFSET, PLANE_START_COSINE, PathRay, Triangle,
+    },
+    world::instances::Stored,
 };
 
 /// The surface of a triangle at a hit, as the ray meets it.
@@ -58,8 +61,13 @@ fn inner_weights(hit: &Hit) -> Vec3 {
     weights / (weights.x + weights.y + weights.z)
 }
 
-/// The surface of triangle `t` at a hit. Its point is interpolated from the corners.
+/// The surface of triangle `t` of a flat world at a hit.
 pub fn surface_at(ray: &PathRay, hit: &Hit, t: &Triangle) -> Surface {
+    surface_of(ray, hit, t, &Stored { row: 0, instance: None })
+}
+
+/// The surface of triangle `t`, which is stored `at` a place, at a hit. Its point is interpolated from the corners.
+pub fn surface_of(ray: &PathRay, hit: &Hit, t: &Triangle, at: &Stored) -> Surface {
     let weights = inner_weights(hit);
     let magnitude = (weights.x * t.v0).abs() + (weights.y * t.v1).abs() + (weights.z * t.v2).abs();
     // The edges are scaled to about 1, since the cross product of a tiny triangle would underflow.
@@ -72,14 +80,15 @@ pub fn surface_at(ray: &PathRay, hit: &Hit, t: &Triangle) -> Surface {
     let interpolated = shading_normal(t, hit, outward);
     let is_reversed = interpolated.dot(geometric) < 0.0;
     let interpolated = if is_reversed { -interpolated } else { interpolated };
+    let point_world = weights.x * t.v0 + weights.y * t.v1 + weights.z * t.v2;
+    let largest = magnitude.max_element().max(at.placement_error(t, weights));
     Surface {
-        point_world: weights.x * t.v0 + weights.y * t.v1 + weights.z * t.v2,
+        point_world,
         geometric,
         interpolated,
         shading: interpolated,
         is_reversed,
-        origin_offset: ORIGIN_OFFSET
-            * magnitude.dot(geometric.abs()).max(LEAST_ORIGIN_OFFSET_SHARE * magnitude.max_element()),
+        origin_offset: ORIGIN_OFFSET * magnitude.dot(geometric.abs()).max(LEAST_ORIGIN_OFFSET_SHARE * largest),
         from_inside,
     }
 }

@@ -3,7 +3,7 @@
 
 use glam::{Mat3, Vec3};
 
-use crate::layout::{TONEMAP_ACES, TONEMAP_AGX};
+use crate::layout::{TONEMAP_ACES, TONEMAP_AGX, TONEMAP_NEUTRAL};
 
 /// Exposed radiance is clamped to this, since infinities would become NaN. Every curve shows white above it.
 const BRIGHTEST: f32 = 65504.0;
@@ -42,6 +42,21 @@ fn agx(exposed: Vec3) -> Vec3 {
     (OUTSET * curve).map(|x| x.max(0.0).powf(2.2))
 }
 
+fn neutral(exposed: Vec3) -> Vec3 {
+    const FIRST_COMPRESSED: f32 = 0.8 - 0.04;
+    const ROOM_ABOVE: f32 = 1.0 - FIRST_COMPRESSED;
+    const FADING: f32 = 0.15;
+    let least = exposed.min_element();
+    let exposed = exposed - if least < 0.08 { least - 6.25 * least * least } else { 0.04 };
+    let peak = exposed.max_element();
+    if peak < FIRST_COMPRESSED {
+        return exposed;
+    }
+    let shown_peak = 1.0 - ROOM_ABOVE * ROOM_ABOVE / (peak + ROOM_ABOVE - FIRST_COMPRESSED);
+    let kept = (FADING * (peak - shown_peak) + 1.0).recip();
+    Vec3::splat(shown_peak).lerp(exposed * (shown_peak / peak), kept)
+}
+
 /// Applies the exposure and a curve, one of `TONEMAP_*`. Returns linear display values, 0..1; black for NaN.
 #[expect(clippy::manual_clamp, reason = "`clamp` keeps NaN")]
 pub fn tone_mapped(curve: u32, radiance: Vec3, exposure: f32) -> Vec3 {
@@ -49,6 +64,7 @@ pub fn tone_mapped(curve: u32, radiance: Vec3, exposure: f32) -> Vec3 {
     let shown = match curve {
         TONEMAP_AGX => agx(exposed),
         TONEMAP_ACES => aces(exposed),
+        TONEMAP_NEUTRAL => neutral(exposed),
         _ => exposed,
     };
     shown.map(|x| x.max(0.0).min(1.0))
@@ -65,7 +81,7 @@ mod tests {
 
     #[test]
     fn greys_stay_grey_and_rise_from_black_to_white() {
-        for curve in [TONEMAP_LINEAR, TONEMAP_AGX, TONEMAP_ACES] {
+        for curve in [TONEMAP_LINEAR, TONEMAP_AGX, TONEMAP_ACES, TONEMAP_NEUTRAL] {
             assert!(grey(curve, 0.0).max_element() < 1e-5);
             assert!(grey(curve, f32::INFINITY).min_element() > 0.99);
             let mut before = -1.0;
@@ -87,13 +103,24 @@ mod tests {
         assert!((grey(TONEMAP_AGX, 0.18) - 0.21452).abs().max_element() < 2e-4, "{}", grey(TONEMAP_AGX, 0.18));
     }
 
+    /// A dielectric of albedo a in full light has the radiance a + 0.04, which the curve takes off again. At 0.8, where
+    /// the compression begins, the curve and its slope are continuous; by hand, 1.76 becomes 1 - 0.24^2 / 1.2.
+    #[test]
+    fn the_neutral_curve_keeps_base_colours() {
+        let base = Vec3::new(0.7, 0.3, 0.1);
+        assert!(tone_mapped(TONEMAP_NEUTRAL, base + 0.04, 1.0).abs_diff_eq(base, 1e-6));
+        let [below, at, above] = [0.799, 0.8, 0.801].map(|value| grey(TONEMAP_NEUTRAL, value).x);
+        assert!((at - 0.76).abs() < 1e-6 && (above - at - (at - below)).abs() < 1e-5, "{below} {at} {above}");
+        assert!((grey(TONEMAP_NEUTRAL, 1.76).x - 0.952).abs() < 1e-5);
+    }
+
     /// As the exposure rises, the linear curve clips one channel after the other. The other curves fade the colour
     /// towards white.
     #[test]
     fn bright_colours_fade() {
         let orange = Vec3::new(20.0, 8.0, 1.0);
         assert_eq!(tone_mapped(TONEMAP_LINEAR, orange, 1.0), Vec3::ONE);
-        for curve in [TONEMAP_AGX, TONEMAP_ACES] {
+        for curve in [TONEMAP_AGX, TONEMAP_ACES, TONEMAP_NEUTRAL] {
             let [dim, bright] = [0.02, 5.0].map(|exposure| tone_mapped(curve, orange, exposure));
             assert!(dim.z / dim.x < 0.3 && bright.z / bright.x > 0.8, "{curve}: {dim} {bright}");
         }
@@ -102,7 +129,7 @@ mod tests {
     #[test]
     fn the_exposure_is_a_factor() {
         let colour = Vec3::new(0.4, 0.2, 0.1);
-        for curve in [TONEMAP_LINEAR, TONEMAP_AGX, TONEMAP_ACES] {
+        for curve in [TONEMAP_LINEAR, TONEMAP_AGX, TONEMAP_ACES, TONEMAP_NEUTRAL] {
             assert_eq!(tone_mapped(curve, colour, 2.0), tone_mapped(curve, colour * 2.0, 1.0));
         }
     }

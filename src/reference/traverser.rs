@@ -6,6 +6,7 @@ use super::{
     counting::table::ReadCounter,
     grid::search_grid,
     inputs::KernelInputs,
+    instances::search_instances,
     kdtree::{Pending, search},
     pending_backtrack::PendingBacktrack,
     pending_mask::PendingMask,
@@ -78,6 +79,10 @@ impl Tracer for Traverser {
         inputs: &KernelInputs<impl ReadCounter>,
         search_ray: &SearchRay,
     ) -> Hit {
+        if let (Some(instanced), None) = (&inputs.instanced, inputs.inside) {
+            let search = |geometry: &KernelInputs<_>, ray: &SearchRay| self.traverse::<ANY_HIT>(geometry, ray);
+            return search_instances::<_, ANY_HIT>(inputs, instanced, search_ray, search);
+        }
         hit_from_near(inputs, search_ray, |near, best| {
             let ray = &TraversalRay::new(inputs, near);
             match self {
@@ -90,7 +95,8 @@ impl Tracer for Traverser {
                 Self::Grid => search_grid::<ANY_HIT>(inputs, ray, best),
                 Self::Ropes => follow_ropes::<ANY_HIT>(inputs, ray, best),
                 Self::Brute => {
-                    *best = brute::closest_hit_of(inputs.triangles, near, |hit| inputs.is_accepted(hit));
+                    let is_accepted = |hit: &Hit| inputs.is_accepted(&ray.hit_filter.shear, hit, near.alpha_seed);
+                    *best = brute::closest_hit_of(inputs.triangles, near, is_accepted);
                 }
             }
         })

@@ -138,6 +138,13 @@ impl Shear {
             .then(|| self.weighted_hit(exact_edges(edges, errors), corners.z, triangle_ix))
     }
 
+    /// Returns whether a ray that hits a triangle comes from behind it: from the side from which its corners turn
+    /// clockwise. The edge functions have exact signs, so the answer is right for needles, too.
+    pub fn is_back_face(&self, triangle: &Triangle) -> bool {
+        let corners = self.corners(triangle);
+        (sum_of(with_exact_signs(corners.edge_functions(), corners.edge_errors())) < 0.0) == (self.z > 0.0)
+    }
+
     /// Returns the point at which the ray meets the triangle's plane, moved to the triangle's edge if it is outside.
     pub fn clamp_to_triangle(&self, triangle: &Triangle, triangle_ix: u32) -> Hit {
         let corners = self.corners(triangle);

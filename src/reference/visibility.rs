@@ -23,7 +23,7 @@ pub fn visibility_by<T: Tracer>(
     new_tracer: impl Fn() -> T + Sync + Send,
     triangle_ids: &mut [u32],
 ) {
-    let width = inputs.frame().width;
+    let (inputs, width) = (&inputs.of_camera(), inputs.frame().width);
     triangle_ids.par_chunks_mut(RAYS_PER_TASK).enumerate().for_each_init(new_tracer, |tracer, (task, ids)| {
         let search_rays = (task * RAYS_PER_TASK..).map(|pixel_ix| {
             let pixel = glam::uvec2(pixel_ix as u32 % width, pixel_ix as u32 / width);

@@ -9,7 +9,7 @@ use crate::{
     buffers::Pixels,
     frame::{
         Crop, Drawn, DrawnTiles, FrameRenderer, Goal, NoiseTiles, PathOptions, Picture, Profile, RenderOptions,
-        TileSamples, Watcher,
+        TileSamples, Unending, Watcher,
     },
     gpu::{Context, DeviceInfo, ExternalImage, GpuError, Limits, TimelinePoint},
     scene::Camera,
@@ -110,7 +110,8 @@ impl BandedRenderer {
         };
         for band in self.bands.clone() {
             self.renderer.set_crop(band)?;
-            let drawn = self.renderer.draw_window(goal, watcher)?;
+            // All bands have as many samples as the first one.
+            let drawn = self.renderer.draw_window(goal, &mut Unending(watcher))?;
             goal = Goal::Samples(drawn.n_samples);
             joined.place(&band, &self.renderer.picture()?, &drawn);
             n_samples = drawn.n_samples;

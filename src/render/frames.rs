@@ -4,9 +4,9 @@ use std::time::{Duration, Instant};
 
 use super::{GpuRenderer, incremental::Until};
 use crate::{
-    frame::{FrameRenderer, LightLayers, NoiseTiles, PathOptions, Profile, RenderOptions, Watcher},
+    frame::{FrameRenderer, MeanLayers, NoiseTiles, PathOptions, Profile, RenderOptions, Watcher},
     gpu::GpuError,
-    layout::PixelAovs,
+    layout::{FILTER_CENTRE, Frame, PixelAovs},
 };
 
 /// Duration above which a sample is slow. The sample after a slow one is drawn part by part (`incremental.rs`), if
@@ -65,14 +65,27 @@ impl FrameRenderer for GpuRenderer {
         self.pixel_aovs()
     }
 
-    fn light_layers(&self) -> Result<LightLayers, GpuError> {
-        let mut layers = LightLayers::default();
-        if !self.in_use.has_light_layers() {
-            return Ok(layers);
-        }
+    fn centre_aovs(&mut self) -> Result<Vec<PixelAovs>, GpuError> {
+        let set_camera = |renderer: &mut Self, pixel_filter, aperture| {
+            let constants = *renderer.resources.constants();
+            renderer.resources.set_constants(&Frame { pixel_filter, aperture, ..constants });
+        };
+        let Frame { pixel_filter, aperture, .. } = *self.resources.constants();
+        let (of_view, is_slow) = (std::mem::replace(&mut self.needs_primary_rays_only, true), self.is_slow);
+        set_camera(self, FILTER_CENTRE, 0.0);
+        self.reset_samples();
+        let drawn = self.draw_frame(&mut || ());
+        set_camera(self, pixel_filter, aperture);
+        (self.needs_primary_rays_only, self.is_slow) = (of_view, is_slow);
+        self.reset_samples();
+        drawn.and_then(|_| self.pixel_aovs())
+    }
+
+    fn mean_layers(&self) -> Result<MeanLayers, GpuError> {
+        let mut layers = MeanLayers::default();
         let (n_pixels, radiance) = (self.resources.n_pixels(), &self.resources.pixels.pixel_radiance);
         let (window, crop) = (self.in_use.window(), self.in_use.crop_or_whole());
-        for (layer_ix, layer) in (1..).zip(&mut layers.0) {
+        for (layer_ix, layer) in (1..).zip(&mut layers.0[self.in_use.mean_layers()]) {
             *layer = window.part(radiance.download_part(layer_ix * n_pixels, n_pixels)?, &crop);
         }
         Ok(layers)

@@ -290,6 +290,13 @@ impl GpuRenderer {
         self.displayed
     }
 
+    /// Returns the pixels of the picture that [`GpuRenderer::displayed`] describes, on the device, and its size; none
+    /// before there is one. Later samples overwrite them.
+    #[cfg(feature = "view")]
+    pub fn displayed_pixels(&self) -> Option<(&crate::gpu::Buffer<u32>, (u32, u32))> {
+        self.displayed.map(|displayed| (&self.resources.pixels.pixel_display, displayed.size))
+    }
+
     /// Downloads the picture that [`GpuRenderer::displayed`] describes, or returns None before there is one. Its
     /// radiance is empty, since a pending sample may have overwritten it. The picture must have no crop.
     ///

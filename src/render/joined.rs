@@ -32,10 +32,8 @@ impl JoinedPicture {
         if options.pixel_aovs {
             drawn.pixel_aovs = room("picture's pixel_aovs", n_pixels)?;
         }
-        if options.has_light_layers() {
-            for layer in &mut drawn.light.0 {
-                *layer = room("picture's layers of light", n_pixels)?;
-            }
+        for layer in &mut drawn.layers.0[options.mean_layers()] {
+            *layer = room("picture's layers", n_pixels)?;
         }
         Ok(Self { whole, picture, drawn })
     }
@@ -47,7 +45,7 @@ impl JoinedPicture {
         if !drawn.pixel_aovs.is_empty() {
             self.whole.place(&mut self.drawn.pixel_aovs, part, &drawn.pixel_aovs);
         }
-        self.drawn.light.place(&self.whole, part, &drawn.light);
+        self.drawn.layers.place(&self.whole, part, &drawn.layers);
     }
 }
 

@@ -320,11 +320,11 @@ impl GpuRenderer {
         let only_primary_rays = self.draws_primary_rays_only();
         let constants = self.resources.constants();
         FrameKind {
-            n_bounces: if only_primary_rays { 1 } else { self.in_use.n_bounces() },
+            n_bounces: if only_primary_rays { 1 } else { constants.max_depth },
             is_lit: !only_primary_rays,
             adds_samples: constants.n_samples > 1,
             shows_aovs: self.in_use.pixel_aovs && self.false_color.is_some(),
-            ..FrameKind::new(&self.in_use, constants.n_lights)
+            ..FrameKind::new(&self.in_use, constants)
         }
     }
 

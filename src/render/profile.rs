@@ -21,7 +21,7 @@ impl GpuRenderer {
     pub(super) fn profile(&self, bounces: &[Bounce], begun_at: Instant) -> Result<Profile, GpuError> {
         let Some(timer) = &self.schedule.timer else { return Ok(Profile::default()) };
         let rows = timer.rows()?;
-        let max_depth = self.in_use.n_bounces();
+        let max_depth = self.resources.constants().max_depth;
         let counts = device_counts(bounces, &self.resources.counters()?);
         let ends_ms = rows.iter().map(|row| row.span_ms.map(|(_, end)| end));
         let pass = |row: &TimerRow| PassTime {
@@ -33,10 +33,15 @@ impl GpuRenderer {
         };
         let mut passes: Vec<_> = rows.iter().map(pass).collect();
         count_batches(&mut passes, &counts, max_depth);
+        let mut bounces = sum_of_batches(&counts, max_depth);
+        // Most bounces that blended surfaces add have no rays.
+        while bounces.len() > self.in_use.n_bounces() as usize && bounces.last().is_some_and(|row| row.n_rays == 0) {
+            bounces.pop();
+        }
         Ok(Profile {
             device: self.context.info().name.clone(),
             n_batches: self.schedule.batches.len() as u32,
-            bounces: sum_of_batches(&counts, max_depth),
+            bounces,
             frame_ms: ends_ms.max_by(|a, b| a.partial_cmp(b).expect("no NaN")).flatten(),
             passes,
             begun_at: Some(begun_at),

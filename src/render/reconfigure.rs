@@ -116,8 +116,8 @@ impl GpuRenderer {
         let spans = self.budget.spans(&constants, self.most_pixels);
         let schedule = Schedule::new(&self.context, &constants, spans, options)?;
         let needs = Needs { constants: &constants, options, n_bounces: schedule.n_rows() };
-        let accel = (self.in_use.traversal != options.traversal).then(|| self.world.accel());
-        Ok((self.resources.for_frame(&self.context, accel, &needs)?, schedule))
+        let links = (self.in_use.traversal != options.traversal).then(|| self.world.geometry());
+        Ok((self.resources.for_frame(&self.context, links, &needs)?, schedule))
     }
 }
 

@@ -13,7 +13,9 @@ use crate::{
 /// Upper limit of the queue's capacity, in rays, unless the caller sets the capacity. This number of rays keeps any
 /// device busy. They take some 100 bytes each, 1.7 GB together, which fits well into memory.
 const MOST_RAYS: u64 = 1 << 24;
-/// The same limit for paths. A dispatch traces all of them, and their shadow rays. On an H200, batches of 2^24 paths
+/// The least capacity, so that the rays of one pixel fit in the queue of a tiny picture, too.
+const LEAST_RAYS: u64 = 1 << 10;
+/// The upper limit for paths. A dispatch traces all of them, and their shadow rays. On an H200, batches of 2^24 paths
 /// are 10 to 40 % faster than those of 2^21: a dispatch ends with its slowest paths, and late bounces have few paths.
 const MOST_PATHS: u64 = 1 << 24;
 /// The number of paths of a batch on a device without much memory, or on a CPU, which has no use for more.
@@ -62,7 +64,7 @@ impl Schedule {
                 Integrator::Path => Bounce::of_paths(n_rays << constants.samples_log2, constants),
             })
             .collect();
-        let n_passes = Plan::new(&FrameKind::new(options, constants.n_lights)).n_passes(batches.len()) as u32;
+        let n_passes = Plan::new(&FrameKind::new(options, constants)).n_passes(batches.len()) as u32;
         Ok(Self {
             first_bounces: Buffer::with(context, "first_bounces", &rows, BufferUse::Storage)?,
             timer: options.profile.then(|| Timer::new(context, n_passes)).transpose()?,
@@ -142,7 +144,7 @@ impl QueueSizing {
         let bytes_per_ray = mem::size_of::<PathRay>().max(4 * constants.n_lights as usize) as u64;
         let most = (limits.storage_range / bytes_per_ray).min(u64::from(limits.n_groups) * u64::from(RAY_GROUP_SIZE));
         let wanted = n_pixels * u64::from(self.rays_per_pixel(constants.max_depth));
-        wanted.min(MOST_RAYS).min(most).max(1) as u32
+        wanted.clamp(LEAST_RAYS, MOST_RAYS).min(most).max(1) as u32
     }
 
     /// Returns the first pixel and the number of pixels of each span. Spans are of equal size, but for the last one.

@@ -83,6 +83,9 @@ impl Scene {
             load_mesh_file(path, options)?
         };
         preset::replace(&mut scene, &options.look.materials).map_err(|what| SceneError::file(path, what))?;
+        if options.look.shows_back_faces {
+            scene.show_back_faces();
+        }
         scene.add_tangents().map_err(|what| SceneError::file(path, what))?;
         if let Some(name) = &options.camera {
             scene.choose_camera(name).map_err(|what| SceneError::file(path, what))?;

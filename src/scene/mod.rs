@@ -11,7 +11,7 @@
 mod files;
 #[cfg(feature = "files")]
 mod formats;
-mod guess;
+pub(crate) mod guess;
 #[cfg(feature = "files")]
 mod load;
 mod meshes;

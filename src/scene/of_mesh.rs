@@ -38,7 +38,7 @@ impl Scene {
         (mesh, materials): (Mesh, Vec<Material>),
         lacks: Lacks,
     ) -> Result<(Scene, Lacks), SceneError> {
-        let slots = scene.push_materials(materials);
+        let slots = scene.push_materials(materials, &mesh);
         scene.push_mesh(mesh, Transform::IDENTITY, slots).map_err(|what| SceneError::file(path, what))?;
         extent::check(path, scene.bounds())?;
         scene.defaults.samples = SAMPLES;

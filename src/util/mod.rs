@@ -5,6 +5,8 @@
 mod named_enum;
 
 pub mod memory;
+#[cfg(feature = "files")]
+pub(crate) mod npy;
 pub mod progress;
 pub mod text;
 

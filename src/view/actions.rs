@@ -13,7 +13,7 @@ use super::{
     session::Session,
 };
 use crate::{
-    frame::{FrameRenderer, Integrator, RenderOptions},
+    frame::{Integrator, RenderOptions, View},
     gpu::GpuError,
     output::{self, OutputError},
     render::Displayed,
@@ -55,6 +55,9 @@ impl Session {
                 self.settings.in_motion = self.settings.in_motion.next();
                 let note = format!("in motion: {}", self.settings.in_motion);
                 self.message = Some(Message::note(Topic::Settings, &note));
+            }
+            Action::Show(view) if gpu.context.is_none() && view != View::Picture => {
+                self.message = Some(Message::note(Topic::Settings, "the CPU engine shows the picture only"));
             }
             Action::Show(view) => self.settings.view = view,
             Action::Pick { x, y } => {

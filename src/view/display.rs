@@ -26,6 +26,8 @@ pub struct ViewOptions {
     pub settings: Settings,
     /// The device to use.
     pub device: ContextOptions,
+    /// Whether the CPU engine draws. The device then only shows its pictures.
+    pub on_cpu: bool,
     /// Whether the panel is shown at first. The user can show and hide it.
     pub overlay: bool,
     /// Camera tour, after which the viewer ends. Without one, the user moves the camera.
@@ -47,14 +49,18 @@ pub struct ViewOptions {
 pub struct ViewReport {
     /// The device's name.
     pub device: String,
-    /// Choices made when the window was opened.
-    pub choices: Choices,
+    /// Choices made when the window was opened; none if it was closed before.
+    pub choices: Option<Choices>,
     /// Frame times and latencies.
     #[serde(flatten)]
     pub pace: PaceReport,
     /// Messages of the validation layer.
     #[serde(skip)]
     pub validation: Vec<String>,
+    /// Whether the window was closed while a driver was compiling. The driver still does, on a thread of its own, so
+    /// the process should end without releasing what drivers use.
+    #[serde(skip)]
+    pub is_abandoned: bool,
 }
 
 /// Frame times and latencies, milliseconds. Each is none if there were no such frames.
@@ -104,7 +110,7 @@ impl Display {
         // An error means that the viewer has ended; then nothing needs to be woken.
         let saver = Saver::new(move || drop(proxy.send_event(Wake::Saved)));
         let session = Session::new(loaded, options.settings.clone(), script.is_none(), (options.print, saver));
-        let mut app = App::new(session, options, script, reloader);
+        let mut app = App::new(session, options, script, reloader, self.event_loop.create_proxy());
         self.event_loop.run_app(&mut app).map_err(|error| ViewError::Window(error.to_string()))?;
         app.report()
     }

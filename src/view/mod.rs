@@ -3,6 +3,7 @@
 
 mod actions;
 mod app;
+mod away;
 pub mod budget;
 pub mod controller;
 mod display;
@@ -21,7 +22,9 @@ mod pace;
 pub mod panel;
 pub mod pick;
 mod reload;
+mod renderer;
 mod saver;
+mod screen;
 mod script;
 mod session;
 mod shaders;

@@ -67,7 +67,8 @@ pub fn pick(world: &World, options: &RenderOptions, camera: &Camera, pixel: UVec
     let bindings = KernelInputs::new(world, &frame).with_links(&links);
     let mut rays = vec![camera_ray(&frame, pixel)];
     let mut picked = Picked { pixel, rays: Vec::new(), n_more: 0 };
-    for depth in 0..options.max_depth {
+    for depth in 0..frame.max_depth {
+        let bindings = if depth == 0 { bindings.of_camera() } else { bindings };
         if rays.is_empty() {
             break;
         }
@@ -77,7 +78,7 @@ pub fn pick(world: &World, options: &RenderOptions, camera: &Camera, pixel: UVec
             let steps = count_steps(&bindings, options.traversal, Query::Closest, &[*ray]);
             picked.rays.push(PickedRay { depth, throughput: ray.throughput, steps, hit: found(scene, ray, hit) });
         }
-        if depth + 1 == options.max_depth {
+        if depth + 1 == frame.max_depth {
             break;
         }
         rays = next_rays(&bindings, &rays, &hits);
@@ -89,7 +90,7 @@ pub fn pick(world: &World, options: &RenderOptions, camera: &Camera, pixel: UVec
 
 fn found(scene: &FlatScene, ray: &PathRay, hit: &Hit) -> Option<PickedHit> {
     (hit.triangle_ix != NO_TRIANGLE).then(|| {
-        let material_ix = scene.triangle_materials[hit.triangle_ix as usize];
+        let material_ix = scene.material_ix_of(hit.triangle_ix as usize);
         PickedHit {
             triangle_ix: hit.triangle_ix,
             material: scene.material_names[material_ix as usize].clone(),
@@ -103,4 +104,31 @@ fn found(scene: &FlatScene, ray: &PathRay, hit: &Hit) -> Option<PickedHit> {
 fn next_rays(bindings: &KernelInputs, rays: &[PathRay], hits: &[Hit]) -> Vec<PathRay> {
     let of_ray = |(ray, hit)| children_of(bindings, ray, hit, child_kinds_of(bindings, ray, hit));
     rays.iter().zip(hits).flat_map(of_ray).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{accel::kdtree::BuildOptions, scene::Scene};
+
+    /// A click finds what the camera sees, behind back faces that it does not see.
+    #[test]
+    fn a_click_passes_back_faces() {
+        let disc = |name: &str, y: f32| {
+            format!(
+                "[[mesh]]\ngenerator = 'disc'\nradius = 1\nsegments = 8\nmaterial = '{name}'\n\
+                 transform = {{ translate = [0, {y}, 0] }}\n[materials.{name}]\n"
+            )
+        };
+        let text = format!("[camera]\neye = [0, -4, 1]\ntarget = [0, 0, 0]\n{}{}", disc("near", 0.0), disc("far", 1.0));
+        let mut scene = Scene::of_text("discs.toml", &text).unwrap();
+        let options = RenderOptions { width: 8, height: 8, ..RenderOptions::default() };
+        for (is_double_sided, seen) in [(true, "near"), (false, "far")] {
+            let near = scene.materials.iter_mut().find(|it| it.name == "near");
+            near.unwrap().is_double_sided = is_double_sided;
+            let world = World::new(&scene, &BuildOptions::default()).unwrap();
+            let picked = pick(&world, &options, &scene.camera, UVec2::new(4, 4));
+            assert_eq!(picked.rays[0].hit.as_ref().map(|hit| &*hit.material), Some(seen));
+        }
+    }
 }

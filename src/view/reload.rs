@@ -37,6 +37,8 @@ pub enum Wake {
     Progress(String),
     /// A file that the user opens was loaded, or could not be loaded.
     Opened(Box<Result<LoadedScene, String>>),
+    /// Work on the session has ended.
+    Returned,
     /// A shader has changed.
     ShadersChanged,
     /// The shaders were compiled again, or could not be compiled.

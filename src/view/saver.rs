@@ -25,6 +25,8 @@ pub struct Saver {
     /// None once no more pictures are taken.
     jobs: Option<Sender<Job>>,
     results: Receiver<Saved>,
+    /// Number of pictures whose results have not been taken.
+    n_open: usize,
     /// None once the thread has ended.
     thread: Option<JoinHandle<()>>,
 }
@@ -45,20 +47,28 @@ impl Saver {
                 wake();
             }
         };
-        Self { jobs: Some(jobs), results, thread: Some(thread::spawn(work)) }
+        Self { jobs: Some(jobs), results, n_open: 0, thread: Some(thread::spawn(work)) }
     }
 
     /// Hands over a picture, which is written as PNG to the first path `NAME-001.png`, `NAME-002.png` and so on that
     /// does not exist. NAME is that of the scene.
-    pub fn save(&self, scene_name: &str, picture: Picture) {
+    pub fn save(&mut self, scene_name: &str, picture: Picture) {
+        self.n_open += 1;
         let jobs = self.jobs.as_ref().expect("a saver that has not ended");
         jobs.send(Job { scene_name: scene_name.to_owned(), picture })
             .expect("a thread that lives as long as the saver");
     }
 
     /// Returns the results since the last call.
-    pub fn results(&self) -> Vec<Saved> {
-        self.results.try_iter().collect()
+    pub fn results(&mut self) -> Vec<Saved> {
+        let results: Vec<_> = self.results.try_iter().collect();
+        self.n_open -= results.len();
+        results
+    }
+
+    /// Returns whether the results of some pictures are still to come.
+    pub fn is_busy(&self) -> bool {
+        self.n_open > 0
     }
 
     /// Waits until all pictures have been written. No more are taken.
@@ -115,7 +125,7 @@ mod tests {
         let mut saver = Saver::with(write, move || awake.send(()).unwrap());
         saver.save("a", picture());
         saver.save("a", picture());
-        assert!(saver.results().is_empty(), "the disk is slow");
+        assert!(saver.results().is_empty() && saver.is_busy(), "the disk is slow");
         go.send(()).unwrap();
         wakes.recv().unwrap();
         let first = saver.results().remove(0).unwrap();
@@ -123,6 +133,6 @@ mod tests {
         saver.finish();
         let second = saver.results().remove(0).unwrap();
         assert_eq!([&first, &second], [&directory.path().join("a-001.png"), &directory.path().join("a-002.png")]);
-        assert!(first.exists() && second.exists());
+        assert!(first.exists() && second.exists() && !saver.is_busy());
     }
 }

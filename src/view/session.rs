@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{
     accel::Statistics,
-    frame::{Denoise, FrameRenderer, Profile, RenderOptions, View},
+    frame::{Denoise, Profile, RenderOptions, View},
     gpu::GpuError,
     layout::PixelAovs,
     scene::RenderDefaults,
@@ -206,8 +206,7 @@ impl Session {
             self.pace.moved(now);
         }
         // Frames in flight read the objects that change here.
-        gpu.context.wait_for_all()?;
-        gpu.presenter.set_vsync(self.settings.vsync);
+        gpu.wait_for_all()?;
         self.budgets.iter_mut().for_each(|budget| budget.set_budget(self.settings.budget_ms));
         self.fit_window(gpu, window)?;
         self.drawing = PictureKind::of(gpu.renderer.options());
@@ -371,6 +370,11 @@ impl Session {
         Ok(())
     }
 
+    /// Returns whether pictures are still to be saved.
+    pub fn has_saves(&self) -> bool {
+        self.is_save_due || self.saver.is_busy()
+    }
+
     /// Records the times of a frame that was handed to the screen. `picture` is the size of its picture in pixels.
     pub fn shown(&mut self, picture: (u32, u32)) {
         let now = Instant::now();
@@ -403,7 +407,8 @@ impl Session {
     pub fn facts<'a>(&'a self, gpu: &'a GpuSession, window: (u32, u32), is_flying: bool) -> Facts<'a> {
         let options = gpu.renderer.options();
         Facts {
-            device: &gpu.context.info().name,
+            device: gpu.context.as_ref().map_or("CPU", |context| &context.info().name),
+            is_on_cpu: gpu.context.is_none(),
             loaded: &self.loaded,
             window,
             picture: (options.width, options.height),
@@ -415,7 +420,7 @@ impl Session {
             is_save_due: self.is_save_due,
             profile: &self.profile,
             history: &self.history,
-            memory: gpu.context.memory(),
+            memory: gpu.context.as_ref().map_or_else(Vec::new, |context| context.memory()),
             view: self.view(),
             pointed: self.pointed,
             picked: self.picked.as_ref(),

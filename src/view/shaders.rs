@@ -64,18 +64,19 @@ impl Shaders {
 
 impl Session {
     /// Replaces the shaders. If they failed to compile or the device refuses them, shows a message and keeps the
-    /// previous shaders.
-    pub fn replace_shaders(&mut self, gpu: &mut GpuSession, shaders: Result<Replacements, String>) {
+    /// previous shaders. Returns whether it succeeded.
+    pub fn replace_shaders(&mut self, gpu: &mut GpuSession, shaders: Result<Replacements, String>) -> bool {
         let replaced =
             shaders.and_then(|shaders| gpu.replace_shaders(shaders).map_err(|error| format!("shaders: {error}")));
-        match replaced {
+        match &replaced {
             Ok(()) => {
                 // The next picture is drawn small, so that it is shown at once.
                 self.pace.moved(Instant::now());
                 self.clear_message(Topic::Shaders);
             }
-            Err(error) => self.show_error(Topic::Shaders, &error),
+            Err(error) => self.show_error(Topic::Shaders, error),
         }
+        replaced.is_ok()
     }
 }
 

@@ -73,11 +73,26 @@ impl Ui {
         self.repaint_after
     }
 
+    /// Returns whether a part of the overlay takes what is typed, or has opened something that Escape closes.
+    pub fn has_keyboard(&self) -> bool {
+        let context = self.state.egui_ctx();
+        context.egui_wants_keyboard_input() || egui::Popup::is_any_open(context)
+    }
+
     /// Lays out the overlay and applies the user's changes to `edited`.
     pub fn layout(&mut self, window: &Window, layers: Layers, edited: &mut Edited, facts: &Facts) -> Layout {
+        self.run(window, |ui| panel::show(ui, layers, edited, facts))
+    }
+
+    /// Lays out what the window says while it waits.
+    pub fn layout_waiting(&mut self, window: &Window, text: &str) -> Layout {
+        self.run(window, |ui| panel::show_waiting(ui, text))
+    }
+
+    fn run(&mut self, window: &Window, show: impl FnMut(&mut egui::Ui)) -> Layout {
         let input = self.state.take_egui_input(window);
         let context = self.state.egui_ctx().clone();
-        let output = context.run_ui(input, |ui| panel::show(ui, layers, edited, facts));
+        let output = context.run_ui(input, show);
         self.state.handle_platform_output(window, output.platform_output);
         let root = output.viewport_output.get(&ViewportId::ROOT);
         self.repaint_after = root.map_or(Duration::MAX, |viewport| viewport.repaint_delay);

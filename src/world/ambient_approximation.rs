@@ -53,15 +53,15 @@ fn flux(scene: &FlatScene) -> DVec3 {
         scene.area_lights.iter().map(|light| light.radiance.as_dvec3() * (PI * f64::from(light.area))).sum();
     let emission: Vec<Option<DVec3>> =
         scene.materials.iter().map(|material| is_emissive(material).then(|| material.ke.as_dvec3())).collect();
-    if emission.iter().all(Option::is_none) {
-        return of_lights;
-    }
-    let of_triangle = |(triangle, material_ix): (&crate::layout::Triangle, &u32)| {
+    let is_emissive: Vec<bool> = emission.iter().map(Option::is_some).collect();
+    let of_triangle = |ix: usize| {
+        let Some(ke) = emission[scene.material_ix_of(ix) as usize] else { return DVec3::ZERO };
+        let triangle = scene.triangle(ix);
         let area = f64::from((triangle.v1 - triangle.v0).cross(triangle.v2 - triangle.v0).length()) / 2.0;
         // Both sides shine.
-        emission[*material_ix as usize].map_or(DVec3::ZERO, |ke| ke * (2.0 * PI * area))
+        ke * (2.0 * PI * area)
     };
-    of_lights + scene.triangles.iter().zip(&scene.triangle_materials).map(of_triangle).sum::<DVec3>()
+    of_lights + scene.triangles_with(&is_emissive).into_iter().map(of_triangle).sum::<DVec3>()
 }
 
 /// Sums over an environment.

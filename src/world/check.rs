@@ -5,14 +5,14 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{FlatScene, Mismatch, Textures, mips};
+use super::{FlatScene, Instances, Mismatch, Textures, mips};
 use crate::{
     frame::Integrator,
     layout::{
-        AREA_SPHERE, LIGHT_SPOT, MaterialMaps, N_MAPS, NO_TEXTURE, SRGB_TABLE_SIZE, TEXTURE_HALVES, TEXTURE_UV_SET,
-        Texture, Triangle,
+        AREA_SPHERE, LIGHT_SPOT, MaterialMaps, N_MAPS, NO_TEXTURE, SRGB_TABLE_SIZE, SUSPENDED, TEXTURE_HALVES,
+        TEXTURE_UV_SET, Texture, Triangle,
     },
-    scene::mesh::MAX_COORDINATE,
+    scene::mesh::{MAX_COORDINATE, box_corners},
 };
 
 /// Checks that all parts of a scene fit together, in one pass over each array.
@@ -52,10 +52,66 @@ fn check_materials(scene: &FlatScene) -> Result<(), Mismatch> {
     }
     let materials = scene.materials.len();
     let is_missing = |(_, material): &(usize, &u32)| **material as usize >= materials;
-    match scene.triangle_materials.iter().enumerate().find(is_missing) {
+    let words = match &scene.instances {
+        Some(instances) => {
+            check_instances(instances, scene)?;
+            &instances.materials
+        }
+        None => &scene.triangle_materials,
+    };
+    match words.iter().enumerate().find(is_missing) {
         Some((triangle, &material)) => Err(Mismatch::Material { triangle, material, materials }),
         None => Ok(()),
     }
+}
+
+/// Checks that instances follow one another, that each has a geometry, and that the slots of its triangles have
+/// materials.
+fn check_instances(instances: &Instances, scene: &FlatScene) -> Result<(), Mismatch> {
+    let Instances { ranges, list, materials } = instances;
+    let mut first_row = 0;
+    let mut n_slots = Vec::with_capacity(ranges.len());
+    for (ix, range) in ranges.iter().enumerate() {
+        let end = first_row + range.n_triangles as usize;
+        if range.first_row as usize != first_row || end > scene.triangles.len() {
+            return Err(scene_error(format!("instances: geometry {ix} does not follow the one before")));
+        }
+        n_slots.push(scene.triangle_materials[first_row..end].par_iter().max().map_or(0, |slot| *slot as usize + 1));
+        first_row = end;
+    }
+    check_len("triangles", scene.triangles.len(), (first_row, "triangles of geometries"))?;
+    let boxes: Vec<(Vec3, Vec3)> = ranges.par_iter().map(|range| bounds_of(range.of(&scene.triangles))).collect();
+    let mut first_triangle = 0_usize;
+    for (ix, instance) in list.iter().enumerate() {
+        let wrong = |what: &str| Err(scene_error(format!("instances: instance {ix} {what}")));
+        let Some(range) = ranges.get(instance.geometry_ix as usize) else { return wrong("has no geometry") };
+        if [instance.first_row, instance.n_triangles] != [range.first_row, range.n_triangles] {
+            return wrong("is not of its geometry");
+        }
+        if instance.first_triangle as usize != first_triangle {
+            return wrong("does not follow the one before");
+        }
+        if instance.first_material as usize + n_slots[instance.geometry_ix as usize] > materials.len() {
+            return wrong("lacks materials");
+        }
+        let corners = [instance.axis_x, instance.axis_y, instance.axis_z, instance.translation];
+        let rows = [instance.local_x, instance.local_y, instance.local_z];
+        if !(corners.iter().chain(&rows).all(|v| v.is_finite()) && instance.condition >= 1.0) {
+            return wrong("has a number that is not finite");
+        }
+        if instance.n_triangles > 0 {
+            let (min, max) = boxes[instance.geometry_ix as usize];
+            let is_near = |p: Vec3| p.is_finite() && p.abs().max_element() <= 1.001 * MAX_COORDINATE;
+            if !box_corners(min, max).into_iter().all(|p| is_near(instance.point(p))) {
+                return wrong(&format!("lies beyond {MAX_COORDINATE:e}"));
+            }
+        }
+        first_triangle += instance.n_triangles as usize;
+    }
+    if first_triangle == 0 || first_triangle > SUSPENDED as usize {
+        return Err(scene_error(format!("instances: they have {first_triangle} triangles, not 1 to {SUSPENDED}")));
+    }
+    Ok(())
 }
 
 /// Checks the arrays of textures. All of them are empty, or each material has maps.
@@ -129,6 +185,12 @@ fn texture_fault(texture: &Texture, texels: &[u32], has_second_set: bool) -> Opt
 fn indices_of(maps: &MaterialMaps) -> [u32; N_MAPS as usize] {
     let words: [u32; size_of::<MaterialMaps>() / 4] = bytemuck::cast(*maps);
     *words.first_chunk().expect("the maps come first")
+}
+
+/// Returns the least and the greatest coordinates of triangles.
+fn bounds_of(triangles: &[Triangle]) -> (Vec3, Vec3) {
+    let corners = triangles.iter().flat_map(|t| [t.v0, t.v1, t.v2]);
+    corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)))
 }
 
 fn check_len(array: &str, len: usize, (expected, of): (usize, &str)) -> Result<(), Mismatch> {

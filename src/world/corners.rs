@@ -1,4 +1,4 @@
-//! Texture coordinates, tangents and colours at the corners of world-space triangles.
+//! Texture coordinates, tangents and colours at the corners of stored triangles.
 
 use glam::{Vec2, Vec3, Vec4};
 use rayon::prelude::*;
@@ -6,17 +6,24 @@ use rayon::prelude::*;
 use super::flat::corners_of;
 use crate::{
     layout::{CornerSurface, FLAT_NORMAL, normal::encode_octahedral},
-    scene::{Mesh, Scene, Transform},
+    scene::{Mesh, Transform},
 };
+
+/// A mesh, and the transform to the space in which its triangles are stored.
+pub type Placed<'a> = (&'a Mesh, &'a Transform);
+
+/// Returns the number of triangles of all meshes.
+pub fn n_triangles_of(placed: &[Placed]) -> usize {
+    placed.iter().map(|(mesh, _)| mesh.faces.len()).sum()
+}
 
 /// Returns the texture coordinates of all triangles' corners, in the order of the triangles: those of the first set,
 /// and after them, if `n_sets` is 2, those of the second set. A mesh without coordinates has zeros.
-pub fn uvs(scene: &Scene, n_sets: usize) -> Vec<[Vec2; 3]> {
-    let mut uvs = Vec::with_capacity(n_sets * scene.n_triangles());
+pub fn uvs(placed: &[Placed], n_sets: usize) -> Vec<[Vec2; 3]> {
+    let mut uvs = Vec::with_capacity(n_sets * n_triangles_of(placed));
     for set in 0..n_sets {
-        for instance in &scene.instances {
-            let mesh = &scene.meshes[instance.mesh_ix];
-            let order = corners_of(&instance.transform);
+        for (mesh, transform) in placed {
+            let order = corners_of(transform);
             match mesh.uvs[set].is_empty() {
                 true => uvs.resize(uvs.len() + mesh.faces.len(), [Vec2::ZERO; 3]),
                 false => uvs.par_extend(mesh.uvs[set].par_iter().map(|corners| order.map(|ix| corners[ix]))),
@@ -28,12 +35,10 @@ pub fn uvs(scene: &Scene, n_sets: usize) -> Vec<[Vec2; 3]> {
 
 /// Returns the tangents and colours of all triangles' corners, in the order of the triangles. A mesh without tangents
 /// has none, and a mesh without colours is white.
-pub fn corner_surfaces(scene: &Scene) -> Vec<[CornerSurface; 3]> {
-    let mut corners = Vec::with_capacity(scene.n_triangles());
-    for instance in &scene.instances {
-        let mesh = &scene.meshes[instance.mesh_ix];
-        let of_face =
-            |face| corners_of(&instance.transform).map(|ix| corner_surface(mesh, &instance.transform, face, ix));
+pub fn corner_surfaces(placed: &[Placed]) -> Vec<[CornerSurface; 3]> {
+    let mut corners = Vec::with_capacity(n_triangles_of(placed));
+    for (mesh, transform) in placed {
+        let of_face = |face| corners_of(transform).map(|ix| corner_surface(mesh, transform, face, ix));
         corners.par_extend((0..mesh.faces.len()).into_par_iter().map(of_face));
     }
     corners

@@ -26,15 +26,13 @@ pub(super) fn emissive_triangles(scene: &FlatScene) -> Vec<(usize, f64)> {
     if !emissive.contains(&true) {
         return Vec::new();
     }
-    let of_triangle = |(ix, material_ix): (usize, &u32)| {
-        if !emissive[*material_ix as usize] {
-            return None;
-        }
-        let area = area_of(&scene.triangles[ix]);
-        let emission = mean_emission(scene, ix, *material_ix as usize);
-        Some((ix, 2.0 * PI * area * luminance(emission)))
+    let of_triangle = |ix: usize| {
+        let material_ix = scene.material_ix_of(ix) as usize;
+        let area = area_of(&scene.triangle(ix));
+        let emission = mean_emission(scene, ix, material_ix);
+        (ix, 2.0 * PI * area * luminance(emission))
     };
-    scene.triangle_materials.par_iter().enumerate().filter_map(of_triangle).collect()
+    scene.triangles_with(&emissive).into_par_iter().map(of_triangle).collect()
 }
 
 /// Returns the area as kernels see it: 0 if its square underflows.
@@ -47,9 +45,10 @@ fn mean_emission(scene: &FlatScene, triangle_ix: usize, material_ix: usize) -> V
     let (textures, ke) = (&scene.textures, scene.materials[material_ix].ke);
     let texture_ix = textures.material_maps.get(material_ix).map_or(NO_TEXTURE, |maps| maps.emission);
     let Some(map) = textures.textures.get(texture_ix as usize) else { return ke };
+    let stored = scene.stored(triangle_ix);
     let sum: Vec3 = middles_of_cells()
         .map(|[u, v]| {
-            let uv = textures.uv_at(triangle_ix as u32, uv_set_of(map), u, v);
+            let uv = textures.uv_at(&stored, uv_set_of(map), u, v);
             sample_texture(&textures.texels, map, uv, 0.0).truncate().max(Vec3::ZERO)
         })
         .sum();

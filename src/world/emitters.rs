@@ -157,7 +157,7 @@ impl Emitters {
             bounds: match light.kind {
                 EMITTER_LIGHT => LightBounds::of_light(&scene.lights[light.ix]),
                 EMITTER_AREA => LightBounds::of_area_light(&scene.area_lights[light.ix]),
-                _ => LightBounds::of_triangle(&scene.triangles[light.ix], light.power / (2.0 * PI)),
+                _ => LightBounds::of_triangle(&scene.triangle(light.ix), light.power / (2.0 * PI)),
             },
             emitter_ix: (self.n_sampled + ix) as u32,
         };

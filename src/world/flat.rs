@@ -5,17 +5,21 @@ use std::f32::consts::PI;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{Mismatch, Textures};
+use super::{
+    Mismatch, Textures,
+    instances::{Instances, Kept, Stored},
+};
 use crate::{
+    accel::two_level::StoredRange,
     layout::{
-        AREA_DISK, AREA_RECTANGLE, AREA_SPHERE, AreaLight, FLAT_NORMAL, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT,
-        Light, MATERIAL_CONDUCTOR, MATERIAL_FRESNEL, MATERIAL_MICROFACET, MATERIAL_REFLECT, MATERIAL_REFRACT,
-        MATERIAL_SINGLE_SCATTERING, MATERIAL_SOLID, MATERIAL_SPECULAR, MATERIAL_UNLIT, Material, Triangle,
-        normal::encode_octahedral,
+        AREA_DISK, AREA_RECTANGLE, AREA_SPHERE, AreaLight, FLAT_NORMAL, Instance, LIGHT_DIRECTIONAL, LIGHT_POINT,
+        LIGHT_SPOT, Light, MATERIAL_CONDUCTOR, MATERIAL_FRESNEL, MATERIAL_MICROFACET, MATERIAL_REFLECT,
+        MATERIAL_REFRACT, MATERIAL_SINGLE_SCATTERING, MATERIAL_SINGLE_SIDED, MATERIAL_SOLID, MATERIAL_SPECULAR,
+        MATERIAL_UNLIT, Material, Triangle, normal::encode_octahedral,
     },
     scene::{
-        self, Alpha, Camera, Conductor, Environment, Ground, Instance, Lobes, Mesh, Microfacet, RenderDefaults, Scene,
-        Sky, Transform,
+        self, Alpha, Camera, Conductor, Environment, Ground, Lobes, Mesh, Microfacet, RenderDefaults, Scene, Sky,
+        Transform, mesh::box_corners,
     },
 };
 
@@ -26,11 +30,13 @@ pub struct FlatScene {
     pub name: String,
     /// The point of the scene's file that is the origin of world space ([`Scene::origin`]).
     pub origin: DVec3,
-    /// The triangles in world space. Those of the first instance come first, in the order of its mesh's faces, then
-    /// those of the next instance.
+    /// The triangles that are stored: those of the world, instance after instance, each in the order of its mesh's
+    /// faces; or with `instances`, those of the geometries, each in its own space.
     pub triangles: Vec<Triangle>,
-    /// For each triangle, the index of its material in `materials`.
+    /// For each stored triangle, the index of its material in `materials`; with `instances`, its slot.
     pub triangle_materials: Vec<u32>,
+    /// The instances of the geometries. `None`: the stored triangles are those of the world.
+    pub instances: Option<Instances>,
     /// The materials.
     pub materials: Vec<Material>,
     /// The name of each material.
@@ -64,27 +70,53 @@ impl FlatScene {
     /// An index names nothing, arrays have different lengths, an instance with faces has no material, or a vertex is
     /// too far from the origin.
     pub fn new(scene: &Scene) -> Result<Self, Mismatch> {
-        let mut triangles = Vec::with_capacity(scene.n_triangles());
-        let mut triangle_materials = Vec::with_capacity(triangles.capacity());
+        check_instances(scene)?;
+        let mut parts = Parts { triangles: Vec::with_capacity(scene.n_triangles()), ..Parts::default() };
         for (instance_ix, instance) in scene.instances.iter().enumerate() {
-            let mesh = scene.meshes.get(instance.mesh_ix).ok_or(Mismatch::Mesh { instance: instance_ix })?;
-            check(mesh, instance).map_err(|what| Mismatch::Instance { instance: instance_ix, what })?;
-            push_triangles(mesh, instance, &mut triangles)
-                .map_err(|what| Mismatch::Instance { instance: instance_ix, what })?;
+            let mesh = &scene.meshes[instance.mesh_ix];
+            parts.push(mesh, &instance.transform, instance_ix)?;
             // An instance with fewer materials than the mesh has slots repeats its materials.
             let material_of = |slot: &u32| instance.materials[*slot as usize % instance.materials.len()];
-            triangle_materials.extend(mesh.slots.iter().map(material_of));
+            parts.materials.extend(mesh.slots.iter().map(material_of));
         }
+        let placed: Vec<_> = scene.instances.iter().map(|it| (&scene.meshes[it.mesh_ix], &it.transform)).collect();
+        let textures = Textures::new(scene, &placed)?;
+        Ok(Self::of_parts(scene, parts, textures, None))
+    }
+
+    /// Stores each mesh of a scene once, however many instances it has. A scene without triangles is flattened.
+    ///
+    /// # Errors
+    /// Fails as [`FlatScene::new`] does, or if the instances have more triangles than there are indices.
+    pub fn with_instances(scene: &Scene) -> Result<Self, Mismatch> {
+        if scene.n_triangles() == 0 {
+            return Self::new(scene);
+        }
+        check_instances(scene)?;
+        let (instances, kept) = Instances::of_scene(scene)?;
+        let n_stored = kept.iter().map(|it| scene.meshes[it.mesh_ix].faces.len()).sum();
+        let mut parts = Parts { triangles: Vec::with_capacity(n_stored), ..Parts::default() };
+        for Kept { mesh_ix, transform, instance_ix } in &kept {
+            parts.push(&scene.meshes[*mesh_ix], transform, *instance_ix)?;
+            parts.materials.extend(&scene.meshes[*mesh_ix].slots);
+        }
+        let placed: Vec<_> = kept.iter().map(|it| (&scene.meshes[it.mesh_ix], &it.transform)).collect();
+        let textures = Textures::new(scene, &placed)?;
+        Ok(Self::of_parts(scene, parts, textures, Some(instances)))
+    }
+
+    fn of_parts(scene: &Scene, parts: Parts, textures: Textures, instances: Option<Instances>) -> Self {
         let sky = scene.sky.as_ref().map(Sky::environment);
         let sun = scene.sky.filter(|sky| sky.has_sun).map(|sky| sky.sun());
-        Ok(Self {
+        Self {
             name: scene.name.clone(),
             origin: scene.origin,
-            triangles,
-            triangle_materials,
+            triangles: parts.triangles,
+            triangle_materials: parts.materials,
+            instances,
             materials: scene.materials.iter().map(Material::from).collect(),
             material_names: scene.materials.iter().map(|material| material.name.clone()).collect(),
-            textures: Textures::new(scene)?,
+            textures,
             lights: scene.lights.iter().chain(&sun).filter_map(flat_light).collect(),
             area_lights: scene.lights.iter().filter_map(area_light).collect(),
             environment: sky.or_else(|| scene.environment.clone()),
@@ -94,23 +126,143 @@ impl FlatScene {
             ground: scene.ground,
             background: scene.background,
             defaults: scene.defaults,
-        })
+        }
     }
 
-    /// Returns the smallest and the largest coordinates of all triangles, world units. Without triangles these are
-    /// infinity and minus infinity.
+    /// The number of triangles in the world.
+    pub fn n_triangles(&self) -> usize {
+        self.instances.as_ref().map_or(self.triangles.len(), Instances::n_triangles)
+    }
+
+    /// Returns where a triangle of the world is stored.
+    pub fn stored(&self, triangle_ix: usize) -> Stored<'_> {
+        match &self.instances {
+            Some(instances) => instances.stored(triangle_ix),
+            None => Stored { row: triangle_ix, instance: None },
+        }
+    }
+
+    /// Returns a triangle in world space.
+    pub fn triangle(&self, triangle_ix: usize) -> Triangle {
+        let Stored { row, instance } = self.stored(triangle_ix);
+        instance.map_or(self.triangles[row], |it| it.triangle(&self.triangles[row]))
+    }
+
+    /// Returns the number of triangles of each material in the world.
+    pub fn triangles_of_materials(&self) -> Vec<usize> {
+        let mut counts = vec![0; self.materials.len()];
+        let Some(instances) = &self.instances else {
+            self.triangle_materials.iter().for_each(|ix| counts[*ix as usize] += 1);
+            return counts;
+        };
+        let of_slots = |range: &StoredRange| {
+            let mut counts = Vec::new();
+            for &slot in range.of(&self.triangle_materials) {
+                counts.resize(counts.len().max(slot as usize + 1), 0);
+                counts[slot as usize] += 1;
+            }
+            counts
+        };
+        let slots: Vec<Vec<usize>> = instances.ranges.iter().map(of_slots).collect();
+        for instance in &instances.list {
+            let materials = &instances.materials[instance.first_material as usize..];
+            for (n, material_ix) in slots[instance.geometry_ix as usize].iter().zip(materials) {
+                counts[*material_ix as usize] += n;
+            }
+        }
+        counts
+    }
+
+    /// Returns the indices of the world's triangles whose materials are wanted, in their order. `is_wanted`: for each
+    /// material.
+    pub(super) fn triangles_with(&self, is_wanted: &[bool]) -> Vec<usize> {
+        let Some(instances) = &self.instances else {
+            let all = self.triangle_materials.par_iter().enumerate();
+            return all.filter(|(_, ix)| is_wanted[**ix as usize]).map(|(triangle_ix, _)| triangle_ix).collect();
+        };
+        let n_slots_of =
+            |range: &StoredRange| range.of(&self.triangle_materials).iter().max().map_or(0, |slot| slot + 1);
+        let n_slots: Vec<u32> = instances.ranges.par_iter().map(n_slots_of).collect();
+        let of_instance = |instance: &Instance| {
+            let first = instance.first_triangle as usize;
+            let slots = instances.ranges[instance.geometry_ix as usize].of(&self.triangle_materials);
+            let materials = &instances.materials[instance.first_material as usize..];
+            let is_wanted = |slot: u32| is_wanted[materials[slot as usize] as usize];
+            // Most instances have no such material at all.
+            if !(0..n_slots[instance.geometry_ix as usize]).any(is_wanted) {
+                return Vec::new();
+            }
+            slots.iter().enumerate().filter(|(_, slot)| is_wanted(**slot)).map(|(ix, _)| first + ix).collect()
+        };
+        instances.list.par_iter().flat_map_iter(|it| -> Vec<usize> { of_instance(it) }).collect()
+    }
+
+    /// Returns the index of the material of a triangle of the world.
+    pub fn material_ix_of(&self, triangle_ix: usize) -> u32 {
+        let Stored { row, instance } = self.stored(triangle_ix);
+        let word = self.triangle_materials[row];
+        match (instance, &self.instances) {
+            (Some(instance), Some(all)) => all.materials[(instance.first_material + word) as usize],
+            _ => word,
+        }
+    }
+
+    /// Returns whether camera rays pass through the back faces of some materials.
+    pub(crate) fn has_single_sided(&self) -> bool {
+        self.materials.iter().any(Material::is_single_sided)
+    }
+
+    /// Returns whether rays pass straight through some surfaces that are neither clear nor opaque.
+    pub(crate) fn has_blended(&self) -> bool {
+        let is_blended = |material: &Material| material.d < 1.0 && material.flags & MATERIAL_REFRACT == 0;
+        self.textures.has_blended() || self.materials.iter().any(is_blended)
+    }
+
+    /// Returns the smallest and the largest coordinates of all triangles, world units; with instances, those of boxes
+    /// around them. Without triangles these are infinity and minus infinity.
     pub fn bounds(&self) -> (Vec3, Vec3) {
-        let corners = self.triangles.iter().flat_map(|t| [t.v0, t.v1, t.v2]);
-        corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)))
+        let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        let joined = |(min, max): (Vec3, Vec3), p: Vec3| (min.min(p), max.max(p));
+        let of = |triangles: &[Triangle]| triangles.iter().flat_map(|t| [t.v0, t.v1, t.v2]).fold(none, joined);
+        let Some(instances) = &self.instances else { return of(&self.triangles) };
+        let boxes: Vec<_> = instances.ranges.par_iter().map(|range| of(range.of(&self.triangles))).collect();
+        let corners = instances.list.iter().filter(|it| it.n_triangles > 0).flat_map(|instance| {
+            let (min, max) = boxes[instance.geometry_ix as usize];
+            box_corners(min, max).map(|p| instance.point(p))
+        });
+        corners.fold(none, joined)
     }
 }
 
-/// Checks that a mesh's arrays belong together, and that its faces have a material.
-fn check(mesh: &Mesh, instance: &Instance) -> Result<(), String> {
-    if instance.materials.is_empty() && !mesh.faces.is_empty() {
-        return Err("it has no material".to_owned());
+/// The triangles that are stored, and the word of each that leads to its material.
+#[derive(Default)]
+struct Parts {
+    triangles: Vec<Triangle>,
+    materials: Vec<u32>,
+}
+
+impl Parts {
+    /// Appends the triangles of a mesh. `instance_ix`: the instance that an error names.
+    fn push(&mut self, mesh: &Mesh, transform: &Transform, instance_ix: usize) -> Result<(), Mismatch> {
+        push_triangles(mesh, transform, &mut self.triangles)
+            .map_err(|what| Mismatch::Instance { instance: instance_ix, what })
     }
-    mesh.check().map_err(|what| format!("its mesh {what}"))
+}
+
+/// Checks each instance, and each mesh that has one.
+fn check_instances(scene: &Scene) -> Result<(), Mismatch> {
+    let mut is_checked = vec![false; scene.meshes.len()];
+    for (instance_ix, instance) in scene.instances.iter().enumerate() {
+        let mesh = scene.meshes.get(instance.mesh_ix).ok_or(Mismatch::Mesh { instance: instance_ix })?;
+        let wrong = |what| Mismatch::Instance { instance: instance_ix, what };
+        if instance.materials.is_empty() && !mesh.faces.is_empty() {
+            return Err(wrong("it has no material".to_owned()));
+        }
+        if !std::mem::replace(&mut is_checked[instance.mesh_ix], true) {
+            mesh.check().map_err(|what| wrong(format!("its mesh {what}")))?;
+        }
+    }
+    Ok(())
 }
 
 /// Returns the order of a face's corners in the world. A mirroring transform reverses the winding, so two corners are
@@ -120,8 +272,7 @@ pub(super) fn corners_of(transform: &Transform) -> [usize; 3] {
 }
 
 /// Appends a world-space triangle for each face, in the order of the faces.
-fn push_triangles(mesh: &Mesh, instance: &Instance, triangles: &mut Vec<Triangle>) -> Result<(), String> {
-    let transform = &instance.transform;
+fn push_triangles(mesh: &Mesh, transform: &Transform, triangles: &mut Vec<Triangle>) -> Result<(), String> {
     let world = mesh.placed(transform)?;
     let encoded = |n: Vec3| match transform.normal(n) {
         Vec3::ZERO => FLAT_NORMAL,
@@ -140,10 +291,18 @@ fn push_triangles(mesh: &Mesh, instance: &Instance, triangles: &mut Vec<Triangle
     Ok(())
 }
 
+impl Material {
+    /// Returns whether camera rays pass through the back faces of the surface.
+    pub(crate) fn is_single_sided(&self) -> bool {
+        self.flags & MATERIAL_SINGLE_SIDED != 0
+    }
+}
+
 impl From<&scene::Material> for Material {
     fn from(material: &scene::Material) -> Self {
         let &scene::Material { kd, d, ks, ni, ke, is_unlit, microfacet, alpha, clearcoat, sheen, .. } = material;
         let unlit = if is_unlit { MATERIAL_UNLIT } else { 0 };
+        let sides = if material.is_double_sided { 0 } else { MATERIAL_SINGLE_SIDED };
         let d = if alpha == Alpha::Blend { d } else { 1.0 };
         let layers = Self {
             clearcoat: clearcoat.factor,
@@ -154,7 +313,7 @@ impl From<&scene::Material> for Material {
         };
         let Some(microfacet) = microfacet else {
             let &scene::Material { ka, tf, ns, lobes, .. } = material;
-            return Self { ka, ns, kd, d, ks, ni, ke, flags: flags_of(lobes) | unlit, tf, ..layers };
+            return Self { ka, ns, kd, d, ks, ni, ke, flags: flags_of(lobes) | unlit | sides, tf, ..layers };
         };
         let Microfacet { metallic, roughness, transmission, is_solid, conductor, has_single_scattering, .. } =
             microfacet;
@@ -171,7 +330,7 @@ impl From<&scene::Material> for Material {
             ks,
             ni,
             ke,
-            flags: MATERIAL_MICROFACET | unlit | solid | single | conductor_flag,
+            flags: MATERIAL_MICROFACET | unlit | sides | solid | single | conductor_flag,
             tf: Vec3::ONE,
             transmission,
             absorption: absorption(&microfacet),

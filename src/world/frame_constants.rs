@@ -22,8 +22,9 @@ impl World {
             false => AmbientApproximation::default(),
         };
         let (sky, ground_ambient) = (scene.ambient + approximation.sky, ground.ambient + approximation.ground);
+        let passes_blended = options.integrator == Integrator::Whitted && scene.has_blended();
         let mut frame = Frame {
-            n_triangles: scene.triangles.len() as u32,
+            n_triangles: scene.n_triangles() as u32,
             n_lights: scene.lights.len() as u32,
             // Equal colours give this colour and no tilt, without any rounding.
             ambient: sky + (ground_ambient - sky) / 2.0,
@@ -32,6 +33,7 @@ impl World {
             background: approximation.background.unwrap_or(scene.background),
             to_viewer: scene.studio.unwrap_or_default(),
             has_studio: scene.studio.is_some().into(),
+            extra_bounces: if passes_blended { RenderOptions::EXTRA_BOUNCES } else { 0 },
             ..Frame::default()
         };
         frame.set_options(options);

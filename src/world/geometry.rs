@@ -1,14 +1,15 @@
 //! Triangles with an acceleration structure over them.
 
-use super::{Mismatch, World};
+use super::{Instances, Mismatch, World};
 use crate::{accel::Accel, layout::Triangle};
 
-/// Borrowed triangles and the acceleration structure over them. Every index in the structure names one of the
-/// triangles.
+/// Borrowed triangles, or geometries and their instances, and the acceleration structure over them. Every index in the
+/// structure names one of the triangles.
 #[derive(Clone, Copy, Debug)]
 pub struct Geometry<'a> {
     triangles: &'a [Triangle],
     accel: &'a Accel,
+    instances: Option<&'a Instances>,
 }
 
 impl<'a> Geometry<'a> {
@@ -18,18 +19,31 @@ impl<'a> Geometry<'a> {
     /// The structure was built from more or fewer triangles.
     pub fn new(triangles: &'a [Triangle], accel: &'a Accel) -> Result<Self, Mismatch> {
         match (accel.n_triangles(), triangles.len()) {
-            (of_accel, given) if of_accel == given => Ok(Self { triangles, accel }),
+            (of_accel, given) if of_accel == given && !matches!(accel, Accel::TwoLevel(_)) => {
+                Ok(Self { triangles, accel, instances: None })
+            }
             (accel, triangles) => Err(Mismatch::Accel { accel, triangles }),
         }
     }
 
     pub(super) fn of_world(world: &'a World) -> Self {
-        Self { triangles: &world.scene().triangles, accel: world.accel() }
+        let scene = world.scene();
+        Self { triangles: &scene.triangles, accel: world.accel(), instances: scene.instances.as_ref() }
     }
 
-    /// World-space triangles.
+    /// The stored triangles: those of the world, or of the instances' geometries.
     pub fn triangles(&self) -> &'a [Triangle] {
         self.triangles
+    }
+
+    /// The instances, if there are any.
+    pub fn instances(&self) -> Option<&'a Instances> {
+        self.instances
+    }
+
+    /// The number of triangles in the world.
+    pub fn n_triangles(&self) -> usize {
+        self.instances.map_or(self.triangles.len(), Instances::n_triangles)
     }
 
     /// The acceleration structure over the triangles.

@@ -35,7 +35,7 @@ pub enum Mismatch {
         /// What is wrong with it.
         what: String,
     },
-    /// The material of a triangle is missing.
+    /// The material of a triangle, or with instances of an entry of their list, is missing.
     #[error("triangle {triangle} has material {material}, but there are {materials} materials")]
     Material {
         /// Index of the triangle.

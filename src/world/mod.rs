@@ -11,6 +11,7 @@ mod environment_map;
 mod flat;
 mod frame_constants;
 mod geometry;
+pub mod instances;
 mod light_bounds;
 mod light_tree;
 #[cfg(test)]
@@ -33,13 +34,15 @@ use self::ambient_approximation::AmbientApproximation;
 pub(crate) use self::texture_arrays::tests::{arrays_of, scene_of};
 pub use self::{
     alias::AliasEntry, emitters::Emitters, environment_map::EnvironmentMap, flat::FlatScene, geometry::Geometry,
-    mismatch::Mismatch, path_materials::path_materials, texture_arrays::TextureArrays, textured::Textures,
+    instances::Instances, mismatch::Mismatch, path_materials::path_materials, texture_arrays::TextureArrays,
+    textured::Textures,
 };
 use crate::{
     accel::{
         Accel, AccelOptions, Statistics,
         grid::DeviceBuild,
         kdtree::{BuildOptions, KdTree},
+        two_level::TwoLevel,
         wide_bvh::WideBvh,
     },
     scene::{Scene, Up},
@@ -114,7 +117,16 @@ impl World {
     ) -> Result<Self, Mismatch> {
         check::check(&scene)?;
         options.check().map_err(Mismatch::AccelOptions)?;
-        let accel = Accel::new_observed(&scene.triangles, options, progress);
+        let accel = match (&scene.instances, options) {
+            (Some(Instances { ranges, list, .. }), AccelOptions::KdTree(options)) => {
+                let two = TwoLevel::build(&scene.triangles, ranges, list, options, progress);
+                Accel::TwoLevel(Box::new(two))
+            }
+            (Some(_), AccelOptions::Grid(_)) => {
+                return Err(Mismatch::AccelOptions("instances are in kd-trees only".to_owned()));
+            }
+            (None, _) => Accel::new_observed(&scene.triangles, options, progress),
+        };
         Ok(Self::of_parts(scene, accel, options.clone()))
     }
 
@@ -125,6 +137,9 @@ impl World {
     /// Fails as [`World::of_flat`] does, or if the tree was built from more or fewer triangles.
     pub fn with_tree(scene: FlatScene, tree: KdTree, build_options: &BuildOptions) -> Result<Self, Mismatch> {
         check::check(&scene)?;
+        if scene.instances.is_some() {
+            return Err(Mismatch::AccelOptions("instances need a tree for each geometry".to_owned()));
+        }
         let (accel, accel_options) = (Accel::KdTree(tree), AccelOptions::KdTree(build_options.clone()));
         Geometry::new(&scene.triangles, &accel)?;
         Ok(Self::of_parts(scene, accel, accel_options))
@@ -191,15 +206,18 @@ impl World {
             (Accel::KdTree(tree), AccelOptions::KdTree(options)) => {
                 Statistics::KdTree(tree.statistics(scene.triangles.len(), options))
             }
+            (Accel::TwoLevel(two), AccelOptions::KdTree(options)) => Statistics::KdTree(two.statistics(options)),
             (Accel::Grid(grid), _) => Statistics::Grid(grid.statistics(&scene.triangles)),
-            (Accel::KdTree(_), AccelOptions::Grid(_)) => unreachable!("a world's structure is of its options' kind"),
+            (Accel::KdTree(_) | Accel::TwoLevel(_), AccelOptions::Grid(_)) => {
+                unreachable!("a world's structure is of its options' kind")
+            }
         }
     }
 
     /// The report of the first device that has built the world's grid, if there is one.
     pub fn grid_build(&self) -> Option<&DeviceBuild> {
         match &self.0.accel {
-            Accel::KdTree(_) => None,
+            Accel::KdTree(_) | Accel::TwoLevel(_) => None,
             Accel::Grid(grid) => grid.device_build(),
         }
     }

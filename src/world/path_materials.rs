@@ -6,7 +6,7 @@
 //!
 //! | MTL | microfacets |
 //! |---|---|
-//! | Kd | base colour, at most 1 |
+//! | Kd | base colour, at most 1 unless the material is unlit |
 //! | Ks, with a highlight or mirror | reflectance along the normal |
 //! | Ns, with a highlight | width sqrt(2 / (Ns + 2)), about as wide as Blinn's distribution (Walter et al., 2007) |
 //! | illum 3, 8 | perfectly smooth, as a mirror is |
@@ -17,8 +17,8 @@ use glam::Vec3;
 
 use super::FlatScene;
 use crate::layout::{
-    MATERIAL_FRESNEL, MATERIAL_MICROFACET, MATERIAL_PHONG_WIDTH, MATERIAL_REFLECT, MATERIAL_REFRACT, MATERIAL_SOLID,
-    MATERIAL_SPECULAR, MATERIAL_UNLIT, Material,
+    MATERIAL_FRESNEL, MATERIAL_MICROFACET, MATERIAL_PHONG_WIDTH, MATERIAL_REFLECT, MATERIAL_REFRACT,
+    MATERIAL_SINGLE_SIDED, MATERIAL_SOLID, MATERIAL_SPECULAR, MATERIAL_UNLIT, Material,
 };
 
 /// Index of refraction of an MTL material that does not state its reflectance by Ni, and the reflectance along the
@@ -37,7 +37,12 @@ fn path_material(material: &Material) -> Material {
     }
     let &Material { kd, ks, flags, tf, .. } = material;
     let has = |flag: u32| flags & flag != 0;
-    let flags = MATERIAL_MICROFACET | flags & MATERIAL_UNLIT;
+    let is_single_sided = flags & MATERIAL_SINGLE_SIDED;
+    // It shows its colour as it is, and reflects nothing.
+    if has(MATERIAL_UNLIT) {
+        return Material { flags: MATERIAL_MICROFACET | MATERIAL_UNLIT | is_single_sided, ..*material };
+    }
+    let flags = MATERIAL_MICROFACET | is_single_sided;
     let base = Material { kd: kd.min(Vec3::ONE), flags, tf: Vec3::ONE, ..*material };
     if has(MATERIAL_REFRACT) {
         // Whitted's rays refract wherever the surface is, whatever its opacity.
@@ -92,6 +97,15 @@ mod tests {
             assert_eq!(glass.flags, MATERIAL_MICROFACET | MATERIAL_SOLID);
             assert_eq!((glass.kd, glass.tf, glass.ni), (Vec3::ONE, Vec3::new(0.7, 0.8, 0.9), 1.3));
             assert_eq!((glass.transmission, glass.roughness, glass.d), (1.0, 0.0, 1.0));
+        }
+    }
+
+    #[test]
+    fn unlit_materials_keep_their_colour() {
+        for illum in [1, 2, 5, 6] {
+            let phong = Material { flags: of_illum(illum).flags | MATERIAL_UNLIT, d: 0.3, ..of_illum(illum) };
+            let unlit = path_material(&phong);
+            assert_eq!((unlit.kd, unlit.d, unlit.flags), (phong.kd, 0.3, MATERIAL_MICROFACET | MATERIAL_UNLIT));
         }
     }
 

@@ -2,7 +2,7 @@
 
 use bytemuck::{NoUninit, cast_slice};
 
-use super::{FlatScene, Textures};
+use super::{FlatScene, Instances, Textures};
 
 impl FlatScene {
     /// Returns a hash of all that frames read of the scene, except for its camera, as 32 hexadecimal digits: the first
@@ -14,6 +14,7 @@ impl FlatScene {
             origin: _,
             triangles,
             triangle_materials,
+            instances,
             materials,
             material_names: _,
             textures,
@@ -36,6 +37,10 @@ impl FlatScene {
         }
         add(&mut hasher, triangles);
         add(&mut hasher, triangle_materials);
+        if let Some(Instances { ranges: _, list, materials }) = instances {
+            add(&mut hasher, list);
+            add(&mut hasher, materials);
+        }
         add(&mut hasher, materials);
         add(&mut hasher, texels);
         add(&mut hasher, textures);

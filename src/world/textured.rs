@@ -6,14 +6,15 @@ use rayon::prelude::*;
 
 use super::{
     Mismatch,
-    corners::{corner_surfaces, uvs},
+    corners::{Placed, corner_surfaces, n_triangles_of, uvs},
+    instances::Stored,
     mips,
     texture_arrays::{Opacities, TextureArrays, texture_arrays},
 };
 use crate::{
     layout::{
-        CornerSurface, LEAST_SHADOWING_OPACITY, MAPS_ALPHA_BLEND, MAPS_ALPHA_MASK, MAPS_COLOUR_HAS_OPACITY,
-        MAPS_CORNERS_HAVE_OPACITY, MAPS_SHADOW_TEST, MaterialMaps, NO_TEXTURE, Texture,
+        CornerSurface, LEAST_SEEN_OPACITY, LEAST_SHADOWING_OPACITY, MAPS_ALPHA_BLEND, MAPS_ALPHA_MASK, MAPS_CLEAR_TEST,
+        MAPS_COLOUR_HAS_OPACITY, MAPS_CORNERS_HAVE_OPACITY, MAPS_SHADOW_TEST, MaterialMaps, NO_TEXTURE, Texture,
     },
     scene::{Alpha, Material, Scene},
     util::memory,
@@ -33,16 +34,17 @@ pub struct Textures {
     pub uvs: Vec<[Vec2; 3]>,
     /// Tangents and colours of the triangles' corners. Empty if there are neither.
     pub corners: Vec<[CornerSurface; 3]>,
-    /// The number of triangles.
+    /// The number of stored triangles.
     pub n_triangles: usize,
 }
 
 impl Textures {
-    /// Makes the arrays of a scene, whose meshes and instances fit together.
+    /// Makes the arrays of a scene, whose meshes and instances fit together. `placed`: the meshes as their triangles
+    /// are stored.
     ///
     /// # Errors
     /// A texture refers to an image that the scene does not have, or the images need more memory than there is.
-    pub(super) fn new(scene: &Scene) -> Result<Self, Mismatch> {
+    pub(super) fn new(scene: &Scene, placed: &[Placed]) -> Result<Self, Mismatch> {
         let opacities = Opacities::new(&scene.images);
         let (arrays, mut material_maps) = texture_arrays(scene, &opacities)?;
         let TextureArrays { mut texels, textures } = arrays;
@@ -63,16 +65,16 @@ impl Textures {
         let n_sets = all_textures().map(|texture| texture.uv_set as usize + 1).max().unwrap_or(0).min(2);
         let has_normals = scene.materials.iter().any(|material| material.maps.normal.is_some());
         let has_corners = has_colours || has_normals;
-        let n_bytes = n_bytes_of_corners(scene.n_triangles(), n_sets, has_corners);
+        let n_bytes = n_bytes_of_corners(n_triangles_of(placed), n_sets, has_corners);
         memory::require("texture coordinates, tangents and colours", n_bytes)
             .map_err(|error| Mismatch::Textures(error.to_string()))?;
         Ok(Self {
             texels,
             textures,
             material_maps,
-            uvs: uvs(scene, n_sets),
-            corners: if has_corners { corner_surfaces(scene) } else { Vec::new() },
-            n_triangles: scene.n_triangles(),
+            uvs: uvs(placed, n_sets),
+            corners: if has_corners { corner_surfaces(placed) } else { Vec::new() },
+            n_triangles: n_triangles_of(placed),
         })
     }
 
@@ -91,12 +93,17 @@ impl Textures {
 
     /// Returns whether rays of all kinds pass through parts of triangles.
     pub fn has_alpha_masks(&self) -> bool {
-        self.material_maps.iter().any(|maps| maps.flags & MAPS_ALPHA_MASK != 0)
+        self.material_maps.iter().any(|maps| maps.flags & (MAPS_ALPHA_MASK | MAPS_CLEAR_TEST) != 0)
     }
 
     /// Returns whether shadow rays pass through parts of triangles.
     pub fn has_shadow_alpha_test(&self) -> bool {
-        self.material_maps.iter().any(|maps| maps.flags & (MAPS_ALPHA_MASK | MAPS_SHADOW_TEST) != 0)
+        self.material_maps.iter().any(|maps| maps.flags & (MAPS_ALPHA_MASK | MAPS_CLEAR_TEST | MAPS_SHADOW_TEST) != 0)
+    }
+
+    /// Returns whether some surfaces are blended.
+    pub(crate) fn has_blended(&self) -> bool {
+        self.material_maps.iter().any(|maps| maps.flags & MAPS_ALPHA_BLEND != 0)
     }
 
     /// Returns whether rays of paths pass through parts of triangles, or through triangles at random.
@@ -110,21 +117,21 @@ impl Textures {
     }
 
     /// Returns the texture coordinates of a triangle's corners; 0 if the scene has none.
-    pub fn uvs_of(&self, triangle_ix: u32, uv_set: u32) -> [Vec2; 3] {
-        let at = uv_set as usize * self.n_triangles + triangle_ix as usize;
-        self.uvs.get(at).copied().unwrap_or_default()
+    pub fn uvs_of(&self, at: &Stored, uv_set: u32) -> [Vec2; 3] {
+        let ix = uv_set as usize * self.n_triangles + at.row;
+        at.corners(self.uvs.get(ix).copied().unwrap_or_default())
     }
 
     /// Returns the texture coordinates at barycentric weights; 0 if the scene has none.
-    pub fn uv_at(&self, triangle_ix: u32, uv_set: u32, u: f32, v: f32) -> Vec2 {
-        let [a, b, c] = self.uvs_of(triangle_ix, uv_set);
+    pub fn uv_at(&self, at: &Stored, uv_set: u32, u: f32, v: f32) -> Vec2 {
+        let [a, b, c] = self.uvs_of(at, uv_set);
         (1.0 - u - v) * a + u * b + v * c
     }
 
     /// Returns the interpolated colour of a triangle's corners; white if the scene has none.
-    pub fn corner_colour_at(&self, triangle_ix: u32, u: f32, v: f32) -> Vec4 {
-        let Some(corners) = self.corners.get(triangle_ix as usize) else { return Vec4::ONE };
-        let [a, b, c] = corners.map(|corner| self.decode_colour(corner.colour));
+    pub fn corner_colour_at(&self, at: &Stored, u: f32, v: f32) -> Vec4 {
+        let Some(corners) = self.corners.get(at.row) else { return Vec4::ONE };
+        let [a, b, c] = at.corners(*corners).map(|corner| self.decode_colour(corner.colour));
         (1.0 - u - v) * a + u * b + v * c
     }
 
@@ -171,7 +178,9 @@ fn set_opacity(
             let by_map = material.maps.opacity.is_some() || by_colour || corners_have_opacity;
             // What refracts shows itself in full.
             let refracts = !is_microfacet && material.lobes.refraction;
+            let can_be_clear = material.d < LEAST_SEEN_OPACITY || by_map;
             maps.flags |= if (material.d < 1.0 || by_map) && !refracts { MAPS_ALPHA_BLEND } else { 0 };
+            maps.flags |= if can_be_clear && !refracts { MAPS_CLEAR_TEST } else { 0 };
             if is_microfacet {
                 maps.flags |= if material.d < 1.0 || by_colour || corners_have_opacity { MAPS_SHADOW_TEST } else { 0 };
             } else if !is_glass && (corners_have_opacity || material.maps.opacity.is_some()) {

@@ -6,8 +6,11 @@ use std::{
     path::Path,
 };
 
-use crate::support::command::{COMPLAINTS, cornell, fail, kdray, names, stderr, stdout, succeed};
-use npyz::{NpyFile, WriterBuilder};
+use crate::support::{
+    arrays::npy,
+    command::{COMPLAINTS, cornell, fail, kdray, names, stderr, stdout, succeed},
+};
+use npyz::NpyFile;
 use serde_json::Value;
 use tempfile::TempDir;
 use zip::ZipArchive;
@@ -23,11 +26,7 @@ fn save<const N: usize>(path: &Path, rays: &[[f32; N]]) {
 }
 
 fn save_as<T: npyz::AutoSerialize + npyz::Serialize>(path: &Path, shape: &[u64], order: npyz::Order, numbers: &[T]) {
-    let file = File::create(path).unwrap();
-    let mut array =
-        npyz::WriteOptions::new().default_dtype().shape(shape).order(order).writer(file).begin_nd().unwrap();
-    numbers.iter().for_each(|number| array.push(number).unwrap());
-    array.finish().unwrap();
+    fs::write(path, npy(shape, order, numbers)).unwrap();
 }
 
 /// Returns the shape and the elements of an array in the archive.
@@ -300,4 +299,35 @@ fn a_validation_message_fails() {
         .output()
         .unwrap();
     assert_eq!(output.status.code(), Some(4), "{}", stderr(&output));
+}
+
+#[test]
+fn kept_instances_have_the_hits_of_flattened_ones() {
+    let directory = with_mesh();
+    let path = |name: &str| directory.path().join(name);
+    // The mesh, and the mesh turned upside down beside it.
+    let places: [f32; 24] = [
+        1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, //
+        1.0, 0.0, 0.0, 4.0, 0.0, -1.0, 0.0, 1.0, 0.0, 0.0, -1.0, 2.0,
+    ];
+    save_as(&path("places.npy"), &[2, 3, 4], npyz::Order::C, &places);
+    fs::write(path("scene.toml"), "[[mesh]]\nfile = 'mesh.obj'\ninstances = 'places.npy'\n").unwrap();
+    let shifted = RAYS.map(|[x, y, z, u, v, w, t_min, t_max]| [x + 4.0, 1.0 - y, z, u, v, w, t_min, t_max]);
+    save(&path("rays.npy"), &[RAYS, shifted].concat());
+    for device in [&[][..], &["--cpu"]] {
+        for kind in ["flatten", "keep"] {
+            let out = format!("{kind}.npz");
+            let arguments = ["cast", "scene.toml", "rays.npy", "-o", &out, "--instances", kind];
+            succeed(directory.path(), &[&arguments[..], device].concat());
+        }
+        let of = |kind: &str| {
+            let path = path(&format!("{kind}.npz"));
+            let (normals, uvs) = (load::<f32>(&path, "primitive_normals"), load::<f32>(&path, "primitive_uvs"));
+            (load::<f32>(&path, "t_hit"), load::<u32>(&path, "primitive_ids"), normals, uvs)
+        };
+        assert_eq!(of("keep"), of("flatten"));
+        assert!(of("keep").1.1.contains(&3), "rays hit the second instance");
+    }
+    let grid = ["cast", "scene.toml", "rays.npy", "-o", "x.npz", "--instances", "keep", "--accel", "grid"];
+    fail(directory.path(), &grid, 2, "--instances keep needs kd-trees");
 }

@@ -31,7 +31,7 @@ fn usage_mistakes_are_refused_before_the_scene_is_read() {
         (&["render", "none.toml", "--denoise", "edge", "--denoise-threshold", "1"], "--denoise edge"),
         (&["render", "none.toml", "--exposure", "0"], "--exposure"),
         (&["render", "none.toml", "--exposure", "inf"], "--exposure"),
-        (&["render", "none.toml", "--tonemap", "film"], "linear, agx, aces"),
+        (&["render", "none.toml", "--tonemap", "film"], "linear, agx, aces, neutral"),
         (&["render", "none.toml", "--spp", "0"], "--spp"),
         (&["render", "none.toml", "--up", "x"], "y, z, auto"),
         (&["render", "none.toml", "--eye", "1,2"], "three numbers"),
@@ -100,6 +100,29 @@ fn a_device_that_is_not_there_is_named() {
     fail(directory.path(), &["render", &cornell(), "-q", "--device", "99"], 4, "99");
     fail(directory.path(), &["render", &cornell(), "-q", "--device", "abacus"], 4, "abacus");
     assert!(names(directory.path()).is_empty());
+}
+
+/// The tests run on software drivers, which are not GPUs.
+#[test]
+fn a_gpu_can_be_required() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    let scene = cornell();
+    // What needs no GPU is not read.
+    for scene in [&scene, "none.toml"] {
+        for more in [&[][..], &["--device", "0"], &["--device", "all"]] {
+            let arguments = [&["render", scene, "-o", "x.png", "--require", "gpu"], more].concat();
+            fail(path, &arguments, 4, "is a software driver");
+        }
+    }
+    fail(path, &["render", &scene, &scene, "--require", "gpu"], 4, "is a software driver");
+    fs::write(path.join("rays.npy"), "").unwrap();
+    let cast = ["cast", &scene, "rays.npy", "-o", "x.npz", "--require", "gpu"];
+    fail(path, &cast, 4, "--require gpu: no usable GPU found: ");
+    fail(path, &[&cast[..], &["--device", "0"]].concat(), 4, "is a software driver");
+    fail(path, &["render", &scene, "--require", "gpu", "--cpu"], 2, "--cpu");
+    fail(path, &["render", &scene, "--require", "tpu"], 2, "gpu");
+    assert_eq!(names(path), ["rays.npy"]);
 }
 
 #[test]

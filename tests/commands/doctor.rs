@@ -133,6 +133,65 @@ fn a_machine_without_a_loader_renders_on_the_cpu() {
     assert_eq!(text.lines().last(), Some("ok, but only the CPU can render: use --cpu"), "{text}");
 }
 
+/// Runs doctor with these manifests of drivers alone.
+#[cfg(target_os = "linux")]
+fn doctor_with(directory: &Path, manifests: &str) -> Output {
+    let mut command = kdray(directory, &["doctor"]);
+    let output = command.env("VK_DRIVER_FILES", manifests).env("VK_ICD_FILENAMES", manifests).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
+    output
+}
+
+#[cfg(target_os = "linux")]
+fn write_manifest(directory: &Path, name: &str, library: &Path) -> String {
+    let path = directory.join(name);
+    let icd = serde_json::json!({ "library_path": library, "api_version": "1.3.0" });
+    fs::write(&path, serde_json::json!({ "file_format_version": "1.0.0", "ICD": icd }).to_string()).unwrap();
+    path.display().to_string()
+}
+
+/// Returns the manifest of the driver with which the tests run, or of lavapipe.
+#[cfg(target_os = "linux")]
+fn good_driver() -> String {
+    let is_lavapipe = |path: &std::path::PathBuf| path.to_string_lossy().contains("lvp_icd");
+    let installed = || fs::read_dir("/usr/share/vulkan/icd.d").unwrap().map(|entry| entry.unwrap().path());
+    let lavapipe = || installed().find(is_lavapipe).expect("lavapipe").display().to_string();
+    std::env::var("VK_DRIVER_FILES").unwrap_or_else(|_| lavapipe())
+}
+
+/// Returns the report's line that begins with these words.
+#[cfg(target_os = "linux")]
+fn line(output: &Output, begin: &str) -> String {
+    let text = stdout(output);
+    text.lines().find(|line| line.starts_with(begin)).unwrap_or_else(|| panic!("{text}")).to_owned()
+}
+
+/// The reason why there is no GPU is told for each driver.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_library_that_is_missing_is_named() {
+    let directory = TempDir::new().unwrap();
+    let manifest = write_manifest(directory.path(), "gone.json", Path::new("libGLX_gone.so.0"));
+    let told = line(&doctor_with(directory.path(), &manifest), &format!("driver {manifest}: wrong: "));
+    assert!(told.contains("its library `libGLX_gone.so.0` cannot be loaded: libGLX_gone.so.0: cannot open"), "{told}");
+}
+
+/// A driver that never answers hides the others. The manifest's library is a pipe that nobody writes to, on which the
+/// system's loader waits for ever.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_driver_that_hangs_is_named_and_left_out() {
+    let directory = TempDir::new().unwrap();
+    let pipe = directory.path().join("libhangs.so");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let hangs = write_manifest(directory.path(), "hangs.json", &pipe);
+    let good = good_driver();
+    let output = doctor_with(directory.path(), &format!("{hangs}:{good}"));
+    let told = line(&output, &format!("driver {hangs}: wrong: "));
+    assert!(told.contains("has not answered within") && told.ends_with(&format!("VK_DRIVER_FILES={good}")), "{told}");
+    assert!(line(&output, "Vulkan: ").contains("leave out the driver"), "{}", stdout(&output));
+}
+
 /// A picture that no memory holds is refused with what to do about it.
 #[test]
 fn a_picture_beyond_the_memory_ends_with_4() {

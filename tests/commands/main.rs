@@ -17,4 +17,5 @@ mod pack;
 mod process;
 mod progress_openjd;
 mod render;
+mod several;
 mod size;

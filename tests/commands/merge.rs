@@ -53,7 +53,7 @@ fn samples_and_tiles_join_to_the_same_bits() {
     for cpu in [&[][..], &["--cpu"]] {
         let directory = TempDir::new().unwrap();
         let path = directory.path();
-        let aov = ["--aov", "depth,id,emission,direct,indirect"];
+        let aov = ["--aov", "depth,id,emission,direct,indirect,albedo,normal"];
         // The last samples need not be a multiple of 16.
         let spp = ["--spp", "100"];
         render_paths(path, "whole.exr", &[&spp, &aov[..], cpu].concat());
@@ -108,8 +108,11 @@ fn noise_is_that_of_all_samples() {
 fn filtered_tiles_join_to_a_png() {
     let directory = TempDir::new().unwrap();
     let path = directory.path();
-    let scene =
-        ["--integrator", "whitted", "--spp", "3", "--denoise", "paper", "--tonemap", "agx", "--exposure", "0.7"];
+    let scene = [
+        ["--integrator", "whitted", "--spp", "3", "--denoise", "paper"],
+        ["--tonemap", "agx", "--exposure", "0.7", "--aov", "albedo,normal"],
+    ]
+    .concat();
     render(path, "whole.exr", &scene);
     render(path, "whole.png", &scene);
     render(path, "left.exr", &[&scene[..], &["--crop", "0,0,17,30"]].concat());
@@ -152,8 +155,11 @@ fn what_is_missing_or_does_not_fit_is_named() {
         fail(path, &[&["merge"], parts, &["-o", "x.exr"]].concat(), 3, named);
         assert!(!path.join("x.exr").exists());
     };
-    refused(&["1.exr", "2.exr"], "the parts have gaps: the pixels of --crop 0,15,40,30");
-    refused(&["1.exr", "3.exr"], "the parts have gaps: --samples 32-64 of --crop 0,0,40,15");
+    refused(&["1.exr", "2.exr"], "the parts have gaps: the pixels of --crop 0,15,40,30 (the parts are 1.exr, 2.exr)");
+    refused(
+        &["1.exr", "3.exr"],
+        "the parts have gaps: --samples 32-64 of --crop 0,0,40,15 (the parts are 1.exr, 3.exr)",
+    );
     refused(&["3.exr", "2.exr", "3.exr", "1.exr"], "overlap: both have --samples 0-64 of --crop 0,15,40,30");
     cpu("rows.exr", &["--crop", "3,10,9,20"]);
     refused(&["1.exr", "2.exr", "3.exr", "rows.exr"], "overlap: both have the pixels of --crop 3,10,9,15");

@@ -3,6 +3,8 @@
 
 use std::{fs, path::Path, process::Output};
 
+use base64::{Engine, engine::general_purpose::STANDARD};
+
 use crate::support::command::{cornell, kdray, stderr, stdout, succeed};
 use tempfile::TempDir;
 
@@ -121,4 +123,62 @@ fn a_missing_mesh_is_reported_with_the_scene_s_line() {
     let output = kdray(directory.path(), &["render", "a.toml", "--cpu", "-q"]).output().unwrap();
     let text = stderr(&output);
     assert!(text.starts_with("error: a.toml:3: mesh 1: parts/none.obj: cannot be read"), "{text}");
+}
+
+/// Only where culling changes the picture, a warning tells of it.
+#[test]
+fn back_faces_that_the_camera_does_not_see_are_told() {
+    let directory = TempDir::new().unwrap();
+    let corners: Vec<u8> = [-1_f32, -1.0, 0.0, 1.0, -1.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes).concat();
+    let data = STANDARD.encode(corners);
+    let gltf = format!(
+        r#"{{"asset": {{"version": "2.0"}}, "scenes": [{{"nodes": [0]}}], "nodes": [{{"mesh": 0}}],
+        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}}}]}}],
+        "accessors": [{{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+            "min": [-1, -1, 0], "max": [1, 1, 0]}}],
+        "bufferViews": [{{"buffer": 0, "byteLength": 36}}],
+        "buffers": [{{"byteLength": 36, "uri": "data:application/octet-stream;base64,{data}"}}]}}"#
+    );
+    fs::write(directory.path().join("a.gltf"), gltf).unwrap();
+    let told = |eye: &str, cull: &str| {
+        let picture = ["--cpu", "--size", "16x12", "-o", "x.png", "--target", "0,0,0"];
+        let arguments = [&["render", "a.gltf", "--eye", eye, "--cull", cull], &picture[..]].concat();
+        warnings(&succeed(directory.path(), &arguments)).join("\n")
+    };
+    let behind = told("0,0,-4", "auto");
+    assert!(behind.contains("pass through back faces of materials that are not doubleSided; --cull off"), "{behind}");
+    assert!(behind.contains("0 of 768 rays of the camera meet a surface"), "{behind}");
+    assert_eq!([told("0,0,-4", "off"), told("0,0,4", "auto"), told("0,0,4", "off")], ["", "", ""]);
+}
+
+/// The camera's rays tell before anything is drawn.
+#[test]
+fn a_picture_that_lacks_what_it_should_show_is_told() {
+    let directory = TempDir::new().unwrap();
+    let told = |text: &str| warnings(&render(directory.path(), "m.toml", text)).join("\n");
+    let disc = "ambient = [1, 1, 1]\n[[mesh]]\ngenerator = 'disc'\nradius = 1\nsegments = 8\n";
+    let away = "[camera]\neye = [0, 5, 0]\ntarget = [0, 9, 1]\n";
+    let empty = told(&format!("{away}{}", disc.replace("ambient = [1, 1, 1]\n", "")));
+    assert!(empty.contains("0 of 768 rays of the camera meet a surface: --eye and --target"), "{empty}");
+    assert_eq!(told(disc), "");
+    let line = "v 0 0 0\nv 1 1 1\nv 2 2 2\nf 1 2 3\n";
+    let flat = warnings(&render(directory.path(), "line.obj", line)).join("\n");
+    assert!(flat.contains("no triangle has an area"), "{flat}");
+    let panes = |n: usize, opacity: f32| {
+        let pane = |ix: usize| {
+            format!(
+                "[[mesh]]\ngenerator = 'disc'\nradius = 1\nsegments = 8\nmaterial = 'pane'\n\
+                 transform = {{ translate = [0, {}, 0] }}\n",
+                0.001 * ix as f32
+            )
+        };
+        let panes: String = (0..n).map(pane).collect();
+        told(&format!("ambient = [1, 1, 1]\nmaterials.pane = {{ d = {opacity} }}\n{panes}"))
+    };
+    // Rays have five levels, and pass 32 panes beside.
+    assert_eq!(panes(36, 0.5), "");
+    let hidden = panes(39, 0.5);
+    assert!(hidden.contains("meet 37 see-through surfaces or more") && hidden.contains("--max-depth 8"), "{hidden}");
+    assert_eq!(panes(39, 1.0), "", "opaque ones hide what they should");
+    assert_eq!(panes(39, 0.001), "", "clear ones are not there");
 }

@@ -5,7 +5,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::support::command::{fail, names, stderr, stdout, succeed};
+use crate::support::{
+    arrays::npy,
+    command::{fail, names, stderr, stdout, succeed},
+};
 use kdray::{
     pack::pack,
     scene::{LoadOptions, Scene},
@@ -27,6 +30,7 @@ file = 'parts/panel.obj'
 generator = 'plane'
 size = [4, 4]
 material = 'floor'
+instances = 'floors.npy'
 
 [materials.floor]
 map_Kd = 'floor.png'
@@ -50,6 +54,8 @@ fn write_scene(folder: &Path) -> PathBuf {
     for (name, text) in [("s.toml", SCENE), ("parts/panel.obj", OBJ), ("parts/panel.mtl", MTL), ("path.toml", PATH)] {
         fs::write(folder.join(name), text).unwrap();
     }
+    let identity = [1.0_f32, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    fs::write(folder.join("floors.npy"), npy(&[1, 3, 4], npyz::Order::C, &identity)).unwrap();
     write_image(&folder.join("floor.png"), [90, 60, 30]);
     write_image(&folder.join("shared/paint.png"), [200, 10, 10]);
     folder.join("s.toml")
@@ -71,7 +77,7 @@ fn a_pack_is_the_scene_and_needs_no_other_file() {
     let output = directory.path().join("s.kdpack");
     let packed = pack(&scene_file, None, &outside(), &output).unwrap();
     let names: Vec<_> = packed.files.iter().map(|(name, _)| name.as_str()).collect();
-    assert_eq!(names, ["floor.png", "parts/panel.mtl", "parts/panel.obj", "s.toml", "shared/paint.png"]);
+    assert_eq!(names, ["floor.png", "floors.npy", "parts/panel.mtl", "parts/panel.obj", "s.toml", "shared/paint.png"]);
     let scene = Scene::load_with(&scene_file, &outside()).unwrap();
     assert_eq!(scene.images.len(), 2, "the scene shows both images");
     let elsewhere = TempDir::new().unwrap();
@@ -271,7 +277,7 @@ fn pictures_and_films_from_packs_have_the_same_bytes() {
     write_scene(path);
     let common = ["--cpu", "--size", "24x18", "-q", "--allow-outside"];
     let report = stdout(&succeed(path, &["pack", "s.toml", "--allow-outside", "--path", "path.toml"]));
-    assert!(report.contains("bytes in 6 files\nhash ") && report.ends_with("\nwrote s.kdpack\n"), "{report}");
+    assert!(report.contains("bytes in 7 files\nhash ") && report.ends_with("\nwrote s.kdpack\n"), "{report}");
     succeed(path, &[&["render", "s.toml", "-o", "a.exr"], &common[..]].concat());
     succeed(path, &[&["render", "s.kdpack", "-o", "b.exr"], &common[..]].concat());
     let same = |a: &str, b: &str| fs::read(path.join(a)).unwrap() == fs::read(path.join(b)).unwrap();

@@ -2,14 +2,15 @@
 
 use std::{
     fs::{self, File},
+    io::{BufRead, BufReader, Read},
     os::unix::process::ExitStatusExt,
     path::Path,
-    process::{Child, Command, ExitStatus, Output, Stdio},
+    process::{Child, ChildStdout, Command, ExitStatus, Output, Stdio},
     thread,
     time::{Duration, Instant},
 };
 
-use crate::support::command::{PATIENCE, cornell, kdray, names, stderr};
+use crate::support::command::{Messages, PATIENCE, cornell, kdray, names, pixels, shipped, stderr, succeed};
 use npyz::WriterBuilder;
 use rustix::process::{Pid, Signal, kill_process};
 use tempfile::TempDir;
@@ -135,11 +136,13 @@ fn a_signal_that_was_ignored_stays_ignored() {
     assert_eq!(names(directory.path()), ["hits.npz", "mesh.obj", "rays.npy"]);
 }
 
+/// Without a complete sample, there is nothing to write.
 #[test]
 fn a_long_rendering_ends_at_once() {
     let directory = TempDir::new().unwrap();
     let scene = cornell();
-    let arguments = ["render", &scene, "--cpu", "--size", "640x480", "--spp", "65536", "-o", "x.png"];
+    let arguments =
+        ["render", &scene, "--cpu", "--size", "2000x1500", "--integrator", "path", "--spp", "16", "-o", "x.png"];
     for signal in [Signal::INT, Signal::TERM] {
         let log = directory.path().join("log");
         let mut child =
@@ -151,6 +154,127 @@ fn a_long_rendering_ends_at_once() {
         assert!(sent.elapsed() < Duration::from_secs(10), "{:?}", sent.elapsed());
         assert_eq!(names(directory.path()), ["log"]);
     }
+}
+
+/// Small pictures of paths.
+const SMALL: [&str; 7] = ["--cpu", "--size", "64x48", "--integrator", "path", "--denoise", "off"];
+
+/// A rendering that has at least one complete sample, with its files and what it prints.
+struct Begun {
+    directory: TempDir,
+    child: Child,
+    messages: Messages,
+    report: BufReader<ChildStdout>,
+}
+
+impl Begun {
+    /// Begins to render scenes with very many samples. A scheduler's progress tells when samples are complete: loading
+    /// and building are the first tenth of a scene.
+    fn render(scenes: &[&str], more: &[&str]) -> Self {
+        let directory = TempDir::new().unwrap();
+        let common = ["--spp", "65536", "--progress", "openjd"];
+        let mut command = interruptible(directory.path(), &[&["render"], scenes, &SMALL, &common, more].concat());
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let messages = Messages::of(&mut child);
+        let mut report = BufReader::new(child.stdout.take().unwrap());
+        let least = 10.1 / scenes.len() as f64;
+        let has_samples = |line: &str| {
+            let percent = line.strip_prefix("openjd_progress: ").map(|percent| percent.trim().parse::<f64>().unwrap());
+            percent.is_some_and(|percent| percent >= least)
+        };
+        let mut line = String::new();
+        while !has_samples(&line) {
+            line.clear();
+            assert!(report.read_line(&mut line).unwrap() > 0, "it has ended");
+        }
+        Self { directory, child, messages, report }
+    }
+
+    fn files(&self) -> Vec<String> {
+        names(self.directory.path())
+    }
+
+    /// Returns how the command has ended, and the rest of what it has printed.
+    fn end(&mut self) -> (ExitStatus, String) {
+        let status = end_of(&mut self.child);
+        let mut rest = String::new();
+        self.report.read_to_string(&mut rest).unwrap();
+        (status, rest)
+    }
+}
+
+#[test]
+fn ctrl_c_writes_the_samples_so_far() {
+    let scene = cornell();
+    for more in [&[][..], &["--noise", "0.0001"]] {
+        let mut begun = Begun::render(&[&scene], &[&["-o", "x.exr"], more].concat());
+        send(&begun.child, Signal::INT);
+        begun.messages.wait_for("note: interrupted: ");
+        let (status, text) = begun.end();
+        assert_eq!(status.signal(), Some(Signal::INT.as_raw()), "{text}");
+        assert_eq!(begun.files(), ["x.exr"]);
+        assert!(text.contains("\nwrote x.exr\n"), "{text}");
+        if more.is_empty() {
+            // The picture is that of the samples which the report states.
+            let n_samples = text.split(" samples a pixel").next().unwrap().split(' ').next_back().unwrap();
+            let counted = ["-q", "-o", "y.exr", "--spp", n_samples];
+            succeed(begun.directory.path(), &[&["render", &scene], &SMALL[..], &counted].concat());
+            let read = |name: &str| pixels(&begun.directory.path().join(name));
+            assert!(read("x.exr") == read("y.exr"), "{n_samples}");
+        }
+    }
+}
+
+/// SIGTERM and SIGHUP mean that there is no time, and what others would take for complete is not cut.
+#[test]
+fn other_signals_and_other_pictures_end_at_once() {
+    let scene = cornell();
+    let film = "[[keyframe]]\nframe = 0\neye = [0.5, 0.5, 2]\ntarget = [0.5, 0.5, 0]\n";
+    let path = TempDir::new().unwrap();
+    fs::write(path.path().join("p.toml"), film).unwrap();
+    let path = path.path().join("p.toml").display().to_string();
+    let cases: [(Signal, &[&str]); 5] = [
+        (Signal::TERM, &["-o", "x.exr"]),
+        (Signal::HUP, &["-o", "x.exr"]),
+        (Signal::INT, &["-o", "x.exr", "--skip-existing"]),
+        (Signal::INT, &["-o", "x.exr", "--samples", "0-65520"]),
+        (Signal::INT, &["-o", "x#.exr", "--path", &path]),
+    ];
+    for (signal, more) in cases {
+        let mut begun = Begun::render(&[&scene], more);
+        send(&begun.child, signal);
+        let (status, text) = begun.end();
+        assert_eq!(status.signal(), Some(signal.as_raw()), "{more:?} {text}");
+        assert!(begun.files().is_empty(), "{more:?}");
+    }
+}
+
+/// The second Ctrl-C ends the command, whether or not the picture is written by then.
+#[test]
+fn ctrl_c_twice_ends_at_once() {
+    let scene = cornell();
+    for _ in 0..4 {
+        let mut begun = Begun::render(&[&scene], &["-o", "x.exr"]);
+        send(&begun.child, Signal::INT);
+        begun.messages.wait_for("note: interrupted: ");
+        send(&begun.child, Signal::INT);
+        assert_eq!(begun.end().0.signal(), Some(Signal::INT.as_raw()));
+        let files = begun.files();
+        assert!(files.is_empty() || files == ["x.exr"], "{files:?}");
+        files.iter().for_each(|name| drop(pixels(&begun.directory.path().join(name))));
+    }
+}
+
+#[test]
+fn ctrl_c_ends_a_list_after_the_present_scene() {
+    let (scene, other) = (cornell(), shipped("lamp.toml"));
+    let mut begun = Begun::render(&[&scene, &other], &[]);
+    send(&begun.child, Signal::INT);
+    begun.messages.wait_for("interrupted: ");
+    let (status, text) = begun.end();
+    assert_eq!(status.signal(), Some(Signal::INT.as_raw()), "{text}");
+    assert_eq!(begun.files(), ["cornell.png"]);
+    assert!(text.ends_with("1 drawn, 0 failed, 1 not begun\n"), "{text}");
 }
 
 /// Runs the command in a shell that first sets a limit.

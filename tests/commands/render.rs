@@ -103,7 +103,7 @@ fn light_is_written_in_layers() {
 fn curves_change_what_is_shown_and_not_what_is() {
     let directory = TempDir::new().unwrap();
     let path = directory.path();
-    for curve in ["linear", "agx", "aces"] {
+    for curve in ["linear", "agx", "aces", "neutral"] {
         render(path, &["-o", &format!("{curve}.png"), "--tonemap", curve]);
         render(path, &["-o", &format!("{curve}.exr"), "--tonemap", curve]);
     }

@@ -136,7 +136,8 @@ fn batches_and_bands_change_no_bit() {
 #[test]
 fn bands_of_parts_of_rows_change_no_bit() {
     let (scene, context) = (scenes::mixed_outdoors(), device());
-    let options = RenderOptions { pixel_aovs: true, light_layers: true, max_depth: 2, ..options(300, 150) };
+    let layers = RenderOptions { pixel_aovs: true, light_layers: true, surface_layers: true, ..options(300, 150) };
+    let options = RenderOptions { max_depth: 2, ..layers };
     let world = world_of(&scene);
     // Rows of the border alone take 300 * 130 pixels.
     let range = Some(150 * 140 * 512);
@@ -148,7 +149,7 @@ fn bands_of_parts_of_rows_change_no_bit() {
     };
     let ((n_whole, whole, expected), (n_bands, joined, found)) = (draw(context.clone()), draw(narrow.clone()));
     assert!(n_whole == 1 && n_bands > 3, "{n_whole}, {n_bands}");
-    assert!(identical(&whole, &joined) && expected.light == found.light);
+    assert!(identical(&whole, &joined) && expected.layers == found.layers);
     assert!(bytemuck::cast_slice::<_, u8>(&expected.pixel_aovs) == bytemuck::cast_slice::<_, u8>(&found.pixel_aovs));
     [&context, &narrow].into_iter().for_each(|context| assert_silent(context));
 }

@@ -5,8 +5,10 @@
 mod support;
 
 mod agreement;
+mod back_faces;
 mod bands;
 mod batches;
+mod blended;
 mod closed_forms;
 mod compiler;
 mod crop;
@@ -15,10 +17,11 @@ mod grids;
 mod lamps;
 mod lanes;
 mod large;
-mod light_layers;
 mod living;
 mod many_lamps;
+mod mean_layers;
 mod mismatch;
+mod normal_maps;
 mod orthographic;
 mod parts;
 mod paths;

@@ -1,7 +1,7 @@
 //! Tests of frames that trace paths: closed forms, and the same bits however the frame is cut into samples, batches,
 //! crops and bands.
 
-use glam::{DVec3, Vec3, vec3};
+use glam::{DQuat, DVec3, Vec3, vec3};
 use kdray::{
     accel::kdtree::Traversal,
     cpu::{self, Batching},
@@ -12,7 +12,7 @@ use kdray::{
     gpu::DeviceOverrides,
     layout::{MATERIAL_MICROFACET, MOST_SAMPLES_LOG2, Material},
     render::{BandedRenderer, GpuRenderer},
-    scene::{self, Alpha, Maps, Projection, Texture},
+    scene::{self, Alpha, Maps, Projection, Texture, Transform},
     world::FlatScene,
 };
 
@@ -145,7 +145,7 @@ fn a_profile_has_the_passes_of_the_plan() {
     let (scene, options) = (scenes::mixed(), RenderOptions { pixel_aovs: true, ..options(20, 15, 2) });
     let mut renderer = GpuRenderer::new(device(), &world_of(&scene), &options).expect("a renderer");
     let mut on_cpu = cpu::CpuRenderer::new(&world_of(&scene), &options, Batching::default());
-    let plan = Plan::new(&FrameKind::new(&options, scene.lights.len() as u32));
+    let plan = Plan::new(&FrameKind::new(&options, &world_of(&scene).frame_constants(&options)));
     let steps = [plan.bounces.concat(), plan.light, plan.image].concat();
     let expected: Vec<_> = plan::passes(&steps).map(Pass::name).collect();
     for profile in [renderer.draw_sample().expect("a sample"), on_cpu.draw_sample()] {
@@ -326,4 +326,55 @@ fn paths_see_sheets_as_often_as_their_opacity_says() {
         // The deviation of 16,384 rays is 0.0034.
         assert!((mean - expected).abs() < 0.02, "{mean}, not {expected}");
     }
+}
+
+/// An unlit surface shows its colour as it is, as by the integrator `whitted`. Light that is too bright for sums of
+/// samples is bounded, not lost.
+#[test]
+fn bright_surfaces_are_shown() {
+    let bright = |kd: Vec3, ke: Vec3| {
+        let mut scene = textured::empty();
+        let phong = scene::Material { kd, ke, is_unlit: ke == Vec3::ZERO, ..scene::Material::default() };
+        textured::add(&mut scene, textured::square(), textured::placed(3.0, DVec3::ZERO), phong);
+        FlatScene::new(&scene).expect("a scene that fits together")
+    };
+    let unlit = bright(vec3(3.0, 0.5, 1e29), Vec3::ZERO);
+    let [too_bright, glowing] =
+        [(Vec3::splat(3e38), Vec3::ZERO), (Vec3::ONE, vec3(1e37, 2.0, 0.0))].map(|(kd, ke)| bright(kd, ke));
+    let options = options(8, 8, 2);
+    for draw in [on_device, on_cpu] {
+        let centre = |scene| {
+            let [r, g, b, _] = draw(scene, &options, 4).radiance[36];
+            vec3(r, g, b)
+        };
+        let found = centre(&unlit);
+        assert!((found / vec3(3.0, 0.5, 1e29) - 1.0).abs().max_element() < 1e-5, "{found}");
+        assert!((centre(&too_bright) / 1e30 - 1.0).abs().max_element() < 1e-5, "{}", centre(&too_bright));
+        let found = centre(&glowing);
+        assert!((found / vec3(1e30, 2.0, 1.0) - vec3(1.0, 1.0, 0.0)).abs().max_element() < 1e-5, "{found}");
+    }
+}
+
+/// Which rays pass through sheets does not depend on how a device rounds the points at which they meet them.
+#[test]
+fn device_and_cpu_agree_behind_sheets() {
+    let mut scene = textured::empty();
+    let image = textured::add_image(&mut scene, [1, 1], |_, _| [200, 120, 90, 128]);
+    let maps = Maps { base_colour: Some(Texture::of_image(image)), ..Maps::default() };
+    let sheet = scene::Material { ks: Vec3::ZERO, d: 0.9, alpha: Alpha::Blend, maps, ..textured::rough(Vec3::ONE) };
+    for i in 0..3 {
+        let offset = DVec3::new(0.1 * f64::from(i), -0.2, 0.7 * f64::from(i));
+        let placed = Transform::new(DVec3::splat(1.3), DQuat::from_rotation_y(0.3 + 0.4 * f64::from(i)), offset);
+        textured::add(&mut scene, textured::square(), placed.expect("a transform"), sheet.clone());
+    }
+    let wall = textured::placed(4.0, DVec3::new(0.0, 0.0, -1.5));
+    textured::add(&mut scene, textured::square(), wall, textured::rough(Vec3::splat(0.7)));
+    scene.lights = vec![scene::Light::Point { position: vec3(1.0, 2.0, 4.0), intensity: Vec3::splat(20.0) }];
+    scene.background = Vec3::splat(0.4);
+    let (scene, options) = (FlatScene::new(&scene).expect("a scene that fits together"), options(48, 36, 5));
+    let n_differing = |a: &Picture, b: &Picture| differing(a, b, 1e-2).len();
+    let (found, expected) = (on_device(&scene, &options, 2), on_cpu(&scene, &options, 2));
+    assert!(n_differing(&found, &expected) <= 1728 / 20, "{} of 1728 pixels", n_differing(&found, &expected));
+    let others = n_differing(&found, &on_cpu(&scene, &options, 4));
+    assert!(others > 600, "pictures of other samples differ in {others} of 1728 pixels");
 }

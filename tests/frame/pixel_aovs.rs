@@ -4,7 +4,7 @@ use glam::{Vec3, vec3};
 use kdray::{
     accel::kdtree::{BuildOptions, Traversal},
     cpu::{self, Batching},
-    frame::{Crop, FrameRenderer, Integrator, Primary, Profile, RenderOptions},
+    frame::{Crop, FrameRenderer, Goal, Integrator, PathOptions, Primary, Profile, RenderOptions},
     layout::{NO_TRIANGLE, PixelAovs},
     render::GpuRenderer,
     world::{FlatScene, World},
@@ -155,6 +155,37 @@ fn the_rays_of_the_first_sample_of_paths_are_counted() {
             assert!(n_differing <= device.len() / 20, "{traversal}: {n_differing} of {} pixels", device.len());
         }
         assert!(cpu.iter().all(|aovs| aovs.n_rays > 0) && cpu.iter().any(|aovs| aovs.n_rays > 4));
+    }
+    assert_silent(&context);
+}
+
+/// What a pixel's centre shows is the same for both integrators, whatever samples are drawn and however wide the lens
+/// is, and costs are those of the first sample.
+#[test]
+fn first_hits_of_paths_are_at_the_centres_of_pixels() {
+    let (plain, context) = (scenes::mixed_outdoors(), device());
+    for scene in [scenes::orthographic(plain.clone()), plain] {
+        let world = world_of(&scene);
+        let whitted = noting(RenderOptions { primary: Primary::Trace, ..options(40, 30, 2) });
+        let paths = PathOptions { aperture: 0.3, first_sample: 32, ..PathOptions::default() };
+        let of_paths = RenderOptions { integrator: Integrator::Path, paths, ..whitted.clone() };
+        let drawn = |options: &RenderOptions| {
+            let mut renderer = GpuRenderer::new(context.clone(), &world, options).expect("a renderer");
+            let on_device = renderer.draw_window(Goal::Samples(20), &mut || ()).expect("a picture");
+            let mut renderer =
+                cpu::CpuRenderer::new(&world, options, Batching { n_pixels: 500, ..Batching::default() });
+            [on_device, renderer.draw_window(Goal::Samples(20), &mut || ()).expect("a picture")]
+        };
+        for (found, expected) in drawn(&of_paths).iter().zip(drawn(&whitted)) {
+            let differs = |(a, b): (&PixelAovs, &PixelAovs)| {
+                let is_near = a.position_world.distance(b.position_world) <= 1e-3 && (a.depth - b.depth).abs() <= 1e-3;
+                (a.triangle_ix, a.material_ix) != (b.triangle_ix, b.material_ix) || !(is_near || a.depth == b.depth)
+            };
+            let n_differing = found.pixel_aovs.iter().zip(&expected.pixel_aovs).filter(|pair| differs(*pair)).count();
+            // Rays that differ in their last bits may hit another triangle at an edge.
+            assert!(n_differing <= 1200 / 100, "{n_differing} of 1200 pixels differ");
+            assert!(found.pixel_aovs.iter().all(|aovs| aovs.n_rays > 0 && aovs.n_samples == 20));
+        }
     }
     assert_silent(&context);
 }

@@ -47,7 +47,7 @@ impl Case {
         let triangles: Vec<Triangle> = visible.iter().map(|&ix| all[ix as usize]).collect();
         let hit_of = |ray: &Ray| {
             let &Ray { origin, t_min, direction, t_max } = ray;
-            let search_ray = SearchRay { origin, t_min, direction, t_max, source_triangle: NO_TRIANGLE };
+            let search_ray = SearchRay { origin, t_min, direction, t_max, source_triangle: NO_TRIANGLE, alpha_seed: 0 };
             let hit = hit_from_near(&self.mesh.inputs(), &search_ray, |near, best| {
                 *best = brute::closest_hit(&triangles, near);
             });
@@ -147,6 +147,7 @@ fn a_mesh_of_which_all_is_hidden_is_not_there() {
         direction: -Vec3::Z,
         t_max: f32::INFINITY,
         source_triangle: NO_TRIANGLE,
+        alpha_seed: 0,
     };
     assert_ne!(traverser.traverse::<false>(&mesh.inputs(), &into).triangle_ix, NO_TRIANGLE);
     let words = vec![TRIANGLE_HIDDEN; mesh.triangles.len()];

@@ -45,9 +45,11 @@ fn together(level: Level, rays: &[PathRay; LANES], triangle: &Triangle, triangle
         let mut hits = [None; LANES];
         for axis in 0..3 {
             let lanes = shears.lanes_of_axis[axis] & ((1 << LANES) - 1);
-            let Some((found, is_hit)) = shears.intersect_triangle(triangle, triangle_ix, axis, lanes) else { continue };
+            let hit = shears.intersect_triangle(triangle, triangle_ix, axis, lanes);
+            let Some((found, is_hit, is_back)) = hit else { continue };
             for lane in (0..LANES).filter(|&lane| is_hit.test(lane)) {
                 assert_eq!((lanes >> lane & 1, hits[lane]), (1, None), "a ray has one axis");
+                assert_eq!(is_back.test(lane), shear_of(&rays[lane]).is_back_face(triangle));
                 hits[lane] = Some(found.of_lane(lane));
             }
         }
@@ -56,7 +58,11 @@ fn together(level: Level, rays: &[PathRay; LANES], triangle: &Triangle, triangle
 }
 
 fn alone(ray: &PathRay, triangle: &Triangle, triangle_ix: u32) -> Option<Hit> {
-    Shear::of(ray.origin.to_array(), ray.direction.to_array()).intersect_triangle(triangle, triangle_ix)
+    shear_of(ray).intersect_triangle(triangle, triangle_ix)
+}
+
+fn shear_of(ray: &PathRay) -> Shear {
+    Shear::of(ray.origin.to_array(), ray.direction.to_array())
 }
 
 /// Returns triangles without area, and triangles with NaN, infinite, large and small coordinates.

@@ -4,7 +4,7 @@ use glam::{Vec3, vec3};
 use kdray::{
     frame::plan,
     layout::{
-        Batch, Bounce, CHILD_REFLECTED, CHILD_TRANSMITTED, Frame, Hit, NO_TRIANGLE, PathRay, SCAN_GROUP_SIZE,
+        Batch, Bounce, CHILD_REFLECTED, CHILD_TRANSMITTED, Frame, Hit, Material, NO_TRIANGLE, PathRay, SCAN_GROUP_SIZE,
         SPINE_ITEMS,
     },
     passes::Inputs,
@@ -39,25 +39,32 @@ const COUNTS: [u32; 14] = [
 
 /// Makes a stage whose rays have i children at triangle i: triangle 0 is diffuse, 1 is a mirror, 2 is glass.
 fn stage(capacity: u32) -> Stage {
+    stage_of(capacity, &[scenes::diffuse(Vec3::ONE), scenes::mirror(Vec3::splat(0.5)), scenes::glass(1.5)])
+}
+
+/// Makes a stage with a triangle of each material.
+fn stage_of(capacity: u32, materials: &[Material]) -> Stage {
     let mut scene = scenes::empty();
-    for material in [scenes::diffuse(Vec3::ONE), scenes::mirror(Vec3::splat(0.5)), scenes::glass(1.5)] {
+    for &material in materials {
         let triangle = meshes::triangle(Vec3::ZERO, vec3(0.0, 0.0, 1.0), vec3(1.0, 0.0, 0.0));
         scenes::add(&mut scene, vec![triangle], material);
     }
     Stage::new(scene, options(8, 8), capacity)
 }
 
-/// Returns a ray whose pixel is its index, and its hit.
-fn parent(i: usize, n_children: u32) -> (PathRay, Hit) {
+/// Returns a ray whose pixel is its index, and its hit. Where some surfaces are blended, the rays have used 0 to 4 of
+/// the five levels, by turns.
+fn parent(stage: &Stage, i: usize, triangle_ix: u32) -> (PathRay, Hit) {
+    let n_used = if stage.resources.constants().extra_bounces > 0 { i as u32 % 5 } else { 0 };
     let ray = PathRay {
         origin: vec3(0.3, 1.0, 0.3),
         pixel_ix: i as u32,
         direction: vec3(0.1, -1.0, 0.2).normalize(),
         source_triangle: NO_TRIANGLE,
         throughput: Vec3::ONE,
-        t_max: f32::INFINITY,
+        t_max: f32::from_bits(f32::INFINITY.to_bits() - n_used),
     };
-    (ray, Hit { t: 1.0, triangle_ix: n_children, u: 0.3, v: 0.3 })
+    (ray, Hit { t: 1.0, triangle_ix, u: 0.3, v: 0.3 })
 }
 
 /// The output of compaction.
@@ -71,8 +78,8 @@ struct Compacted {
 /// Compacts the children of the second bounce, whose rays come after `n_before` rays of the first one.
 fn on_device(stage: &Stage, n_before: u32, child_counts: &[u32]) -> Compacted {
     let resources = &stage.resources;
-    let before = vec![parent(0, 0); n_before as usize];
-    let parents = child_counts.iter().enumerate().map(|(i, &n)| parent(i, n));
+    let before = vec![parent(stage, 0, 0); n_before as usize];
+    let parents = child_counts.iter().enumerate().map(|(i, &n)| parent(stage, i, n));
     let (rays, hits): (Vec<_>, Vec<_>) = before.into_iter().chain(parents).unzip();
     stage.set_n_rays(&[n_before, child_counts.len() as u32]);
     stage.set_rays(&rays);
@@ -97,12 +104,12 @@ fn on_device(stage: &Stage, n_before: u32, child_counts: &[u32]) -> Compacted {
 fn on_cpu(stage: &Stage, n_before: u32, child_counts: &[u32]) -> Compacted {
     let (bindings, constants) = (stage.inputs(), stage.resources.constants());
     let capacity = stage.resources.queue.rays.len();
-    let parents = child_counts.iter().enumerate().map(|(i, &n)| parent(i, n));
+    let parents = child_counts.iter().enumerate().map(|(i, &n)| parent(stage, i, n));
     let (rays, hits): (Vec<_>, Vec<_>) = parents.unzip();
     let n = child_counts.len();
     let mut bounces = stage.set_n_rays(&[n_before, n as u32]);
     let mut all = vec![UNTOUCHED_RAY; capacity];
-    all[..n_before as usize].fill(parent(0, 0).0);
+    all[..n_before as usize].fill(parent(stage, 0, 0).0);
     let (before, behind) = all.split_at_mut(n_before as usize + n);
     before[n_before as usize..].copy_from_slice(&rays);
     let untouched = || vec![UNTOUCHED_WORD; capacity];
@@ -183,6 +190,22 @@ fn all_children_keep_their_order() {
     compare::exact(&[UNTOUCHED_RAY; 5000], &found.rays[2500..]).unwrap();
     let next = found.bounces[2];
     assert_eq!((next.n_rays, next.trace_groups_x, next.scan_groups_x, next.shade_groups_x), (0, 0, 0, 40));
+}
+
+/// Rays that have used all levels go on only where they pass straight through a blended surface. Other children use a
+/// level more than their parents.
+#[test]
+fn levels_are_counted_where_surfaces_are_blended() {
+    let stage = stage_of(100, &[scenes::veil(Vec3::ONE, 0.5), scenes::mirror(Vec3::splat(0.5)), scenes::glass(1.5)]);
+    let found = check(&stage, 0, &[0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 2, 2, 2, 2, 2]);
+    let (both, levels) = (CHILD_REFLECTED | CHILD_TRANSMITTED, [1; 4].into_iter().chain([0]));
+    let of_veil = [CHILD_TRANSMITTED; 5].into_iter();
+    let expected: Vec<_> =
+        of_veil.chain(levels.clone().map(|n| n * CHILD_REFLECTED)).chain(levels.map(|n| n * both)).collect();
+    assert_eq!(found.child_kinds[..15], expected);
+    let n_used = |ray: &PathRay| f32::INFINITY.to_bits() - ray.t_max.to_bits();
+    let of_children: Vec<_> = found.rays[15..32].iter().map(n_used).collect();
+    assert_eq!(of_children, [0, 1, 2, 3, 4, 1, 2, 3, 4, 1, 1, 2, 2, 3, 3, 4, 4]);
 }
 
 /// If there is one ray more than the queue holds, no ray is made, and the loss is reported.

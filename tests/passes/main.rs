@@ -29,6 +29,7 @@ mod resolve;
 mod shade;
 mod shadow;
 mod stage;
+mod surface_layers;
 mod tonemap;
 mod trace;
 mod visibility;

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 use kdray::{
+    frame::RenderOptions,
     layout::{Batch, LIGHT_LAYERS, PathState},
     reference::path_layers::path_layers,
 };
@@ -22,7 +23,8 @@ fn growing_states(n_paths: usize, random: &mut Random) -> Vec<Vec<PathState>> {
 #[test]
 fn agrees_with_its_twin() {
     for samples_log2 in 0..=4 {
-        let stage = PathStage::with_light_layers(scenes::mixed(), samples_log2);
+        let options = RenderOptions { light_layers: true, ..RenderOptions::default() };
+        let stage = PathStage::with_layers(scenes::mixed(), samples_log2, &options);
         let kernel = stage.passes.path_layers.as_ref().expect("the options ask for layers");
         let mut random = Random(u64::from(samples_log2));
         let states = growing_states(1200 << samples_log2, &mut random);

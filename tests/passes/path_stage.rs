@@ -37,10 +37,9 @@ impl PathStage {
         Self::with_options(scene, samples_log2, &RenderOptions { denoise, ..RenderOptions::default() })
     }
 
-    /// Makes the same stage for a picture with layers of light.
-    pub fn with_light_layers(scene: FlatScene, samples_log2: u32) -> Self {
-        let denoise = Denoise::Off;
-        Self::with_options(scene, samples_log2, &RenderOptions { denoise, light_layers: true, ..Default::default() })
+    /// Makes the same stage for a picture with the layers of some options.
+    pub fn with_layers(scene: FlatScene, samples_log2: u32, options: &RenderOptions) -> Self {
+        Self::with_options(scene, samples_log2, &RenderOptions { denoise: Denoise::Off, ..options.clone() })
     }
 
     /// Makes the same stage on another device.
@@ -141,7 +140,7 @@ impl PathStage {
         path_begin(&self.inputs(), &self.batch(), &mut rays);
         let all: Vec<u32> = (0..n as u32).collect();
         let mut hits = vec![super::stage::UNTOUCHED_HIT; n];
-        path_trace::closest_hits(&self.inputs(), self.options.traversal, &all, &rays, &mut hits);
+        path_trace::closest_hits(&self.inputs(), &self.batch(), self.options.traversal, (&all, &rays), &mut hits);
         (rays, hits)
     }
 }

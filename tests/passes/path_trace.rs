@@ -46,12 +46,13 @@ fn agrees_with_its_twin() {
         paths.shadow_rays.upload(&shadow_rays).expect("shadow_rays");
         paths.live_paths.upload(&lists).expect("live_paths");
         // Bounce 2 has the first list.
-        stage.trace(&Batch { n_pixels: 1200, bounce_ix: 2, depth: 2, ..FIRST });
+        let batch = Batch { n_pixels: 1200, bounce_ix: 2, depth: 2, ..FIRST };
+        stage.trace(&batch);
 
         let (inputs, traversal) = (stage.inputs(), stage.options.traversal);
         let (mut hits, mut states, mut shadow_rays) = (vec![UNTOUCHED_HIT; 1200], states, shadow_rays);
-        let n_hits = path_trace::closest_hits(&inputs, traversal, &live, &rays, &mut hits);
-        path_trace::shadow_rays(&inputs, traversal, &with_shadow_ray, &mut shadow_rays, &mut states);
+        let n_hits = path_trace::closest_hits(&inputs, &batch, traversal, (&live, &rays), &mut hits);
+        path_trace::shadow_rays(&inputs, &batch, traversal, &with_shadow_ray, (&mut shadow_rays, &mut states));
         let n_shadow_rays = with_shadow_ray.len() as u32;
         let n_outliers = if stage.context.is_software() { 0 } else { n as usize / 500 };
         compare::hits(n_outliers, &hits, &stage.resources.queue.hits.download().expect("hits")).unwrap();

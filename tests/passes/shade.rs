@@ -10,6 +10,11 @@ use kdray::{
 use super::stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_PIXEL, hits_of, options, rays_of};
 use crate::support::{compare, random::Random, scenes, textured};
 
+/// Returns how many of some rays are the camera's. Only a last bounce can be empty.
+fn n_of_camera(n_rays: u32) -> u32 {
+    n_rays.div_ceil(3)
+}
+
 /// Asserts that radiance agrees within 1e-4: `pow` and `inversesqrt` have an error of some 2^-13 of a steep
 /// highlight. The rays are those of two bounces.
 fn check(stage: &Stage, batch: &Batch, n_rays: u32) {
@@ -19,12 +24,16 @@ fn check(stage: &Stage, batch: &Batch, n_rays: u32) {
     let mut random = Random(3);
     let light_visibility: Vec<u32> = (0..queue.light_visibility.len()).map(|_| random.below(3) as u32).collect();
     let mut expected = vec![UNTOUCHED_PIXEL; rays.len()];
-    let lit =
-        LitRays { rays: &rays, hits: &hits, n_of_camera: (n_rays / 3) as usize, light_visibility: &light_visibility };
+    let lit = LitRays {
+        rays: &rays,
+        hits: &hits,
+        n_of_camera: n_of_camera(n_rays) as usize,
+        light_visibility: &light_visibility,
+    };
     reference::shade::shade(&stage.inputs(), lit, &mut expected);
     expected.resize(queue.hits.len(), UNTOUCHED_PIXEL);
 
-    let bounces = stage.set_n_rays(&[n_rays / 3, n_rays - n_rays / 3]);
+    let bounces = stage.set_n_rays(&[n_of_camera(n_rays), n_rays - n_of_camera(n_rays)]);
     stage.set_rays(&stored);
     stage.set_hits(&hits);
     queue.light_visibility.upload(&light_visibility).expect("light_visibility");
@@ -45,7 +54,7 @@ fn agrees_with_its_twin() {
     let stage = Stage::new(scenes::mixed_outdoors(), options(50, 50), 2010);
     for n_rays in RAY_COUNTS {
         check(&stage, &FIRST, n_rays);
-        check(&stage, &Batch { first_pixel: 300, n_pixels: n_rays / 3, ..FIRST }, n_rays);
+        check(&stage, &Batch { first_pixel: 300, n_pixels: n_of_camera(n_rays), ..FIRST }, n_rays);
     }
 }
 
@@ -54,7 +63,7 @@ fn agrees_on_textures_and_microfacets() {
     let stage = Stage::new(textured::every_kind(), options(50, 50), 2010);
     for n_rays in [1, 2000] {
         check(&stage, &FIRST, n_rays);
-        check(&stage, &Batch { n_pixels: n_rays / 3, ..FIRST }, n_rays);
+        check(&stage, &Batch { n_pixels: n_of_camera(n_rays), ..FIRST }, n_rays);
     }
 }
 

@@ -5,7 +5,7 @@ use std::{f32::consts::PI, fs, path::Path};
 use base64::{Engine, engine::general_purpose::STANDARD};
 use glam::Vec3;
 use kdray::{
-    scene::{Alpha, Light, LightChoice, LoadOptions, PathDefaults, RenderDefaults, Scene, scene_file_of},
+    scene::{Alpha, Light, LightChoice, LoadOptions, Look, PathDefaults, RenderDefaults, Scene, scene_file_of},
     world::FlatScene,
 };
 use serde_json::json;
@@ -124,6 +124,34 @@ fn a_converted_gltf_file_shows_the_same() {
         assert_same(&text, &before, &after);
         assert_eq!((before.camera, before.camera.is_orthographic()), (before.cameras[ix].1, name == "plan"));
     }
+}
+
+/// A scene file says whether the camera sees back faces, and keeps it when it is moved.
+#[test]
+fn a_converted_file_says_whether_back_faces_are_seen() {
+    let folder = TempDir::new().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    fs::write(path("m.glb"), model().glb()).unwrap();
+    let off = LoadOptions { look: Look { shows_back_faces: true, ..Look::default() }, ..LoadOptions::default() };
+    let are_double_sided = |scene: &Scene| scene.materials.iter().all(|material| material.is_double_sided);
+    for (options, is_off) in [(&LoadOptions::default(), false), (&off, true)] {
+        let (text, before, after) = converted(&path("m.glb"), &path("s.toml"), options);
+        assert_same(&text, &before, &after);
+        assert_eq!((text.contains("\ncull = \"off\"\n"), are_double_sided(&after)), (is_off, is_off), "{text}");
+    }
+    let (_, seen, culled) = converted(&path("m.glb"), &path("s.toml"), &LoadOptions::default());
+    assert!(!are_double_sided(&seen) && !are_double_sided(&culled));
+    let (text, before, after) = converted(&path("s.toml"), &path("t.toml"), &off);
+    assert_same(&text, &before, &after);
+    assert!(are_double_sided(&after), "{text}");
+    // A preset changes what a surface is made of, not its sides.
+    fs::write(path("s.toml"), "replace = ['clay']\n[[mesh]]\nfile = 'm.glb'\n").unwrap();
+    let clay = Scene::load(&path("s.toml")).unwrap();
+    let sides = |scene: &Scene| scene.materials.iter().map(|it| it.is_double_sided).collect::<Vec<_>>();
+    assert_eq!(sides(&clay)[..5], [false, true, false, false, false]);
+    fs::write(path("s.toml"), "cull = 'on'\n[[mesh]]\nfile = 'm.glb'\n").unwrap();
+    let error = Scene::load(&path("s.toml")).unwrap_err().to_string();
+    assert!(error.ends_with("s.toml:1: cull: `on` is not one of auto, off"), "{error}");
 }
 
 #[test]

@@ -18,6 +18,7 @@ mod path;
 mod placed;
 mod progress;
 mod replaced;
+mod rooms;
 mod standard;
 mod strangers;
 #[path = "../support/mod.rs"]

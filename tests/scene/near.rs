@@ -139,5 +139,6 @@ fn rooms_with_specks_far_away_are_rooms() {
     let (scene, warnings) = load_scene(&[("a.toml", toml.as_bytes()), ("a.obj", speck.as_bytes())]);
     let eye = scene.unwrap().camera.eye;
     assert!(eye.abs().cmple(Vec3::new(3.0, 1.5, 4.5)).all(), "{eye}");
-    assert!(warnings.len() == 1 && warnings[0].contains("1 of 13 triangles"), "{warnings:?}");
+    assert!(warnings.len() == 2 && warnings[0].contains("is shown as a room"), "{warnings:?}");
+    assert!(warnings[1].contains("1 of 13 triangles"), "{warnings:?}");
 }

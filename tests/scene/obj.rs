@@ -120,8 +120,9 @@ fn the_format_is_read_as_people_write_it() {
         "v 0 0 0 1\nv 1 0 0 0.5 0.5 0.5\nv\t0\t1 0\nvp 1\nf\t1 2\t3\nfoo bar\n".to_owned(),
     ];
     for text in same {
-        // Colours of vertices are all that the plain file lacks.
-        let found = FlatScene { textures: plain.textures.clone(), ..load_obj(&text) };
+        // Colours of vertices, and the white beneath them, are all that the plain file lacks.
+        let (textures, materials) = (plain.textures.clone(), plain.materials.clone());
+        let found = FlatScene { textures, materials, ..load_obj(&text) };
         assert_eq!(found, plain, "{text}");
     }
     let pentagon = load_obj("v 0 0 0\nv 2 0 0\nv 3 2 0\nv 1 3 0\nv -1 2 0\nf 1 2 3 4 5\n");

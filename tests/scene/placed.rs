@@ -2,10 +2,12 @@
 
 use glam::Vec3;
 use kdray::scene::{Pixels, Scene};
+use npyz::Order;
 
 use super::{
     gltf::Model,
     materials::{load_scene, png},
+    support::arrays::npy,
 };
 
 const OBJ: &str = "mtllib m.mtl\nusemtl red\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 1 0\nvt 0 1\n\
@@ -186,4 +188,92 @@ fn files_that_are_read_together_are_as_read_one_by_one() {
         let error = load(&order, &broken).0.unwrap_err().to_string();
         assert!(error.contains(order[1]), "{error}");
     }
+}
+
+/// The rows of matrices that place a mesh at three places: moved; turned and moved; mirrored and sheared.
+const PLACES: [[f64; 12]; 3] = [
+    [1.0, 0.0, 0.0, 5.0, 0.0, 1.0, 0.0, 6.0, 0.0, 0.0, 1.0, 7.0],
+    [0.0, -1.0, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.25],
+    [-1.0, 0.5, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0],
+];
+
+const IDENTITY: [f32; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+
+/// Loads a scene file with a mesh and an array of transforms beside it.
+fn load_placed(toml: &str, array: &[u8]) -> Result<Scene, String> {
+    let obj = OBJ.replace("mtllib m.mtl\nusemtl red\n", "");
+    let (scene, warnings) =
+        load_scene(&[("s.toml", toml.as_bytes()), ("m.obj", obj.as_bytes()), ("places.npy", array)]);
+    assert!(warnings.is_empty(), "{warnings:?}");
+    scene.map_err(|error| error.to_string())
+}
+
+#[test]
+fn an_array_places_a_mesh_many_times() {
+    let numbers = PLACES.as_flattened();
+    let single: Vec<f32> = numbers.iter().map(|x| *x as f32).collect();
+    let with_last_rows: Vec<f64> = PLACES.iter().flat_map(|rows| [&rows[..], &[0.0, 0.0, 0.0, 1.0]].concat()).collect();
+    let arrays = [
+        npy(&[3, 3, 4], Order::C, numbers),
+        npy(&[3, 3, 4], Order::C, &single),
+        npy(&[3, 4, 4], Order::C, &with_last_rows),
+    ];
+    let (p, scaled) = (Vec3::new(1.0, 2.0, 3.0), Vec3::new(2.0, 4.0, 6.0));
+    let expected = |p: Vec3| {
+        let row = |rows: &[f64; 12], y: usize| (0..3).map(|x| rows[4 * y + x] as f32 * p[x]).sum::<f32>();
+        PLACES.map(|rows| Vec3::from_array([0, 1, 2].map(|y| row(&rows, y) + rows[4 * y + 3] as f32)))
+    };
+    for array in arrays {
+        for source in ["file = 'm.obj'", "generator = 'box'\nsize = [1, 1, 1]"] {
+            let placed = |more: &str| {
+                let toml = format!("[[mesh]]\n{source}\ninstances = 'places.npy'\n{more}");
+                let scene = load_placed(&toml, &array).unwrap();
+                assert_eq!((scene.meshes.len(), scene.instances.len()), (1, 3));
+                assert_eq!(scene.n_triangles(), 3 * scene.meshes[0].faces.len());
+                let points: Vec<Vec3> = scene.instances.iter().map(|it| it.transform.point(p)).collect();
+                points
+            };
+            assert_eq!(placed(""), expected(p));
+            // The table's own transform comes first.
+            assert_eq!(placed("transform.scale = 2\n"), expected(scaled));
+        }
+    }
+    let nowhere = npy::<f32>(&[0, 3, 4], Order::C, &[]);
+    let toml = "[[mesh]]\nfile = 'm.obj'\ninstances = 'places.npy'\n[[mesh]]\nfile = 'm.obj'\n";
+    assert_eq!(load_placed(toml, &nowhere).unwrap().instances.len(), 1);
+}
+
+#[test]
+fn arrays_that_place_nothing_are_refused_with_their_reason() {
+    let toml = "[[mesh]]\nfile = 'm.obj'\ninstances = 'places.npy'\n";
+    let flat = PLACES.map(|rows| rows.map(|x| if x == 2.0 { 0.0 } else { x }));
+    let broken = PLACES.map(|rows| rows.map(|x| if x == 0.25 { f64::NAN } else { x }));
+    let far = PLACES.map(|rows| rows.map(|x| if x == 6.0 { 1e30 } else { x }));
+    let whole = npy(&[3, 3, 4], Order::C, PLACES.as_flattened());
+    let mut endless = npy(&[11, 3, 4], Order::C, &[1.0_f32; 132]);
+    let at = endless.windows(4).position(|word| word == b"(11,").unwrap();
+    let spaces = endless[at..].windows(20).position(|word| word == [b' '; 20]).unwrap();
+    endless.drain(at + spaces..at + spaces + 17);
+    endless.splice(at + 1..at + 3, *b"4611686018427387904");
+    let cases: [(&[u8], &str); 10] = [
+        (&endless, "has the shape 4611686018427387904 x 3 x 4, too many numbers for a file"),
+        (&npy(&[3, 3, 4], Order::C, flat.as_flattened()), "instance 2: the transform flattens the mesh"),
+        (&npy(&[3, 3, 4], Order::C, broken.as_flattened()), "instance 1: the transform has a number that is not"),
+        (&npy(&[3, 3, 4], Order::C, far.as_flattened()), "instance 0: "),
+        (&npy(&[3, 12], Order::C, PLACES.as_flattened()), "has the shape [3, 12]: instances are N x 3 x 4 numbers"),
+        (&npy(&[3, 3, 4], Order::Fortran, PLACES.as_flattened()), "is in Fortran order"),
+        (&npy(&[1, 3, 4], Order::C, &[1_i32; 12]), "not float32 or float64"),
+        (&npy(&[1, 4, 4], Order::C, &[1.0_f32; 16]), "instance 0: the last row of its matrix is not 0 0 0 1"),
+        (&whole[..whole.len() - 8], "ends after 2 of 3 instances"),
+        (b"no array", "is no .npy file"),
+    ];
+    for (array, what) in cases {
+        let error = load_placed(toml, array).unwrap_err();
+        assert!(error.contains("s.toml") && error.contains(what) && error.contains("mesh 1"), "{error}");
+    }
+    // Too many triangles are refused before they are placed.
+    let many = npy(&[1 << 18, 3, 4], Order::C, &IDENTITY.repeat(1 << 18));
+    let toml = "[[mesh]]\ngenerator = 'geodesic'\nradius = 1\nfrequency = 64\ninstances = 'places.npy'\n";
+    let error = load_placed(toml, &many).unwrap_err();
+    assert!(error.contains("a scene of 21474836480 triangles"), "{error}");
 }

@@ -423,7 +423,7 @@ fn a_mesh_under_the_users_sky_stands_on_a_ground() {
     let room = box_obj(min, size).replace("f 1 5 7 3", "f 3 7 5 1").replace("f 6 2 4 8", "f 8 4 2 6");
     let room = room.replace("f 1 2 6 5", "f 5 6 2 1").replace("f 7 8 4 3", "f 3 4 8 7");
     let room = room.replace("f 2 1 3 4", "f 4 3 1 2").replace("f 5 6 8 7", "f 7 8 6 5");
-    assert_eq!(load(&[("a.obj", &room)], &look()).instances.len(), 1);
+    assert_eq!(load(&[("interior_of_room.obj", &room)], &look()).instances.len(), 1);
 }
 
 /// `--light` takes the place of the sun; the sky stays.

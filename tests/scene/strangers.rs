@@ -100,6 +100,58 @@ fn libraries_of_other_machines_and_names_before_comments_are_found() {
 }
 
 #[test]
+fn a_library_of_the_files_own_name_is_taken_where_none_else_is() {
+    let mtl = &b"newmtl red\nKd 1 0 0\n"[..];
+    let other = &b"newmtl red\nKd 0 1 0\n"[..];
+    let of = |statement: &str| {
+        let obj = format!("{statement}\n{TRIANGLE}f 1 2 3\n");
+        let (scene, warnings) = loaded(&[("m.obj", obj.as_bytes()), ("m.mtl", mtl), ("other.mtl", other)]);
+        (scene.materials[scene.meshes[0].slots[0] as usize].kd, warnings.join("\n"))
+    };
+    let own = "m.mtl, which it does not name";
+    let (kd, told) = of("usemtl red");
+    assert!(kd == Vec3::X && told.contains(own), "{told}");
+    let (kd, told) = of("mtllib none.mtl\nusemtl red");
+    assert!(kd == Vec3::X && told.contains("none.mtl does not exist") && told.contains(own), "{told}");
+    assert_eq!(of("mtllib other.mtl\nusemtl red"), (Vec3::Y, String::new()));
+    assert_eq!(of(""), (Vec3::splat(0.8), String::new()), "no face names a material");
+}
+
+#[test]
+fn colours_of_a_file_are_albedos() {
+    let coloured = "v 0 0 0 1 0.5 0\nv 1 0 0 1 0.5 0\nv 0 1 0 1 0.5 0\nf 1 2 3\n";
+    let kd = |files: &[(&str, &[u8])]| {
+        let scene = loaded(files).0;
+        scene.materials[scene.instances[0].materials[scene.meshes[0].slots[0] as usize] as usize].kd
+    };
+    let plain = format!("{TRIANGLE}f 1 2 3\n");
+    assert_eq!(kd(&[("m.obj", coloured.as_bytes())]), Vec3::ONE);
+    assert_eq!(kd(&[("m.obj", plain.as_bytes())]), Vec3::splat(0.8));
+    for (file, expected) in [("c.obj", Vec3::ONE), ("p.obj", Vec3::splat(0.8))] {
+        let toml = format!("[[mesh]]\nfile = '{file}'\n");
+        let files = [("s.toml", toml.as_bytes()), ("c.obj", coloured.as_bytes()), ("p.obj", plain.as_bytes())];
+        assert_eq!(kd(&files), expected, "{file}");
+    }
+}
+
+#[test]
+fn a_concave_polygon_that_is_too_large_is_told() {
+    let n = 20_000;
+    let of = |is_star: bool| {
+        let point = |ix: usize| {
+            let angle = ix as f64 / n as f64 * std::f64::consts::TAU;
+            let radius = if is_star && ix.is_multiple_of(2) { 50.0 } else { 100.0 };
+            format!("v {} {} 0\n", radius * angle.cos(), radius * angle.sin())
+        };
+        let face: String = (1..=n).map(|ix| format!(" {ix}")).collect();
+        let obj = (0..n).map(point).collect::<String>() + "f" + &face + "\n";
+        mesh_of("m.obj", &obj).1.join("\n")
+    };
+    assert!(of(true).contains("a concave polygon of 20000 corners"));
+    assert_eq!(of(false), "");
+}
+
+#[test]
 fn names_may_be_in_an_old_encoding() {
     // \xfc is u with two dots in Windows-1252.
     let obj = [b"mtllib K\xfcche.mtl\nusemtl gr\xfcn\n", TRIANGLE.as_bytes(), b"f 1 2 3\n"].concat();

@@ -249,6 +249,7 @@ fn options(bytes: &mut Bytes) -> RenderOptions {
         traversal: Traversal::Stack,
         pixel_aovs: bytes.below(8) == 7,
         light_layers: bytes.below(8) == 7,
+        surface_layers: bytes.below(8) == 6,
         approximates_ambient: bytes.below(4) == 3,
         paths: PathOptions {
             first_sample: if bytes.below(16) == 15 { bytes.word(16) } else { 0 },

@@ -31,6 +31,7 @@ pub enum Format {
     Mtl,
     Toml,
     Gltf,
+    Draco,
     Ply,
     Stl,
     Image,
@@ -41,11 +42,12 @@ pub enum Format {
 
 impl Format {
     /// All formats with the folder of `tests/corpus` that has files of it.
-    pub const ALL: [(Self, &str); 10] = [
+    pub const ALL: [(Self, &str); 11] = [
         (Self::Obj, "obj"),
         (Self::Mtl, "mtl"),
         (Self::Toml, "toml"),
         (Self::Gltf, "gltf"),
+        (Self::Draco, "draco"),
         (Self::Ply, "ply"),
         (Self::Stl, "stl"),
         (Self::Image, "image"),
@@ -62,6 +64,7 @@ impl Format {
             Self::Mtl => "file.mtl",
             Self::Toml => "file.toml",
             Self::Gltf => "file.gltf",
+            Self::Draco => "file.bin",
             Self::Ply => "file.ply",
             Self::Stl => "file.stl",
             Self::Image => "file.tga",
@@ -71,11 +74,12 @@ impl Format {
         }
     }
 
-    /// Returns the scene that uses a file which is no scene itself.
-    fn user(self) -> Option<(&'static str, &'static str)> {
+    /// Returns the scene that uses a file, of `n_bytes`, which is no scene itself.
+    fn user(self, n_bytes: usize) -> Option<(&'static str, String)> {
         match self {
-            Self::Mtl => Some(("user.obj", USER_OF_MTL)),
-            Self::Image => Some(("user.toml", USER_OF_IMAGE)),
+            Self::Mtl => Some(("user.obj", USER_OF_MTL.to_owned())),
+            Self::Draco => Some(("user.gltf", USER_OF_DRACO.replace("N_BYTES", &n_bytes.to_string()))),
+            Self::Image => Some(("user.toml", USER_OF_IMAGE.to_owned())),
             _ => None,
         }
     }
@@ -84,6 +88,27 @@ impl Format {
 /// A mesh of three triangles with the materials `a`, `b` and `c` of `file.mtl`.
 const USER_OF_MTL: &str = "mtllib file.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 2 0\nvt 0 1\n\
                            usemtl a\nf 1/1 2/2 3/3\nusemtl b\nf 1/1 3/3 2/2\nusemtl c\nf 2/2 1/1 3/3\n";
+
+/// A pyramid of four faces with all attributes, whose data is `file.bin`.
+const USER_OF_DRACO: &str = r#"{
+    "asset": { "version": "2.0" }, "extensionsUsed": ["KHR_draco_mesh_compression"],
+    "buffers": [{ "uri": "file.bin", "byteLength": N_BYTES }], "bufferViews": [{ "buffer": 0, "byteLength": N_BYTES }],
+    "accessors": [
+        { "count": 5, "type": "VEC3", "componentType": 5126 }, { "count": 5, "type": "VEC3", "componentType": 5126 },
+        { "count": 5, "type": "VEC2", "componentType": 5126 },
+        { "count": 5, "type": "VEC4", "componentType": 5121, "normalized": true },
+        { "count": 5, "type": "VEC4", "componentType": 5121 }, { "count": 5, "type": "VEC4", "componentType": 5126 },
+        { "count": 12, "type": "SCALAR", "componentType": 5123 }
+    ],
+    "meshes": [{ "primitives": [{
+        "attributes":
+            { "POSITION": 0, "NORMAL": 1, "TEXCOORD_0": 2, "COLOR_0": 3, "JOINTS_0": 4, "WEIGHTS_0": 5 },
+        "indices": 6,
+        "extensions": { "KHR_draco_mesh_compression": { "bufferView": 0, "attributes":
+            { "POSITION": 0, "NORMAL": 1, "TEXCOORD_0": 2, "COLOR_0": 3, "JOINTS_0": 4, "WEIGHTS_0": 5 } } }
+    }] }],
+    "nodes": [{ "mesh": 0, "skin": 0 }, {}, {}, {}, {}, {}], "skins": [{ "joints": [0, 1, 2, 3, 4, 5] }]
+}"#;
 
 /// A scene whose materials use `file.tga` in each of the ways in which pixels are read.
 const USER_OF_IMAGE: &str = "materials.a = { map_Kd = 'file.tga', map_d = 'file.tga', map_normal = 'file.tga' }\n\
@@ -135,7 +160,7 @@ impl Reader {
 
     fn check_file(&self, format: Format, content: &[u8]) -> Option<String> {
         let path = self.write(format.file_name(), content);
-        let scene = match format.user() {
+        let scene = match format.user(content.len()) {
             Some((name, content)) => self.write(name, content.as_bytes()),
             None => path.clone(),
         };

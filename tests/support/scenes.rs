@@ -25,6 +25,7 @@ pub fn empty() -> FlatScene {
         name: "test".to_owned(),
         origin: DVec3::ZERO,
         triangles: Vec::new(),
+        instances: None,
         triangle_materials: Vec::new(),
         materials: Vec::new(),
         material_names: Vec::new(),

@@ -133,6 +133,11 @@ fn see_through(is_solid: bool) -> Material {
 /// Returns a scene with every kind of texture and of microfacet material, under a point, a spot and a directional
 /// light.
 pub fn every_kind() -> FlatScene {
+    FlatScene::new(&scene_of_every_kind()).expect("a scene that fits together")
+}
+
+/// Returns what [`every_kind`] flattens.
+pub fn scene_of_every_kind() -> Scene {
     let mut scene = empty();
     let checks =
         add_image(
@@ -191,5 +196,5 @@ pub fn every_kind() -> FlatScene {
     ];
     scene.ambient = Vec3::splat(0.25);
     scene.background = vec3(0.2, 0.3, 0.5);
-    FlatScene::new(&scene).expect("a scene that fits together")
+    scene
 }

@@ -4,9 +4,11 @@
 #[path = "../support/mod.rs"]
 mod support;
 
+mod compiling;
 mod failures;
 mod files;
 mod motion;
+mod on_cpu;
 mod shaders;
 mod slow;
 

@@ -18,10 +18,12 @@
 // lobes together. Perfectly smooth (delta) lobes have no pdf per steradian: they are sampled alone.
 //
 // Light from a direction whose sides of the triangle and of the shading normal differ is not scattered. If the viewer
-// is behind the shading normal, the triangle's normal replaces it.
+// is behind the shading normal, the triangle's normal replaces it. Where a map bends the normal, the interpolated
+// surface takes the triangle's place: light fades towards its horizon (`share_from`), and the normal turns towards the
+// interpolated one as far as the viewer demands (`normal_of_lobes`), so that no edges of triangles are seen.
 //
 // Needs nothing. Provides `bsdf_terms` (terms.glsl), `eval_bsdf` (evaluate.glsl), `sample_bsdf` (sample.glsl), and
-// `is_smooth`, `surface_albedo` and `surface_gloss` (lobes.glsl).
+// `is_smooth`, `hit_albedo`, `surface_albedo` and `surface_gloss` (lobes.glsl).
 #ifndef KDRAY_BSDF
 #define KDRAY_BSDF
 

@@ -4,6 +4,7 @@
 #define KDRAY_BSDF_EVALUATE
 
 #include "layout.glsl"
+#include "shading/maps.glsl"
 #include "shading/surface.glsl"
 #include "bsdf/albedo.glsl"
 #include "bsdf/clearcoat.glsl"
@@ -95,16 +96,22 @@ BsdfEval eval_lobes(BsdfTerms terms, vec3 to_light) {
     return sum;
 }
 
-// Whether a direction is on the same side of the triangle and of the surface's frame. local: in this frame.
-bool is_consistent(Surface surface, vec3 direction, vec3 local) {
-    return dot(surface.geometric, direction) * local.z > 0.0;
+// The share of the light from a direction that the surface itself lets pass to its lobes: nothing if the direction is
+// not on the same side of the surface and of its frame. The surface of a bent normal is the interpolated one, towards
+// whose horizon the bumps shadow one another. local: the direction in the frame.
+float share_from(Surface surface, vec3 direction, vec3 local) {
+    vec3 up = is_bent(surface) ? surface.interpolated : surface.geometric;
+    return dot(up, direction) * local.z > 0.0 ? bump_shadowing(surface, direction) : 0.0;
 }
 
 // The sum of all lobes but the delta lobes, at a surface.
 BsdfEval eval_bsdf(BsdfTerms terms, Surface surface, vec3 to_light) {
     vec3 local = to_local(terms.frame, to_light);
-    if (terms.choice == vec4(0.0) || !is_consistent(surface, to_light, local)) return BsdfEval(vec3(0.0), 0.0);
-    return eval_lobes(terms, local);
+    float share = share_from(surface, to_light, local);
+    if (terms.choice == vec4(0.0) || !(share > 0.0)) return BsdfEval(vec3(0.0), 0.0);
+    BsdfEval found = eval_lobes(terms, local);
+    found.value *= share;
+    return found;
 }
 
 #endif

@@ -73,12 +73,30 @@ vec3 with_metal(Material material, vec3 dielectric, vec3 metal) {
     return scene_has_lobe(LOBE_METAL) ? mix(dielectric, metal, material.metallic) : dielectric;
 }
 
-// About the share of light that the surface scatters, by colour: what it reflects along its normal, or lets pass. It is
-// 1 if the surface is perfectly smooth, since that shows other surfaces.
-vec3 surface_albedo(Material material) {
-    if (is_smooth(material)) return vec3(1.0);
-    vec3 dielectric = material.kd + normal_reflectance(material);
+// The albedo of a material of MTL as the integrator whitted reads it: that of the microfacets which it is for paths
+// (src/world/path_materials.rs).
+vec3 phong_albedo(Material material) {
+    float ratio = (material.ni - 1.0) / (material.ni + 1.0);
+    if ((material.flags & MATERIAL_REFRACT) != 0u) return material.tf + ratio * ratio;
+    bool is_mirror = (material.flags & MATERIAL_REFLECT) != 0u;
+    if (is_mirror && (material.flags & MATERIAL_FRESNEL) != 0u) return material.kd + normal_reflectance(material);
+    bool reflects = is_mirror || (material.flags & MATERIAL_SPECULAR) != 0u;
+    return reflects ? material.kd + material.ks : material.kd;
+}
+
+// About the share of light that the surface scatters, by colour: what it reflects along its normal, or lets pass. Of
+// metals it is the reflectance, of glass the tint. It is the same for both integrators.
+vec3 hit_albedo(Material material) {
+    if ((material.flags & MATERIAL_UNLIT) != 0u) return clamp(material.kd, 0.0, 1.0);
+    if (!is_microfacet(material)) return clamp(phong_albedo(material), 0.0, 1.0);
+    vec3 base = material.kd * (1.0 - material.transmission * (1.0 - material.tf));
+    vec3 dielectric = base + normal_reflectance(material);
     return clamp(with_metal(material, dielectric, metal_fresnel(material, 1.0)), 0.0, 1.0);
+}
+
+// The albedo of `hit_albedo`, but 1 for a perfectly smooth surface, which shows other surfaces.
+vec3 surface_albedo(Material material) {
+    return is_smooth(material) ? vec3(1.0) : hit_albedo(material);
 }
 
 // How narrow the surface scatters light, 0..1: the share of its albedo that is not Lambertian, less the wider its

@@ -113,10 +113,11 @@ BsdfSample delta_sample(BsdfTerms terms, Surface surface, LobeSample lobe) {
 BsdfSample rough_sample(BsdfTerms terms, Surface surface, LobeSample lobe) {
     vec3 direction = to_world(terms.frame, lobe.local);
     bool is_on_side = lobe.local.z * lobe.side > 0.0;
-    if (!is_on_side || !is_consistent(surface, direction, lobe.local)) return BSDF_ABSORBED;
+    float share = share_from(surface, direction, lobe.local);
+    if (!is_on_side || !(share > 0.0)) return BSDF_ABSORBED;
     BsdfEval found = eval_lobes(terms, lobe.local);
     if (!(found.pdf > 0.0)) return BSDF_ABSORBED;
-    return BsdfSample(direction, found.value / found.pdf, found.pdf, false);
+    return BsdfSample(direction, found.value * share / found.pdf, found.pdf, false);
 }
 
 // A direction from which light is scattered to the viewer. u: random numbers in [0, 1). u.z selects the lobe, and

@@ -4,6 +4,7 @@
 #define KDRAY_BSDF_TERMS
 
 #include "layout.glsl"
+#include "shading/maps.glsl"
 #include "shading/surface.glsl"
 #include "shading/microfacet.glsl"
 #include "shading/fresnel.glsl"
@@ -163,15 +164,34 @@ float clear_loss(BsdfTerms terms, GgxAlbedo albedo) {
     return solid_loss(terms.to_viewer.z, sqrt(terms.width), terms.eta);
 }
 
+// The mapped normal, turned towards the interpolated one just as far that no mirror image of the viewer is below the
+// surface. It is then half-way between the viewer, seen in the plane in which the normal turns, and the horizon there.
+vec3 mirroring_normal(Surface surface, vec3 to_viewer) {
+    vec3 up = surface.interpolated, normal = surface.shading;
+    up = normalize(up + max(LEAST_COSINE - dot(up, to_viewer), 0.0) * to_viewer);
+    float cosine = dot(normal, to_viewer);
+    if (cosine > 0.0 && dot(up, 2.0 * cosine * normal - to_viewer) >= 0.0) return normal;
+    vec3 horizon = normalize(normal - dot(normal, up) * up);
+    return normalize(normalize(dot(to_viewer, up) * up + dot(to_viewer, horizon) * horizon) + horizon);
+}
+
+// The normal around which the lobes are. The viewer is on the front of the triangle, but may be behind an interpolated
+// normal, or behind that of a map. Lambertian surfaces look alike from everywhere, so their mapped normal stays.
+vec3 normal_of_lobes(Material material, Surface surface, vec3 to_viewer) {
+    if (is_bent(surface)) {
+        bool is_lambertian = !has_interface(material) && !has_clearcoat(material) && !has_sheen(material);
+        return is_lambertian ? surface.shading : mirroring_normal(surface, to_viewer);
+    }
+    return dot(surface.shading, to_viewer) < LEAST_COSINE ? surface.geometric : surface.shading;
+}
+
 // The terms for a viewer.
 BsdfTerms bsdf_terms(Material material, Surface surface, vec3 to_viewer) {
     // Textures of floats can have any value.
     material.kd = clamp(material.kd, 0.0, 1.0);
     material.sheen_colour = clamp(material.sheen_colour, 0.0, 1.0);
     BsdfTerms terms;
-    // The viewer is on the front of the triangle, but may be behind an interpolated normal.
-    bool is_behind = dot(surface.shading, to_viewer) < LEAST_COSINE;
-    terms.frame = frame_around(is_behind ? surface.geometric : surface.shading);
+    terms.frame = frame_around(normal_of_lobes(material, surface, to_viewer));
     terms.to_viewer = to_local(terms.frame, to_viewer);
     terms.to_viewer.z = max(terms.to_viewer.z, LEAST_COSINE);
     terms.material = material;

@@ -15,7 +15,7 @@
 // The radiance that a triangle emits at barycentric weights of its second and third corner, by the largest level of
 // its texture. A surface without shading (`unlit`) emits nothing.
 vec3 emission_at(uint triangle_ix, float u, float v) {
-    uint material_ix = load_triangle_materials(triangle_ix);
+    uint material_ix = material_ix_of(triangle_ix);
     if ((materials[material_ix].flags & MATERIAL_UNLIT) != 0u) return vec3(0.0);
     vec3 emitted = materials[material_ix].ke;
     bool has_maps = TEXTURED ? accel.material_maps_begin != NO_WORDS : false;

@@ -212,7 +212,8 @@ uint suspend_in_grid(GridWalk walk, Visit visit, Nearest best) {
     vec2 weights = spilled_pair(WEIGHTS_SLOT);
     return suspend(SuspendedRay(
         pack_cube(walk.cube), walk.t_enter, 0.0, visit.entry_ix, visit.end_ix,
-        best.t, best.triangle_ix, weights.x, weights.y, steps_so_far(), uvec2(walk.upper_cube, 0u)
+        best.t, best.triangle_ix, weights.x, weights.y, steps_so_far(), uvec2(walk.upper_cube, 0u),
+        outer.top_node, outer.top_pending, outer.t, outer.triangle_ix
     ));
 }
 
@@ -239,6 +240,7 @@ void resume_in_grid(TraversalRay ray, out GridWalk walk, out Visit visit, out Ne
     spill_pair(WEIGHTS_SLOT, state.u, state.v);
     visit = Visit(state.entry_ix, state.end_ix, interval_of(walk.t_enter, min(t_leave_of(walk), best.t)));
     count_steps(state.n_steps);
+    resumes = false;
 }
 
 // Searches all cells that the ray meets in [t_enter, t_exit], until nothing nearer can follow. Each iteration of the

@@ -13,7 +13,7 @@ struct Cell {
 
 // The root, and the ray's whole interval.
 Cell root_cell(TraversalRay ray) {
-    return Cell(0u, ray.t_enter, ray.t_exit);
+    return Cell(root_offset(), ray.t_enter, ray.t_exit);
 }
 
 uint node_ix_of(uint node_offset) {

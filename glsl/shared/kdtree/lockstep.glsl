@@ -11,7 +11,7 @@
 // Needs everything that kdtree.glsl includes, and its `next_leaf`. Provides `search_in_step`.
 
 // Does what `find_candidate` does. The candidate is the entry before the visit's entry_ix. reach:
-// accel.plane_epsilon, which is passed in since loading it in each iteration takes lavapipe 23 instructions of 145.
+// extent().plane_epsilon, which is passed in since loading it in each iteration takes lavapipe 23 instructions of 145.
 bool find_candidate_in_step(TraversalRay ray, float reach, inout Visit visit) {
     bool found = false;
     bool looks = visit.entry_ix < visit.end_ix && has_iterations();
@@ -30,14 +30,17 @@ void intersect_in_step(TraversalRay ray, LeafTriangle entry, bool tests, inout N
     vec3 a, b, c;
     vec3 edges = seen_edges(ray.shear, corners_of(entry), a, b, c);
     vec3 errors = edge_errors(a, b, c);
-    Hit hit = weighted_hit(ray.shear, exact_edges(edges, errors), vec3(a.z, b.z, c.z), entry.triangle_ix);
+    Hit hit = in_world(weighted_hit(
+        ray.shear, exact_edges(edges, errors), vec3(a.z, b.z, c.z), entry.triangle_ix
+    ));
     bool is_hit = tests && is_inside(with_exact_signs(edges, errors));
-    bool is_new = is_hit && is_better(ray, hit.t, entry.triangle_ix, best);
-    if (SKIPS_HIDDEN) is_new = is_new && is_accepted(entry.triangle_ix, hit.u, hit.v);
-    if (has_alpha_test()) is_new = is_new && is_accepted(entry.triangle_ix, hit.u, hit.v);
+    bool is_new = is_hit && is_better(ray, hit.t, hit.triangle_ix, best);
+    if (SKIPS_HIDDEN || has_alpha_test() || passes_back_faces()) {
+        is_new = is_new && is_accepted(ray.shear, corners_of(entry), hit.triangle_ix, hit.u, hit.v);
+    }
     vec2 weights = spilled_pair(WEIGHTS_SLOT);
     best.t = is_new ? hit.t : best.t;
-    best.triangle_ix = is_new ? entry.triangle_ix : best.triangle_ix;
+    best.triangle_ix = is_new ? hit.triangle_ix : best.triangle_ix;
     spill_pair(WEIGHTS_SLOT, is_new ? hit.u : weights.x, is_new ? hit.v : weights.y);
 }
 
@@ -64,7 +67,7 @@ uint search_in_step(TraversalRay ray, bool any_hit, inout Nearest best) {
     Cell cell = root_cell(ray);
     // The ray starts at the root, with a visit that has nothing left to test.
     Visit visit = Visit(0u, 0u, interval_of(0.0, 0.0));
-    float reach = accel.plane_epsilon;
+    float reach = extent().plane_epsilon;
     bool begins = true;
     bool goes_on = is_in(ray);
     uint mark = 0u;

@@ -12,7 +12,7 @@
 // Finds the next pending cell upwards from the cell's node. Returns false if there is none that may hold a hit nearer
 // than t_best.
 bool backtrack(TraversalRay ray, float t_best, inout Cell cell) {
-    while (cell.node_offset != 0u) {
+    while (cell.node_offset != root_offset()) {
         uint parent_ix = kd_parent_of(node_ix_of(cell.node_offset));
         KdNode parent = kd_node(offset_of(parent_ix));
         if (cell.node_offset == first_child(ray, parent)) {

@@ -15,7 +15,7 @@ uvec2 siblings_done;
 // Finds the next pending cell upwards from the cell's node. Returns false if there is none that may hold a hit nearer
 // than t_best.
 bool climb_by_boxes(TraversalRay ray, float t_best, inout Cell cell) {
-    while (cell.node_offset != 0u) {
+    while (cell.node_offset != root_offset()) {
         count_iteration();
         if ((siblings_done.x & 1u) == 0u) {
             vec2 interval = interval_in(ray, node_ix_of(sibling_of(cell.node_offset)));

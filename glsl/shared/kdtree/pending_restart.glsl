@@ -17,7 +17,7 @@ uint trail_length;
 // Walks from the root to the lowest pending node, whose bit it clears.
 void retrace(TraversalRay ray, inout Cell cell) {
     trail_length -= mask_up();
-    cell.node_offset = 0u;
+    cell.node_offset = root_offset();
     cell.t_exit = ray.t_exit;
     for (uint n_left = trail_length; n_left > 0u; --n_left) {
         KdNode node = kd_node(cell.node_offset);

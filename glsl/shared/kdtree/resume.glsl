@@ -8,7 +8,8 @@ uint suspend_at(Cell cell, Visit visit, Nearest best) {
     vec2 weights = spilled_pair(WEIGHTS_SLOT);
     return suspend(SuspendedRay(
         cell.node_offset, cell.t_enter, cell.t_exit, visit.entry_ix, visit.end_ix,
-        best.t, best.triangle_ix, weights.x, weights.y, steps_so_far(), siblings_done
+        best.t, best.triangle_ix, weights.x, weights.y, steps_so_far(), siblings_done,
+        outer.top_node, outer.top_pending, outer.t, outer.triangle_ix
     ));
 }
 
@@ -20,7 +21,7 @@ void walk_to(TraversalRay ray, uint node_offset) {
     // whether this node is its parent's upper child, on the positive side of the split plane.
     uvec2 path = uvec2(0u);
     uint n_levels = 0u;
-    for (uint at = node_offset; at != 0u; at = offset_of(kd_parent_of(node_ix_of(at)))) {
+    for (uint at = node_offset; at != root_offset(); at = offset_of(kd_parent_of(node_ix_of(at)))) {
         uint bit = (node_ix_of(at) & 1u) << (n_levels % 32u);
         if (n_levels < 32u) path.x |= bit;
         else path.y |= bit;
@@ -55,6 +56,7 @@ void resume(TraversalRay ray, out Cell cell, out Visit visit, out Nearest best) 
     visit = Visit(state.entry_ix, state.end_ix, interval_of(cell.t_enter, min(cell.t_exit, best.t)));
     count_steps(state.n_steps);
     siblings_done = state.siblings_done;
+    resumes = false;
     // These methods find pending subtrees on the way back up, or by a rope, so nothing has to be rebuilt.
     if (TRAVERSAL == TRAVERSAL_MASK_BOXES) return;
     if (TRAVERSAL == TRAVERSAL_BACKTRACK) return;

@@ -37,11 +37,27 @@ vec3 agx(vec3 exposed) {
     return pow(max(curve * outset, vec3(0.0)), vec3(2.2));
 }
 
+// Khronos PBR Neutral (2024): base colours below 0.8 are shown as they are, less the 0.04 that a dielectric reflects.
+// Brighter ones are compressed by a hyperbola that joins without a kink, and fade towards white.
+vec3 neutral(vec3 exposed) {
+    const float first_compressed = 0.8 - 0.04;
+    const float room_above = 1.0 - first_compressed;
+    const float fading = 0.15;
+    float least = min(exposed.r, min(exposed.g, exposed.b));
+    exposed -= least < 0.08 ? least - 6.25 * least * least : 0.04;
+    float peak = max(exposed.r, max(exposed.g, exposed.b));
+    if (peak < first_compressed) return exposed;
+    float shown_peak = 1.0 - room_above * room_above / (peak + room_above - first_compressed);
+    float kept = 1.0 / (fading * (peak - shown_peak) + 1.0);
+    return mix(vec3(shown_peak), exposed * (shown_peak / peak), kept);
+}
+
 // Applies the exposure and a curve, one of TONEMAP_*. Returns linear display values, 0..1.
 vec3 tone_mapped(uint curve, vec3 radiance, float exposure) {
     vec3 exposed = clamp(radiance * exposure, vec3(0.0), vec3(BRIGHTEST));
     if (curve == TONEMAP_AGX) exposed = agx(exposed);
     if (curve == TONEMAP_ACES) exposed = aces(exposed);
+    if (curve == TONEMAP_NEUTRAL) exposed = neutral(exposed);
     return clamp(exposed, vec3(0.0), vec3(1.0));
 }
 

@@ -12,6 +12,7 @@
 #include "rays/camera.glsl"
 #include "search/triangle.glsl"
 #include "shading/alpha_test.glsl"
+#include "shading/back_faces.glsl"
 
 layout(std430, set = 0, binding = BIND_PIXEL_NEAREST) buffer PixelNearestBlock { uint64_t pixel_nearest[]; };
 
@@ -41,6 +42,7 @@ void test_pixel(uvec2 pixel, Triangle triangle, uint triangle_ix) {
     Hit hit;
     Shear shear = shear_of(camera_origin(pixel), camera_direction(pixel));
     if (!intersect_triangle(shear, triangle, triangle_ix, hit)) return;
+    if (CULLS_BACK_FACES && is_culled(shear, triangle, triangle_ix)) return;
     if (ALPHA_MASKS && fails_alpha_test(triangle_ix, hit.u, hit.v, false)) return;
     if (hit.t > 0.0) keep_nearest(pixel, hit.t, triangle_ix);
 }

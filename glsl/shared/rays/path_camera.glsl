@@ -19,6 +19,7 @@ vec2 on_circle(float turn) {
 // The offset of a sample from the centre of its pixel, pixels. Its pdf is the pixel's filter, so all samples have
 // the same weight (Ernst, Stamminger, Greiner: Filter Importance Sampling, 2006).
 vec2 filter_offset(vec2 u) {
+    if (frame.pixel_filter == FILTER_CENTRE) return vec2(0.0);
     if (frame.pixel_filter == FILTER_BOX) return u - 0.5;
     if (frame.pixel_filter == FILTER_TENT) return vec2(tent(u.x), tent(u.y));
     // The distance that a Gaussian of two dimensions gives, cut off at three standard deviations of 0.5 px.

@@ -1,15 +1,17 @@
 // The acceleration structure: finds the hit of a ray.
 //
-// Needs the macros TRAVERSAL and, for scenes with alpha-tested materials, WITH_ALPHA_TEST (build.rs); and the constants
-// `bool COUNT_COSTS` (steps.glsl) and `bool TESTS_BLENDED` (shading/alpha_test.glsl), which the kernel declares before
-// this file. Provides `traverse`, and `traverse_any_length` for directions of any length, which are all that a kernel
-// calls to find a hit. Kernels also use `is_suspended` and `runs_in_pass` of suspended_rays.glsl. cast.comp checks its
-// rays by `exponent_of`, `longest_bits` and `magnitude_bits`.
+// Needs the macros TRAVERSAL and, for rays that pass through parts of triangles or back faces, WITH_ALPHA_TEST, and in
+// worlds of instances WITH_INSTANCES (build.rs); and the constants `bool COUNT_COSTS` (steps.glsl), `bool
+// TESTS_BLENDED` (shading/alpha_test.glsl) and `bool FROM_CAMERA` (shading/back_faces.glsl), which the kernel declares
+// before this file. Provides `traverse`, and `traverse_any_length` for directions of any length, which are all that a
+// kernel calls to find a hit. Kernels also use `is_suspended` and `runs_in_pass` of suspended_rays.glsl. cast.comp
+// checks its rays by `exponent_of`, `longest_bits` and `magnitude_bits`.
 //
 //   traversal_ray.glsl   the ray, clipped to the structure's box
 //   kdtree/kdtree.glsl   the search through a kd-tree
 //   grid/grid.glsl       the search through a grid
 //   candidate.glsl       the test of a triangle that the search comes to, against the nearest hit so far
+//   instances/hierarchy.glsl   from instance to instance, in each of which one of these searches
 //   local_memory.glsl    values that are kept out of registers during the search
 #ifndef KDRAY_ACCEL
 #define KDRAY_ACCEL
@@ -35,24 +37,6 @@ uint search(TraversalRay ray, bool any_hit, inout Nearest best) {
     return search_kdtree(ray, any_hit, best);
 }
 
-// Returns the closest hit in (t_min, t_max], or with any_hit one that need not be the closest. The direction has
-// about unit length. A miss has t = t_max. If the ray was suspended, the hit's triangle_ix is its mark. During the
-// search, all t are half of the ray's own (traversal_ray.glsl).
-Hit traverse(PathRay ray_in, float t_min, bool any_hit) {
-    float t_start;
-    PathRay ray_near = near_scene(ray_in, t_min, t_start);
-    TraversalRay ray = traversal_ray(ray_near, t_min);
-    spill_pair(LENGTHS_SLOT, t_start, ray_in.t_max);
-    Nearest best = Nearest(0.5 * ray_near.t_max, NO_TRIANGLE);
-    uint mark = search(ray, any_hit, best);
-    if (CAN_SUSPEND && mark != 0u) return Hit(0.0, mark, 0.0, 0.0);
-    vec2 lengths = spilled_pair(LENGTHS_SLOT);
-    if (best.triangle_ix == NO_TRIANGLE) return Hit(lengths.y, NO_TRIANGLE, 0.0, 0.0);
-    vec2 weights = spilled_pair(WEIGHTS_SLOT);
-    // The sum could round to more than t_max.
-    return Hit(min(2.0 * best.t + lengths.x, lengths.y), best.triangle_ix, weights.x, weights.y);
-}
-
 // The bits of a magnitude, which have the order of the magnitudes. Integers are used since a device may flush
 // denormals and need not tell a NaN from a number.
 uint magnitude_bits(float x) {
@@ -67,6 +51,95 @@ uint longest_bits(vec3 v) {
 // and 255 if it is infinite or NaN.
 uint exponent_of(vec3 direction) {
     return longest_bits(direction) >> 23;
+}
+
+#include "instances/hierarchy.glsl"
+
+// Stores the state of a ray that is in no instance, and returns the mark for its result.
+uint suspend_between(Nearest best) {
+    vec2 weights = spilled_pair(WEIGHTS_SLOT);
+    return suspend(SuspendedRay(
+        NO_TRIANGLE, 0.0, 0.0, 0u, 0u, 0.0, NO_TRIANGLE, weights.x, weights.y, steps_so_far(), uvec2(0u),
+        outer.top_node, outer.top_pending, best.t, best.triangle_ix
+    ));
+}
+
+// Loads the stored state of the search through the instances. Returns whether the ray is in one of them, whose state is
+// loaded later.
+bool resume_outer(out TopCell at, out Nearest best) {
+    SuspendedRay state = suspended_rays[resumed_slot];
+    at = TopCell(state.top_node, state.top_pending);
+    best = Nearest(state.t_outer, state.outer_triangle);
+    bool is_inside = state.node_offset != NO_TRIANGLE;
+    if (!is_inside) {
+        spill_pair(WEIGHTS_SLOT, state.u, state.v);
+        count_steps(state.n_steps);
+        resumes = false;
+    }
+    return is_inside;
+}
+
+// Returns the closest hit in (t_min, t_max], or with any_hit one that need not be the closest. The direction has
+// about unit length. A miss has t = t_max. If the ray was suspended, the hit's triangle_ix is its mark. During the
+// search, all t are half of the ray's own (traversal_ray.glsl). Without INSTANCED, the loop has one turn; with it, one
+// for each instance that the ray comes to.
+Hit traverse(PathRay ray_in, float t_min, bool any_hit) {
+    Nearest best = Nearest(0.5 * ray_in.t_max, NO_TRIANGLE);
+    TopCell at = TopCell(0u, 0u);
+    bool is_inside = false;
+    if (INSTANCED) {
+        if (is_resumed()) is_inside = resume_outer(at, best);
+    }
+    uint mark = 0u;
+    bool goes_on = true;
+    while (goes_on) {
+        PathRay ray = ray_in;
+        float least_t = t_min;
+        float inv_scale = 1.0;
+        bool searches = true;
+        if (INSTANCED) {
+            count_iteration();
+            uint instance_ix = 0u;
+            if (is_inside) instance_ix = top_node_at(at.node_ix).link & ~TOP_LEAF;
+            else searches = find_instance(top_ray(ray_in, t_min), best.t, kind_of_rays(any_hit), at, instance_ix);
+            is_inside = false;
+            ray = in_geometry(instance_ix, ray_in, inv_scale);
+            ray.t_max = 2.0 * best.t * inv_scale;
+            least_t = t_min * inv_scale;
+            outer = OuterSearch(at.node_ix, at.pending, best.t, best.triangle_ix);
+        }
+        float t_start;
+        PathRay ray_near = near_scene(ray, least_t, t_start);
+        TraversalRay prepared = traversal_ray(ray_near, least_t);
+        spill_pair(LENGTHS_SLOT, t_start, ray_in.t_max);
+        Nearest found = Nearest(0.5 * ray_near.t_max, best.triangle_ix);
+        if (searches) mark = search(prepared, any_hit, found);
+        goes_on = false;
+        if (INSTANCED) {
+            if (found.triangle_ix != best.triangle_ix && mark == 0u) {
+                // The reciprocal of a power of two.
+                float scale = uintBitsToFloat(0x7f000000u - floatBitsToUint(inv_scale));
+                best = Nearest(min((found.t + 0.5 * t_start) * scale, best.t), found.triangle_ix);
+            }
+            if (searches && mark == 0u) leave_node(at);
+            goes_on = mark == 0u && at.node_ix != NO_TRIANGLE && !is_done(any_hit, best);
+            if (goes_on && !has_iterations()) {
+                outer = OuterSearch(at.node_ix, at.pending, best.t, best.triangle_ix);
+                mark = suspend_between(best);
+                goes_on = false;
+            }
+        } else {
+            best = found;
+        }
+        if (!goes_on) break;
+    }
+    if (CAN_SUSPEND && mark != 0u) return Hit(0.0, mark, 0.0, 0.0);
+    vec2 lengths = spilled_pair(LENGTHS_SLOT);
+    if (INSTANCED) lengths.x = 0.0;
+    if (best.triangle_ix == NO_TRIANGLE) return Hit(lengths.y, NO_TRIANGLE, 0.0, 0.0);
+    vec2 weights = spilled_pair(WEIGHTS_SLOT);
+    // The sum could round to more than t_max.
+    return Hit(min(2.0 * best.t + lengths.x, lengths.y), best.triangle_ix, weights.x, weights.y);
 }
 
 // Does what `traverse` does, for a ray whose direction has any length, such as a ray that was transformed to the

@@ -1,11 +1,12 @@
 // Candidates, which are the triangles that a search comes to, and their test against the nearest hit so far. A part
 // of accel.glsl.
 //
-// Needs scene.glsl, triangle.glsl, traversal_ray.glsl, local_memory.glsl and TESTS_BLENDED, whether the rays are shadow
-// rays, which test blended materials. Provides `Nearest`, `intersect`, `is_better`, `has_alpha_test`, `is_accepted`,
-// `is_done`.
+// Needs scene.glsl, triangle.glsl, traversal_ray.glsl, local_memory.glsl, TESTS_BLENDED, whether the rays are shadow
+// rays, which test blended materials, and FROM_CAMERA, whether they are camera rays, which pass through back faces.
+// Provides `Nearest`, `intersect`, `is_better`, `has_alpha_test`, `passes_back_faces`, `is_accepted`, `is_done`.
 
 #include "shading/alpha_test.glsl"
+#include "shading/back_faces.glsl"
 
 // Whether rays pass through triangles that are marked TRIANGLE_HIDDEN in `triangle_materials`.
 layout(constant_id = CONSTANT_SKIPS_HIDDEN) const bool SKIPS_HIDDEN = false;
@@ -35,20 +36,40 @@ bool has_alpha_test() {
 #endif
 }
 
-// Whether a hit counts. Without SKIPS_HIDDEN and alpha test every hit does, and nothing is read. u, v: barycentric
-// weights of the hit.
-bool is_accepted(uint triangle_ix, float u, float v) {
+// Whether the rays pass through back faces. The same modules have the code for it.
+bool passes_back_faces() {
+#ifdef WITH_ALPHA_TEST
+    if (FROM_CAMERA) return CULLS_BACK_FACES;
+#endif
+    return false;
+}
+
+// Whether a hit counts. Without SKIPS_HIDDEN, alpha test and culling every hit does, and nothing is read. u, v:
+// barycentric weights of the hit.
+bool is_accepted(Shear shear, Triangle triangle, uint triangle_ix, float u, float v) {
+    if (passes_back_faces() && is_culled(shear, triangle, triangle_ix)) return false;
     if (has_alpha_test()) return !fails_alpha_test(triangle_ix, u, v, TESTS_BLENDED);
     if (SKIPS_HIDDEN) return (load_triangle_materials(triangle_ix) & TRIANGLE_HIDDEN) == 0u;
     return true;
 }
 
-// Tests a triangle against the ray, and keeps the hit in `best` if it is nearer.
-void intersect(TraversalRay ray, Triangle triangle, uint triangle_ix, inout Nearest best) {
+// A hit of a stored triangle as one of the world.
+Hit in_world(Hit hit) {
+    if (INSTANCED) {
+        hit.triangle_ix -= placed.to_row;
+        if (is_mirrored()) return Hit(hit.t, hit.triangle_ix, hit.v, hit.u);
+    }
+    return hit;
+}
+
+// Tests a triangle against the ray, and keeps the hit in `best` if it is nearer. row: the triangle's in `triangles`.
+void intersect(TraversalRay ray, Triangle triangle, uint row, inout Nearest best) {
     Hit hit;
-    if (!intersect_triangle(ray.shear, triangle, triangle_ix, hit)) return;
-    if (is_better(ray, hit.t, triangle_ix, best) && is_accepted(triangle_ix, hit.u, hit.v)) {
-        best = Nearest(hit.t, triangle_ix);
+    if (!intersect_triangle(ray.shear, triangle, row, hit)) return;
+    hit = in_world(hit);
+    if (!is_better(ray, hit.t, hit.triangle_ix, best)) return;
+    if (is_accepted(ray.shear, triangle, hit.triangle_ix, hit.u, hit.v)) {
+        best = Nearest(hit.t, hit.triangle_ix);
         spill_pair(WEIGHTS_SLOT, hit.u, hit.v);
     }
 }

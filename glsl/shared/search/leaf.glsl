@@ -29,7 +29,7 @@ bool find_candidate(TraversalRay ray, inout Visit visit, out uint entry_ix) {
         count_iteration();
         entry_ix = visit.entry_ix;
         visit.entry_ix += 1u;
-        if (!is_clear(ray, visit.interval, load_leaf_planes(entry_ix), accel.plane_epsilon)) return true;
+        if (!is_clear(ray, visit.interval, load_leaf_planes(entry_ix), extent().plane_epsilon)) return true;
     }
     return false;
 }

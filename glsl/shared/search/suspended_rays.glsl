@@ -24,6 +24,10 @@ const bool CAN_SUSPEND = ITERATION_BUDGET != 0u;
 // (steps.glsl). siblings_done: the mask of TRAVERSAL_MASK_BOXES; the other traversals of the kd-tree rebuild their
 // pending subtrees or store none. grid/grid.glsl stores the packed indices of the ray's cell in node_offset, and those
 // of the cell of the upper level in siblings_done.x.
+//
+// In a world of instances, top_node and top_pending are the ray's place in the hierarchy, and t_outer and
+// outer_triangle the nearest hit in the instances before, with the t of the world; all others are about the geometry
+// that the ray is in. If it is in none, node_offset is NO_TRIANGLE.
 struct SuspendedRay {
     uint node_offset;
     float t_enter;
@@ -36,6 +40,10 @@ struct SuspendedRay {
     float v;
     uint n_steps;
     uvec2 siblings_done;
+    uint top_node;
+    uint top_pending;
+    float t_outer;
+    uint outer_triangle;
 };
 
 // The counts of suspended rays, one row. n_slots: slots that rays have requested, which can be more than there are.
@@ -53,6 +61,15 @@ layout(std430, set = 0, binding = BIND_SUSPENDED_RAYS) buffer SuspendedRaysBlock
     SuspendedCounts suspended_counts;
     SuspendedRay suspended_rays[];
 };
+
+// The search through the instances while a ray is in one of them (accel.glsl).
+struct OuterSearch {
+    uint top_node;
+    uint top_pending;
+    float t;
+    uint triangle_ix;
+};
+OuterSearch outer = OuterSearch(0u, 0u, 0.0, 0u);
 
 // Iterations that this invocation has taken.
 uint n_iterations = 0u;
@@ -72,8 +89,11 @@ bool has_iterations() {
 // Slot of the ray's stored state, or NO_SLOT if the ray starts from its beginning.
 uint resumed_slot = NO_SLOT;
 
+// Whether the ray has still to go on where it was suspended.
+bool resumes = false;
+
 bool is_resumed() {
-    return CAN_SUSPEND && resumed_slot != NO_SLOT;
+    return CAN_SUSPEND && resumes;
 }
 
 // Whether a result is the mark of a suspended ray.
@@ -87,7 +107,10 @@ bool runs_in_pass(uint resume_pass, uint mark) {
     if (ITERATION_BUDGET == 0u || resume_pass == PASS_BEGIN) return true;
     if (!is_suspended(mark)) return false;
     uint slot = mark & ~SUSPENDED;
-    if (resume_pass == PASS_RESUME) resumed_slot = slot;
+    if (resume_pass == PASS_RESUME) {
+        resumed_slot = slot;
+        resumes = slot != NO_SLOT;
+    }
     return (slot == NO_SLOT) == (resume_pass == PASS_RESTART);
 }
 

@@ -3,6 +3,30 @@
 //
 // Needs scene.glsl and triangle.glsl. Provides `TraversalRay`, `traversal_ray`, `is_in` and `near_scene`.
 
+// What is searched: all triangles, or with INSTANCED, a geometry. The first four members are those of `AccelConstants`,
+// the others those of `GeometryConstants`.
+struct Extent {
+    vec3 box_min;
+    float plane_epsilon;
+    vec3 box_max;
+    float origin_reach;
+    uint root_offset;
+    uint first_row;
+    uint n_triangles;
+};
+
+// The geometry that is searched, with INSTANCED.
+Extent entered;
+
+Extent extent() {
+    if (INSTANCED) return entered;
+    return Extent(accel.box_min, accel.plane_epsilon, accel.box_max, accel.origin_reach, 0u, 0u, accel.n_triangles);
+}
+
+uint root_offset() {
+    return extent().root_offset;
+}
+
 // A ray in the form that the traversal uses. It meets the plane at x on an axis at t = x * inv_direction + bias.
 //
 // All t of the traversal are half of the ray's own. So the middle of an interval, in the ray's own t, is the sum of
@@ -38,8 +62,8 @@ TraversalRay traversal_ray(PathRay ray, float t_min) {
     vec3 tiny = vec3(KD_LEAST_COMPONENT);
     r.inv_direction = 0.5 / mix(ray.direction, tiny, lessThan(abs(ray.direction), tiny));
     r.bias = -ray.origin * r.inv_direction;
-    precise vec3 t0 = fma(accel.box_min, r.inv_direction, r.bias);
-    precise vec3 t1 = fma(accel.box_max, r.inv_direction, r.bias);
+    precise vec3 t0 = fma(extent().box_min, r.inv_direction, r.bias);
+    precise vec3 t1 = fma(extent().box_max, r.inv_direction, r.bias);
     vec3 near = min(t0, t1);
     vec3 far = max(t0, t1);
     r.t_enter = max(max(near.x, near.y), max(near.z, 0.5 * t_min));
@@ -53,7 +77,7 @@ bool is_in(TraversalRay ray) {
 }
 
 float largest_coordinate() {
-    vec3 largest = max(abs(accel.box_min), abs(accel.box_max));
+    vec3 largest = max(abs(extent().box_min), abs(extent().box_max));
     return max(largest.x, max(largest.y, largest.z));
 }
 
@@ -89,14 +113,14 @@ float next_above(float x) {
 // such that the sum of t_start and any greater t is greater than the ray's own t_min, also after rounding.
 PathRay near_scene(PathRay ray, inout float t_min, out float t_start) {
     t_start = 0.0;
-    if (longest_component(ray.origin) <= accel.origin_reach) return ray;
+    if (longest_component(ray.origin) <= extent().origin_reach) return ray;
     if (longest_component(ray.origin) > KD_MAX_ORIGIN_DISTANCE * largest_coordinate()) {
         t_start = 2.0 * max(traversal_ray(ray, 0.0).t_enter, 0.0);
         precise vec3 origin = ray.origin + t_start * ray.direction;
         ray.origin = origin;
         ray.t_max -= t_start;
     }
-    if (longest_component(ray.origin) > accel.origin_reach) t_start += move_to_centre(ray, t_min - t_start);
+    if (longest_component(ray.origin) > extent().origin_reach) t_start += move_to_centre(ray, t_min - t_start);
     // A greater t is at least the next number above t_min - t_start. Without next_above, the sum could round to t_min.
     if (t_start != 0.0) t_min = next_above(t_min) - t_start;
     return ray;

@@ -1,7 +1,7 @@
 // The watertight test of a ray against one triangle.
 //
-// Needs nothing: it includes layout.glsl. Provides `Shear`, `shear_of`, `intersect_triangle` and `clamp_to_triangle`.
-// kdtree/lockstep.glsl also calls the steps of the test.
+// Needs nothing: it includes layout.glsl. Provides `Shear`, `shear_of`, `intersect_triangle`, `is_back_face` and
+// `clamp_to_triangle`. kdtree/lockstep.glsl also calls the steps of the test.
 #ifndef KDRAY_TRIANGLE
 #define KDRAY_TRIANGLE
 
@@ -146,6 +146,14 @@ bool intersect_triangle(Shear shear, Triangle triangle, uint triangle_ix, out Hi
     if (!is_inside(with_exact_signs(edges, errors))) return false;
     hit = weighted_hit(shear, exact_edges(edges, errors), vec3(a.z, b.z, c.z), triangle_ix);
     return true;
+}
+
+// Whether a ray that hits a triangle comes from behind it: from the side from which its corners turn clockwise. The
+// edge functions have exact signs, so the answer is right for needles, too.
+bool is_back_face(Shear shear, Triangle triangle) {
+    vec3 a, b, c;
+    vec3 edges = seen_edges(shear, triangle, a, b, c);
+    return (sum_of(with_exact_signs(edges, edge_errors(a, b, c))) < 0.0) == (shear.z > 0.0);
 }
 
 // Returns the point at which the ray meets the triangle's plane, moved to the triangle's edge if it is outside. A

@@ -28,10 +28,11 @@ vec3 lit_point(Surface s, Hit hit, vec3 to_light) {
     float span = PLANE_START_COSINE - CURVED_START_COSINE;
     float share = SMOOTH ? clamp((PLANE_START_COSINE - dot(s.geometric, to_light)) / span, 0.0, 1.0) : 0.0;
     if (!(share > 0.0)) return s.point_world;
+    place(hit.triangle_ix);
     vec3 weights = inner_weights(hit);
     vec3 curved = vec3(0.0);
     for (uint corner = 0u; corner < 3u; ++corner) {
-        vec4 row = load_triangles(3u * hit.triangle_ix + corner);
+        vec4 row = corner_at(hit.triangle_ix, corner);
         uint normal = floatBitsToUint(row.w);
         if (normal == FLAT_NORMAL) return s.point_world;
         curved += weights.x * above_corner(s.point_world, row.xyz, normal, s.interpolated);

@@ -151,15 +151,20 @@ float squared_tangent(float cosine) {
     return max(1.0 - cosine * cosine, 0.0) / (cosine * cosine);
 }
 
+// Whether a normal map has bent the shading normal. It has not where a normal is not a number.
+bool is_bent(Surface surface) {
+    return TEXTURED && any(greaterThan(abs(surface.shading - surface.interpolated), vec3(0.0)));
+}
+
 // The share of a light that reaches a bent normal, whose bumps shadow one another: 1 from the direction of the
 // interpolated normal, 0 at the horizon of the interpolated surface. The bumps are taken for microfacets of GGX, the
 // rougher the more the normal is bent (Estevez, Lecocq, Stein: A Microfacet-Based Shadowing Function to Solve the Bump
 // Terminator Problem, Ray Tracing Gems, 2019).
 float bump_shadowing(Surface surface, vec3 to_light) {
     float share = 1.0;
-    if (TEXTURED && surface.shading != surface.interpolated) {
+    if (is_bent(surface)) {
         float cos_bend = max(abs(dot(surface.interpolated, surface.shading)), LEAST_COSINE);
-        float cos_light = max(dot(surface.interpolated, to_light), LEAST_COSINE);
+        float cos_light = max(abs(dot(surface.interpolated, to_light)), LEAST_COSINE);
         float squared_width = min(0.125 * squared_tangent(cos_bend), 1.0);
         share = 2.0 / (1.0 + sqrt(1.0 + squared_width * squared_tangent(cos_light)));
     }
@@ -169,7 +174,7 @@ float bump_shadowing(Surface surface, vec3 to_light) {
 // The material at a hit. If it has a normal map, the surface's shading normal becomes that of the map. t: the triangle
 // that is hit.
 Material material_at(PathRay ray, Hit hit, Triangle t, inout Surface surface) {
-    uint material_ix = load_triangle_materials(hit.triangle_ix);
+    uint material_ix = material_ix_of(hit.triangle_ix);
     Material material = materials[material_ix];
     if (TEXTURED) {
         MaterialMaps maps = maps_of(material_ix);

@@ -5,11 +5,10 @@
 
 #include "layout.glsl"
 #include "scene.glsl"
+#include "shading/materials.glsl"
 #include "shading/surface.glsl"
 #include "shading/microfacet.glsl"
 #include "shading/fresnel.glsl"
-
-layout(std430, set = 0, binding = BIND_MATERIALS) readonly buffer MaterialsBlock { Material materials[]; };
 
 // The directions in which a ray continues from a surface, and the weights by which its throughput is multiplied. A
 // weight of zero means that there is no such ray.
@@ -18,6 +17,8 @@ struct Scattering {
     vec3 reflected_weight;
     vec3 transmitted;
     vec3 transmitted_weight;
+    // Whether what is transmitted goes straight on through a blended surface.
+    bool passes_straight;
 };
 
 // Whether the surface shows its colour without any light.
@@ -88,7 +89,7 @@ bool can_show(Material material, vec3 normal, vec3 to_viewer, vec3 to_light) {
 // How a ray of this direction continues from a surface of microfacets. What is transmitted is not spread, however rough
 // the surface is.
 Scattering scatter_by_microfacets(Material material, Surface surface, vec3 direction) {
-    Scattering s = Scattering(vec3(0.0), vec3(0.0), direction, vec3(0.0));
+    Scattering s = Scattering(vec3(0.0), vec3(0.0), direction, vec3(0.0), material.d < 1.0);
     float through = material.transmission * (1.0 - material.metallic);
     bool is_solid = (material.flags & MATERIAL_SOLID) != 0u && through > 0.0;
     float eta = surface.from_inside ? material.ni : 1.0 / material.ni;
@@ -105,6 +106,7 @@ Scattering scatter_by_microfacets(Material material, Surface surface, vec3 direc
     if (is_solid && !total) {
         vec3 refracted = eta * direction + (eta * cos_in - cos_out) * surface.shading;
         s.transmitted = keep_side(normalize(refracted), -surface.geometric);
+        s.passes_straight = false;
     }
     return s;
 }
@@ -118,13 +120,14 @@ vec3 transmittance(Material material, Surface surface, float t) {
 
 // How a ray of this direction continues from a surface.
 Scattering scatter(Material material, Surface surface, vec3 direction) {
-    if (is_unlit(material)) return Scattering(vec3(0.0), vec3(0.0), direction, vec3(1.0 - material.d));
+    if (is_unlit(material)) return Scattering(vec3(0.0), vec3(0.0), direction, vec3(1.0 - material.d), true);
     if (is_microfacet(material)) return scatter_by_microfacets(material, surface, direction);
-    Scattering s = Scattering(vec3(0.0), vec3(0.0), direction, vec3(0.0));
+    Scattering s = Scattering(vec3(0.0), vec3(0.0), direction, vec3(0.0), false);
     bool reflects = (material.flags & MATERIAL_REFLECT) != 0u;
     bool refracts = (material.flags & MATERIAL_REFRACT) != 0u;
     if (!reflects && !refracts) {
         s.transmitted_weight = vec3(1.0 - material.d);
+        s.passes_straight = true;
         return s;
     }
     float eta = surface.from_inside ? material.ni : 1.0 / material.ni;

@@ -16,6 +16,7 @@
 #include "shading/surface.glsl"
 #include "shading/material.glsl"
 #include "shading/maps.glsl"
+#include "shading/lit_point.glsl"
 #include "bsdf/bsdf.glsl"
 
 layout(std430, set = 0, binding = BIND_LIGHTS) readonly buffer LightsBlock { Light lights[]; };
@@ -40,11 +41,11 @@ float mis_weight(PathState state, float light_pdf) {
     return state.pdf > 0.0 ? power_heuristic(state.pdf, light_pdf) : 1.0;
 }
 
-// Light that is added to the path: bounded after the first hit, and nothing if it is not a number.
+// Light that is added to the path: bounded, after the first hit as the options say, and nothing if it is not finite.
 vec3 added_light(vec3 light, uint depth) {
     if (depth > 0u) light = min(light, vec3(frame.clamp));
-    bool is_finite = all(lessThan(light, vec3(1.0e30)));
-    return is_finite ? max(light, 0.0) : vec3(0.0);
+    bool is_finite = all(lessThan(light, vec3(INFINITY)));
+    return is_finite ? clamp(light, 0.0, MOST_ADDED_LIGHT) : vec3(0.0);
 }
 
 // The light of an environment that a ray meets. The camera and perfectly smooth surfaces do not see the ambient light.
@@ -59,10 +60,18 @@ vec3 met_environment(PathRay ray, PathState state, uint depth) {
     return mirrors ? met + studio_radiance(ray.direction) : met;
 }
 
+// The vector from a hit to the start of a ray in a direction to which lobes with a pdf scatter light. What a bent
+// normal reflects is above the interpolated surface, so its ray starts there.
+vec3 to_start(Surface surface, Hit hit, vec3 direction) {
+    bool is_mapped = is_bent(surface);
+    bool is_below = dot(direction, is_mapped ? surface.interpolated : surface.geometric) < 0.0;
+    vec3 offset = (is_below ? -surface.origin_offset : surface.origin_offset) * surface.geometric;
+    if (is_mapped && !is_below) offset += lit_point(surface, hit, direction) - surface.point_world;
+    return offset;
+}
+
 // The shadow ray to a light that is sampled at a hit.
-ShadowRay shadow_ray_to_light(
-    uint depth, vec3 u, Surface surface, BsdfTerms terms, uint triangle_ix, vec3 throughput
-) {
+ShadowRay shadow_ray_to_light(uint depth, vec3 u, Surface surface, BsdfTerms terms, Hit hit, vec3 throughput) {
     ShadowRay shadow_ray;
     shadow_ray.state = SHADOW_RAY_NONE;
     if (is_smooth(terms.material)) return shadow_ray;
@@ -73,10 +82,10 @@ ShadowRay shadow_ray_to_light(
     float weight = light_sample.pdf > 0.0 ? power_heuristic(light_sample.pdf, scattered.pdf) : 1.0;
     vec3 light = added_light(throughput * scattered.value * light_sample.light * weight, depth + 1u);
     if (!any(greaterThan(light, vec3(0.0)))) return shadow_ray;
-    float side = dot(light_sample.direction, surface.geometric) < 0.0 ? -surface.origin_offset : surface.origin_offset;
-    vec3 offset = side * surface.geometric;
+    vec3 offset = to_start(surface, hit, light_sample.direction);
     vec3 origin = surface.point_world + offset;
-    shadow_ray = ShadowRay(origin, SHADOW_RAY_WAITS, light_sample.direction, triangle_ix, light, light_sample.distance);
+    uint source = hit.triangle_ix;
+    shadow_ray = ShadowRay(origin, SHADOW_RAY_WAITS, light_sample.direction, source, light, light_sample.distance);
     if (isinf(light_sample.distance)) return shadow_ray;
     // From its start beside the surface, the shadow ray still goes to the point that was sampled.
     vec3 to_light = light_sample.distance * light_sample.direction - offset;
@@ -126,11 +135,12 @@ bool step_path(
     uint first_pair = PAIRS_OF_CAMERA + PAIRS_OF_HIT * depth;
     vec2 to_light = random_pair(key, first_pair), choices = random_pair(key, first_pair + 1u);
     vec2 to_next = random_pair(key, first_pair + 2u), lobe = random_pair(key, first_pair + 3u);
-    shadow_ray = shadow_ray_to_light(depth, vec3(to_light, choices.x), surface, terms, hit.triangle_ix, throughput);
+    shadow_ray = shadow_ray_to_light(depth, vec3(to_light, choices.x), surface, terms, hit, throughput);
     BsdfSample next = sample_bsdf(terms, surface, vec3(to_next, lobe.x));
     throughput *= next.weight;
     if (!any(greaterThan(throughput, vec3(0.0))) || !survives(depth, choices.y, throughput)) return false;
     ray = ray_from(surface, next.direction, hit.triangle_ix, ray, throughput);
+    if (is_bent(surface) && !next.is_delta) ray.origin = surface.point_world + to_start(surface, hit, next.direction);
     state.pdf = next.is_delta ? 0.0 : next.pdf;
     return true;
 }

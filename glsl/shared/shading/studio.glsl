@@ -1,5 +1,6 @@
 // The studio around a scene without light of its own whose metals or glass would mirror an even background: a bright
-// ceiling and three soft boxes. Camera rays do not see it. Twin of src/reference/studio.rs.
+// ceiling, three soft boxes, and a floor darker than the background, without which a polished box would show the
+// background on its sides and vanish before it. Camera rays do not see it. Twin of src/reference/studio.rs.
 //
 // Needs the uniform buffer `frame`.
 #ifndef KDRAY_STUDIO
@@ -10,6 +11,10 @@
 
 // Radiance of the ceiling in the zenith. Towards the horizon it falls to 0.
 const float STUDIO_CEILING = 0.5;
+// Share of the background's radiance that the floor lacks, and how far below the horizon it lacks all of that, as a
+// sine.
+const float STUDIO_FLOOR = 0.6;
+const float STUDIO_HORIZON = 0.1;
 // Width of a box's soft edge, as a tangent from the box's middle.
 const float STUDIO_EDGE = 0.08;
 
@@ -27,7 +32,8 @@ float studio_box(vec3 local, vec4 azimuth_elevation, vec2 half_size, float radia
     return radiance * share.x * share.y;
 }
 
-// The radiance that a ray which leaves the scene after its first hit sees beside that of the background.
+// The radiance that the studio adds to that of the background, for a ray that leaves the scene after its first hit.
+// The floor is darker than the background, so it adds a negative radiance.
 vec3 studio_radiance(vec3 direction) {
     if (frame.has_studio == 0u) return vec3(0.0);
     vec3 up = frame.up_axis == 2u ? vec3(0.0, 0.0, 1.0) : vec3(0.0, 1.0, 0.0);
@@ -38,7 +44,7 @@ vec3 studio_radiance(vec3 direction) {
     sum += studio_box(local, vec4(-0.7660444, 0.6427876, 0.6427876, 0.7660444), vec2(0.5, 0.4), 2.4);
     sum += studio_box(local, vec4(0.9659258, 0.2588190, 0.2588190, 0.9659258), vec2(0.25, 0.7), 1.2);
     sum += studio_box(local, vec4(0.3420201, -0.9396926, 0.6427876, 0.7660444), vec2(0.6, 0.2), 1.6);
-    return vec3(sum);
+    return vec3(sum) - STUDIO_FLOOR * clamp(-local.y / STUDIO_HORIZON, 0.0, 1.0) * frame.background;
 }
 
 #endif

@@ -3,6 +3,8 @@
 #define KDRAY_SURFACE
 
 #include "layout.glsl"
+#include "octahedral.glsl"
+#include "scene.glsl"
 
 // The surface of a triangle at a hit, as the ray meets it.
 struct Surface {
@@ -19,17 +21,6 @@ struct Surface {
     // Whether the ray meets the triangle's back. The ray then counts as inside a solid.
     bool from_inside;
 };
-
-// The unit vector of an octahedral 2 x snorm16 code (Cigolle et al.: Survey of Efficient Representations for
-// Independent Unit Vectors, JCGT 2014).
-vec3 decode_normal(uint code) {
-    vec2 p = unpackSnorm2x16(code);
-    vec3 n = vec3(p, 1.0 - abs(p.x) - abs(p.y));
-    float fold = max(-n.z, 0.0);
-    n.x += n.x >= 0.0 ? -fold : fold;
-    n.y += n.y >= 0.0 ? -fold : fold;
-    return normalize(n);
-}
 
 // The interpolated unit normal, or `geometric` if a corner has none or the corners' normals cancel out.
 vec3 shading_normal(Triangle t, Hit hit, vec3 geometric) {
@@ -64,6 +55,7 @@ Surface surface_at(PathRay ray, Hit hit, Triangle t) {
     s.interpolated = s.is_reversed ? -interpolated : interpolated;
     s.shading = s.interpolated;
     float largest = max(magnitude.x, max(magnitude.y, magnitude.z));
+    if (INSTANCED) largest = max(largest, placement_error(t, weights));
     s.origin_offset = ORIGIN_OFFSET * max(dot(magnitude, abs(s.geometric)), LEAST_ORIGIN_OFFSET_SHARE * largest);
     return s;
 }

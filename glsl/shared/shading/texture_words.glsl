@@ -48,7 +48,8 @@ uint map_flags_of(uint material_ix) {
 
 // Texture coordinates of a corner of a triangle, 0..2.
 vec2 corner_uv(uint triangle_ix, uint uv_set, uint corner) {
-    uint at = accel.uvs_begin + 6u * (uv_set * accel.n_triangles + triangle_ix) + 2u * corner;
+    uint entry = uv_set * accel.n_triangles + row_of(triangle_ix);
+    uint at = accel.uvs_begin + 6u * entry + 2u * stored_corner(corner);
     return vec2(load_float(at), load_float(at + 1u));
 }
 
@@ -60,8 +61,8 @@ vec2 uv_at(uint triangle_ix, uint uv_set, float u, float v) {
 }
 
 CornerSurface corner_surface(uint triangle_ix, uint corner) {
-    uint at = accel.corners_begin + 6u * triangle_ix + 2u * corner;
-    return CornerSurface(load_texture_words(at), load_texture_words(at + 1u));
+    uint at = accel.corners_begin + 6u * row_of(triangle_ix) + 2u * stored_corner(corner);
+    return CornerSurface(placed_tangent(load_texture_words(at)), load_texture_words(at + 1u));
 }
 
 // A colour of 8 bits a channel, with sRGB decoded.

@@ -18,10 +18,20 @@ pub struct TraversalLinks {
 
 impl TraversalLinks {
     /// Returns the arrays that the traversal reads in addition to the scene's structure. For a grid, all are empty.
+    /// With several trees, those of each tree follow those of the one before.
     pub fn of(accel: &Accel, traversal: Traversal) -> Self {
         match accel {
             Accel::KdTree(tree) => Self::new(tree, traversal),
             Accel::Grid(_) => Self::default(),
+            Accel::TwoLevel(two) => {
+                let mut all = Self::default();
+                for tree in two.trees() {
+                    let Self { boxes, ropes } = Self::new(tree, traversal);
+                    all.boxes.extend(boxes);
+                    all.ropes.extend(ropes);
+                }
+                all
+            }
         }
     }
 

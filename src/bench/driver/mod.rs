@@ -62,7 +62,7 @@ impl Structure {
     fn new(context: &Arc<Context>, stage: &Stage, variant: Search) -> Result<Self, GpuError> {
         let geometry = stage.geometry(variant);
         let mut buffers = AccelBuffers::new(context, geometry)?;
-        buffers.add_links(context, geometry.accel(), Traversal::Ropes)?;
+        buffers.add_links(context, geometry, Traversal::Ropes)?;
         Ok(Self { kind: variant.accel(), bindings: CastResources::bindings(context, &buffers)?, buffers })
     }
 

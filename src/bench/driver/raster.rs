@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::report::{PassSpread, RasterResult, SetResult};
 use crate::{
     bench::{Spread, stage::Stage},
-    frame::{Denoise, Primary, RenderOptions},
+    frame::{Denoise, PassTime, Primary, RenderOptions},
     gpu::{Context, GpuError},
     render::GpuRenderer,
 };
@@ -54,7 +54,9 @@ impl Raster {
         self.renderer.draw()?;
         for _ in 0..n_frames {
             let passes = self.renderer.draw()?.passes;
-            let tracing = passes.iter().filter(|pass| pass.pass().finds_hits());
+            // Blended surfaces add bounces, which are no matter of rasterization.
+            let is_of_camera = |pass: &&PassTime| pass.pass().finds_hits() && pass.bounce.unwrap_or_default() == 0;
+            let tracing = passes.iter().filter(is_of_camera);
             self.frames.extend(tracing.map(|pass| pass.ms.map(|ms| (pass.name, ms))).collect::<Option<Vec<_>>>());
         }
         Ok(())

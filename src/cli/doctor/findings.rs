@@ -6,7 +6,7 @@ use kdray::{
 };
 use serde::{Serialize, Serializer};
 
-use super::{check::Passed, examine::Examined, host::Host};
+use super::{causes::Cause, check::Passed, examine::Examined, facts::Facts, host::Host};
 
 /// All that was found, in the order of the report.
 #[derive(Serialize)]
@@ -15,6 +15,10 @@ pub struct Findings {
     pub host: Host,
     /// Whether there are a Vulkan loader, a driver and a device.
     pub vulkan: Verdict<()>,
+    /// What explains missing GPUs and slow CPUs. It does not count in the verdict of all.
+    pub causes: Vec<Cause>,
+    /// The facts from which the causes follow.
+    pub facts: Facts,
     /// The Vulkan devices in the loader's order, then the CPU.
     pub processors: Vec<ProcessorFindings>,
     /// None if the user named no scene.
@@ -71,6 +75,11 @@ impl Problem {
             what,
             "mend or copy the file that is named, or put the scene and all its files into one with `kdray pack`",
         )
+    }
+
+    /// Returns the problem that drivers end each process that loads them, for example doctor's own.
+    pub fn of_ended_drivers(how: &str) -> Self {
+        Self::new(format!("the drivers were not loaded: {how}"), "leave out the driver that is named below")
     }
 
     /// Returns the problem that Vulkan cannot be used at all.
@@ -130,7 +139,7 @@ impl<T: Serialize> Serialize for Verdict<T> {
 
 impl<T> Verdict<T> {
     /// Returns a line: the label, and either `ok` with what `found` says of the result, or the problem with the advice.
-    fn line(&self, label: &str, found: impl FnOnce(&T) -> String) -> String {
+    pub fn line(&self, label: &str, found: impl FnOnce(&T) -> String) -> String {
         match &self.0 {
             Ok(result) => format!("{label}: ok{}\n", found(result)),
             Err(Problem { what, advice }) => format!("{label}: wrong: {what}; {advice}\n"),
@@ -191,6 +200,7 @@ impl Findings {
     pub fn text(&self) -> String {
         let mut text = self.host.text();
         text += &self.vulkan.line("Vulkan", |()| String::new());
+        self.causes.iter().for_each(|cause| text += &cause.verdict.line(&cause.about, |()| String::new()));
         if let Some(scene) = &self.scene {
             text.push('\n');
             text += &scene.line("scene", SceneFindings::text);

@@ -2,6 +2,10 @@
 //!
 //! ```text
 //! host       the machine: operating system, threads, memory
+//! facts      signs of GPUs, manifests of drivers
+//! quota      the quota of CPU time
+//! probe      asks a driver for its devices in a process of its own
+//! causes     from the facts to why there is no GPU
 //! check      draws the sample picture on a processor and compares it with the CPU's
 //! examine    finds the memory that a picture of the user's scene takes on a processor, and draws a part of it
 //! findings   what was found, as text and as JSON
@@ -9,23 +13,29 @@
 //!
 //! A processor is a Vulkan device or the CPU.
 
+mod causes;
 mod check;
 mod examine;
+mod facts;
 mod findings;
 mod host;
+pub mod probe;
+mod quota;
 
 use std::path::Path;
 
 use kdray::{
     engine::{self, Engine, Loaded, Opened},
-    gpu::{self, ContextOptions, Device, DeviceInfo, DeviceSelector, GpuError},
+    gpu::{self, ContextOptions, Device, DeviceInfo, DeviceSelector},
     scene::pack_hash,
     util::progress::Work,
 };
 
 use self::{
+    causes::causes,
     check::Sample,
     examine::ScenePicture,
+    facts::Facts,
     findings::{Findings, Problem, ProcessorFindings, SceneFindings, Verdict},
     host::Host,
 };
@@ -33,8 +43,9 @@ use super::{args::DoctorArgs, error::CliError, load_args::LoadArgs, print, print
 
 /// Examines the machine and, if the user names one, a scene. Prints what was found even if that is an error.
 pub fn run(args: &DoctorArgs) -> Result<(), CliError> {
-    let progress = Progress::new(false, 3);
-    let devices = gpu::devices();
+    let progress = Progress::new(false, 4);
+    let (facts, _) = progress.stage("asking the Vulkan drivers", Facts::of_machine);
+    let devices = devices(&facts);
     let (mut processors, _) = progress.stage("checking the CPU and the Vulkan devices", || check_all(&devices));
     let (mut scene, mut error) = (None, None);
     if let Some(path) = &args.scene {
@@ -46,9 +57,12 @@ pub fn run(args: &DoctorArgs) -> Result<(), CliError> {
         })));
     }
     drop(progress);
+    let host = Host::of_machine();
     let findings = Findings {
-        host: Host::of_machine(),
-        vulkan: Verdict(devices.as_ref().map(|_| ()).map_err(Problem::of_vulkan)),
+        vulkan: Verdict(devices.map(|_| ())),
+        causes: causes(&facts, host.cpu_threads),
+        facts,
+        host,
         processors: processors.into_iter().map(|processor| processor.findings).collect(),
         scene,
     };
@@ -63,6 +77,14 @@ pub fn run(args: &DoctorArgs) -> Result<(), CliError> {
     }
 }
 
+/// Returns the Vulkan devices. Drivers that end the process which loads them are not loaded.
+fn devices(facts: &Facts) -> Result<Vec<DeviceInfo>, Problem> {
+    match facts.end_of_all() {
+        Some(how) => Err(Problem::of_ended_drivers(&how)),
+        None => gpu::devices().map_err(|error| Problem::of_vulkan(&error)),
+    }
+}
+
 /// A processor that was found.
 struct Processor {
     /// The engine that draws on the processor. `None` if the processor cannot be used.
@@ -71,7 +93,7 @@ struct Processor {
 }
 
 /// Checks the CPU and all devices with the sample picture. The CPU comes last.
-fn check_all(devices: &Result<Vec<DeviceInfo>, GpuError>) -> Vec<Processor> {
+fn check_all(devices: &Result<Vec<DeviceInfo>, Problem>) -> Vec<Processor> {
     let sample = Sample::on_cpu();
     let mut processors: Vec<_> = (devices.iter().flatten()).map(|device| check_device(&sample, device)).collect();
     processors.push(Processor {
@@ -130,7 +152,7 @@ fn examine_scene(
         name: scene.name.clone(),
         hash: scene.hash(),
         pack_hash,
-        triangles: scene.triangles.len(),
+        triangles: scene.n_triangles(),
         structure_bytes: world.statistics().bytes(),
         width: options.width,
         height: options.height,

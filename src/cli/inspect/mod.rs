@@ -192,13 +192,8 @@ impl From<&Light> for LightUse {
 }
 
 fn material_uses(scene: &FlatScene, details: Vec<MaterialDetails>) -> Vec<MaterialUse> {
-    let named = scene.material_names.iter().zip(details);
-    let mut uses: Vec<_> =
-        named.map(|(name, details)| MaterialUse { name: name.clone(), triangles: 0, details }).collect();
-    for &material_ix in &scene.triangle_materials {
-        uses[material_ix as usize].triangles += 1;
-    }
-    uses
+    let named = scene.material_names.iter().zip(details).zip(scene.triangles_of_materials());
+    named.map(|((name, details), triangles)| MaterialUse { name: name.clone(), triangles, details }).collect()
 }
 
 impl Inspection {

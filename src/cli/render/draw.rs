@@ -7,7 +7,7 @@ use std::{
 
 use kdray::{
     cpu,
-    engine::{Engine, NoiseGoal, NoisePicture, Renderer},
+    engine::{Engine, NoiseGoal, Renderer},
     frame::{Drawn, Goal, Picture, Profile, RangeSums, RenderOptions, SampleRange, SampleSums, Watcher},
     gpu::{DeviceInfo, GpuError},
     output::{Layers, Record, WholeRecord},
@@ -15,10 +15,11 @@ use kdray::{
     world::World,
 };
 
-use super::{files::Files, noise::NoiseReached};
+use super::{deadline::Deadline, files::Files, noise::NoiseReached};
 use crate::cli::{
     args::RenderArgs,
     error::CliError,
+    interrupt::{self, Unwritten},
     progress::{Progress, StepProgress},
 };
 
@@ -46,6 +47,8 @@ pub struct Common<'a> {
     pub n_drawn: u32,
     /// The samples that are drawn, if they are not all samples of the pictures.
     pub some_samples: Option<SampleRange>,
+    /// The time after which the picture ends with the samples so far.
+    pub deadline: Deadline,
     /// The record of the pictures. Its camera differs from picture to picture, and so does its device if each of
     /// several draws whole frames.
     pub record: Record,
@@ -72,6 +75,11 @@ struct DrawnView {
     /// The device that has drawn the picture. None if several have drawn it together, or the CPU.
     device: Option<DeviceInfo>,
     written: WrittenView,
+    /// Whether it has fewer samples than it should have.
+    is_cut: bool,
+    /// The limit of time that has ended it.
+    overdue: Option<Duration>,
+    unwritten: Unwritten,
 }
 
 /// What remains of a picture after it is written.
@@ -179,40 +187,65 @@ fn draw_view(
     watcher: &mut dyn Watcher,
 ) -> Result<DrawnView, GpuError> {
     let (camera, device) = (common.camera_of(view), renderer.device().cloned());
-    if let Some(range) = common.some_samples {
-        let (mut drawn, sums) = renderer.draw_range(&camera, range, Relay(watcher))?;
-        let written = WrittenView { profiles: vec![take(&mut drawn.profile)], n_samples: common.n_drawn, noise: None };
-        return Ok(DrawnView { picture: part(common, &sums.picture), drawn, sums, device, written });
-    }
-    if let Some(goal) = common.noise_goal {
-        let mut noisy = renderer.draw_until(&camera, goal, Relay(watcher))?;
-        let (profiles, noise) = (vec![take(&mut noisy.drawn.profile)], Some(NoiseReached::of(&noisy)));
-        // Pictures of other crops have the same number, whatever their tiles have needed.
-        let written = WrittenView { profiles, n_samples: common.n_drawn, noise };
-        let NoisePicture { picture, drawn, .. } = noisy;
-        return Ok(DrawnView { picture, drawn, sums: RangeSums::default(), device, written });
-    }
-    let (mut drawn, mut profiles) = (Drawn::default(), Vec::new());
-    for _ in 0..common.args.repeat {
-        drawn = renderer.draw(&camera, common.goal, Relay(watcher))?;
+    let mut relay = Relay::new(common, watcher);
+    let (mut drawn, mut sums, mut profiles, mut noise) = (Drawn::default(), RangeSums::default(), Vec::new(), None);
+    let mut n_samples = common.n_drawn;
+    let picture = if let Some(range) = common.some_samples {
+        (drawn, sums) = renderer.draw_range(&camera, range, &mut relay)?;
         profiles.push(take(&mut drawn.profile));
-    }
-    let written = WrittenView { profiles, n_samples: drawn.n_samples, noise: None };
-    Ok(DrawnView { picture: renderer.picture()?.into_owned(), drawn, sums: RangeSums::default(), device, written })
+        part(common, &sums.picture)
+    } else if let Some(goal) = common.noise_goal {
+        let mut noisy = renderer.draw_until(&camera, goal, &mut relay)?;
+        profiles.push(take(&mut noisy.drawn.profile));
+        noise = Some(NoiseReached::of(&noisy));
+        drawn = noisy.drawn;
+        // Pictures of other crops have the same number, whatever their tiles have needed.
+        n_samples = if relay.is_cut { drawn.n_samples } else { n_samples };
+        noisy.picture
+    } else {
+        for _ in 0..common.args.repeat {
+            drawn = renderer.draw(&camera, common.goal, &mut relay)?;
+            profiles.push(take(&mut drawn.profile));
+        }
+        n_samples = drawn.n_samples;
+        renderer.picture()?.into_owned()
+    };
+    // The watcher is asked after the last frame, too.
+    let is_whole = matches!(common.goal, Goal::Samples(goal) if common.noise_goal.is_none() && n_samples >= goal);
+    let Relay { is_cut, overdue, unwritten, .. } = relay;
+    let (is_cut, overdue) = (is_cut && !is_whole, overdue.filter(|_| !is_whole));
+    let written = WrittenView { profiles, n_samples, noise };
+    let unwritten = unwritten.unwrap_or_default();
+    Ok(DrawnView { picture, drawn, sums, device, written, is_cut, overdue, unwritten })
 }
 
 /// Writes the files of a view.
 fn write_view(common: &Common, view: &FrameJob, of_view: DrawnView) -> Result<WrittenView, CliError> {
-    let DrawnView { picture, drawn, sums, device, written } = of_view;
+    let DrawnView { picture, drawn, sums, device, written, is_cut, overdue, unwritten } = of_view;
+    if let Some(limit) = overdue {
+        if !common.args.may_end_early() {
+            return Err(CliError::TimeLimit { limit, present: "drawing" });
+        }
+        let limit = humantime::format_duration(limit);
+        tracing::warn!("the picture ends with the samples so far, since --time-limit {limit} is over");
+    }
     let mut record = record_of(common, &common.camera_of(view), written.n_samples);
+    if is_cut {
+        record.whole.noise = None;
+    }
     // Several devices that draw whole frames may be of several kinds.
     if let Some(DeviceInfo { name, driver, .. }) = device {
         (record.device, record.driver) = (name, driver);
     }
-    let (sums, light_sums) = sums.untold();
-    let light = drawn.light.0.each_ref().map(Vec::as_slice);
+    let (sums, mean_sums) = sums.untold();
+    let means = drawn.layers.0.each_ref().map(Vec::as_slice);
     let (aovs, pixel_aovs) = (&common.args.aov[..], &drawn.pixel_aovs[..]);
-    view.files.write(&picture, &Layers { aovs, pixel_aovs, light, sums, light_sums, record: Some(&record) })?;
+    view.files.write(&picture, &Layers { aovs, pixel_aovs, means, sums, mean_sums, record: Some(&record) })?;
+    drop(unwritten);
+    if common.args.path.is_some() {
+        // A film ends after this frame, without a report.
+        interrupt::end_if_asked();
+    }
     Ok(written)
 }
 
@@ -252,19 +285,46 @@ impl Watcher for Bar<'_, '_> {
     }
 }
 
-/// Passes on what it is told.
-struct Relay<'a>(&'a mut dyn Watcher);
+/// Passes on what it is told, and ends a picture early if the user or the time limit wants that.
+struct Relay<'a> {
+    watcher: &'a mut dyn Watcher,
+    deadline: Deadline,
+    may_end: bool,
+    /// Whether the picture has been ended early.
+    is_cut: bool,
+    /// The limit of time that has ended it.
+    overdue: Option<Duration>,
+    /// From the first samples on that are a picture.
+    unwritten: Option<Unwritten>,
+}
 
-impl Watcher for Relay<'_> {
+impl<'a> Relay<'a> {
+    fn new(common: &Common, watcher: &'a mut dyn Watcher) -> Self {
+        let may_end = common.args.may_end_early();
+        Self { watcher, deadline: common.deadline, may_end, is_cut: false, overdue: None, unwritten: None }
+    }
+}
+
+impl Watcher for &mut Relay<'_> {
     fn sees_parts(&self) -> bool {
-        self.0.sees_parts()
+        self.watcher.sees_parts()
     }
 
     fn part(&mut self, share: f32) {
-        self.0.part(share);
+        self.watcher.part(share);
     }
 
     fn sample(&mut self) {
-        self.0.sample();
+        self.watcher.sample();
+    }
+
+    fn ends(&mut self) -> bool {
+        self.overdue = self.overdue.or(self.deadline.passed());
+        if self.may_end {
+            self.unwritten.get_or_insert_default();
+            self.is_cut |= interrupt::is_asked();
+        }
+        self.is_cut |= self.overdue.is_some();
+        self.is_cut
     }
 }

@@ -8,7 +8,14 @@ use kdray::{
     scene::Scene,
 };
 
+use super::names::{named, pattern_of, picture_names};
 use crate::cli::{args::RenderArgs, error::CliError, file_roles::FileRoles};
+
+/// A scene, and the file of its picture or, with a path, the pattern of the pictures' files.
+pub struct Job {
+    pub scene: PathBuf,
+    pub output: PathBuf,
+}
 
 /// The files of one picture.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,12 +87,13 @@ impl Files {
 
 /// Returns the roles of the command's files, without the pictures of a path's frames, which are not known yet.
 /// Refuses outputs that the command also reads, or that it writes twice.
-pub fn roles(args: &RenderArgs) -> Result<FileRoles, CliError> {
+pub fn roles(args: &RenderArgs, jobs: &[Job]) -> Result<FileRoles, CliError> {
     let mut roles = FileRoles::default();
-    roles.read_scene("SCENE", &args.scene, args.load.options());
+    jobs.iter().for_each(|job| roles.read_scene("SCENE", &job.scene, args.load.options()));
+    args.list.iter().for_each(|list| roles.read("--list", list));
     match &args.path {
         Some(path) => roles.read("--path", path),
-        None => Files::of(output_of(args), &args.aov).note(&mut roles)?,
+        None => jobs.iter().try_for_each(|job| Files::of(job.output.clone(), &args.aov).note(&mut roles))?,
     }
     args.profile.iter().try_for_each(|path| roles.write("--profile", path))?;
     args.trace.iter().try_for_each(|path| roles.write("--trace", path))?;
@@ -93,20 +101,51 @@ pub fn roles(args: &RenderArgs) -> Result<FileRoles, CliError> {
 }
 
 /// Refuses outputs that cannot be written, as far as they are known before the scene is loaded.
-pub fn check_outputs(args: &RenderArgs) -> Result<(), CliError> {
-    if let Some(path) = &args.output {
-        Format::of(path)?;
-        output::check(path)?;
+pub fn check_outputs(args: &RenderArgs, job: &Job) -> Result<(), CliError> {
+    if args.output.is_some() {
+        Format::of(&job.output)?;
+        output::check(&job.output)?;
         if args.path.is_some() {
-            numbered(path, 0)?;
+            numbered(&job.output, 0)?;
         }
     }
     Ok([&args.profile, &args.trace].into_iter().flatten().try_for_each(|path| output::check(path))?)
 }
 
-/// Returns the picture's file or, with a path, the pattern of the pictures' files.
-pub fn output_of(args: &RenderArgs) -> PathBuf {
-    args.output.clone().unwrap_or_else(|| default_output(&Scene::name_of(&args.scene), args.path.is_some()))
+/// Returns the job of the command's only scene.
+pub fn only_job(args: &RenderArgs, scene: PathBuf) -> Job {
+    let name = Scene::name_of(&scene);
+    let in_folder = if args.path.is_some() { "{}.####.png" } else { "{}.png" };
+    let output = match &args.output {
+        None => default_output(&name, args.path.is_some()),
+        Some(output) => match pattern_of(output, in_folder) {
+            Some(pattern) if args.path.is_some() => named(&pattern, &output::stem_of(&name).replace('#', "-")),
+            Some(pattern) => named(&pattern, &output::stem_of(&name)),
+            None => output.clone(),
+        },
+    };
+    Job { scene, output }
+}
+
+/// Returns the jobs of several scenes, in the order of the scenes.
+///
+/// # Errors
+/// The output cannot name several pictures, or two scenes would have one picture.
+pub fn jobs_of_several(args: &RenderArgs, scenes: Vec<PathBuf>) -> Result<Vec<Job>, CliError> {
+    let pattern = match &args.output {
+        None => Path::new("{}.png").to_owned(),
+        Some(output) => pattern_of(output, "{}.png").ok_or_else(|| {
+            let output = output.display();
+            CliError::Usage(format!(
+                "--output `{output}` names one picture: several scenes need a folder, as in out/, or {{}} for the \
+                 scene's name, as in out/{{}}.exr"
+            ))
+        })?,
+    };
+    Format::of(&pattern)?;
+    let names = picture_names(&scenes)?;
+    let job = |(scene, name): (PathBuf, String)| Job { scene, output: named(&pattern, &name) };
+    Ok(scenes.into_iter().zip(names).map(job).collect())
 }
 
 /// Returns a .png file in the working directory, named after the scene.

@@ -7,7 +7,7 @@ use kdray::scene::{Camera, CameraPath};
 
 use super::{
     draw::FrameJob,
-    files::{Files, numbered, output_of},
+    files::{Files, numbered},
 };
 use crate::cli::{
     args::{FrameChoice, Frames, RenderArgs},
@@ -20,15 +20,15 @@ use crate::cli::{
 /// wants that. Refuses views whose files cannot be written or have another role.
 pub fn views(
     args: &RenderArgs,
+    output: &Path,
     path: Option<&NamedPath>,
     mut roles: FileRoles,
     progress: &Progress,
 ) -> Result<Vec<FrameJob>, CliError> {
-    let output = output_of(args);
     let mut views = match path {
-        None => vec![FrameJob { camera: None, frame: 0, files: Files::of(output, &args.aov) }],
+        None => vec![FrameJob { camera: None, frame: 0, files: Files::of(output.to_owned(), &args.aov) }],
         Some(path) => {
-            let views = views_along(path, args, &output)?;
+            let views = views_along(path, args, output)?;
             views.iter().try_for_each(|view| view.files.note(&mut roles))?;
             views
         }

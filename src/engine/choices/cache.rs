@@ -21,6 +21,7 @@ use crate::{
     gpu::DeviceInfo,
     layout::Triangle,
     passes::modules_of,
+    world::Instances,
 };
 
 /// Environment variable with the path of the cache folder. If its value is empty, nothing is kept.
@@ -57,6 +58,12 @@ impl Key {
             triangles: hash(bytemuck::cast_slice(triangles)),
             build: format!("{accel_options:?}"),
         }
+    }
+
+    /// Returns the key of a measurement in a world in which the triangles are those of geometries.
+    #[must_use]
+    pub fn of_instances(self, instances: &Instances) -> Self {
+        Self { triangles: self.triangles + &hash(bytemuck::cast_slice(&instances.list)), ..self }
     }
 
     /// Returns the key of a measurement of primary visibility, in pictures of a size and with a traversal.

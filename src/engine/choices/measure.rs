@@ -50,7 +50,7 @@ pub fn measure_traversals(
     let rays = some_rays(world, &frame);
     let mut buffers = AccelBuffers::new(context, world.geometry())?;
     if traversals.contains(&Traversal::Ropes) {
-        buffers.add_links(context, world.accel(), Traversal::Ropes)?;
+        buffers.add_links(context, world.geometry(), Traversal::Ropes)?;
     }
     let bindings = CastResources::bindings(context, &buffers)?;
     let resources = Rc::new(CastResources::new(context, &bindings, &buffers, rays.len())?);
@@ -75,7 +75,7 @@ fn some_rays(world: &World, frame: &Frame) -> Vec<Ray> {
     primary_rays(frame, 0, &mut from_camera);
     let mut hits = vec![Hit::zeroed(); from_camera.len()];
     trace(&KernelInputs::new(world, frame), Traversal::OF_CPU.into(), &from_camera, &mut hits);
-    let bounced = diffuse_rays(&world.scene().triangles, &from_camera, &hits);
+    let bounced = diffuse_rays(|ix| world.scene().triangle(ix as usize), &from_camera, &hits);
     from_camera.iter().chain(&bounced).map(cast_ray).collect()
 }
 

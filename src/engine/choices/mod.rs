@@ -52,7 +52,7 @@ use crate::{
     frame::{Integrator, Primary, RenderOptions},
     gpu::{Context, DeviceInfo, GpuError},
     scene::{Camera, Projection},
-    world::World,
+    world::{World, instances::Instancing},
 };
 
 /// What the user specifies; `None` and [`BuildPolicy::Auto`] leave a choice open.
@@ -66,6 +66,8 @@ pub struct Request {
     pub traversal: Option<Traversal>,
     /// How primary rays find their triangles.
     pub primary: Option<Primary>,
+    /// Whether meshes that occur several times are stored once.
+    pub instances: Instancing,
 }
 
 /// The kind of processor that traces rays.
@@ -191,7 +193,7 @@ impl Request {
         workload: &Workload,
         cache: &Cache,
     ) -> Result<Methods, GpuError> {
-        let n_triangles = world.scene().triangles.len();
+        let n_triangles = world.scene().n_triangles();
         let mut by_rule = self.methods_by_rule(context.map(|context| &**context), n_triangles, workload.size);
         if workload.traces_paths {
             by_rule.primary = Chosen { value: Primary::Trace, by: Reason::Rule };

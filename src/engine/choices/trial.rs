@@ -21,7 +21,7 @@ pub struct Trial<'a> {
 impl Trial<'_> {
     /// Replaces the rule's traversal by one that is measurably faster, if times are known or a measurement pays off.
     pub fn choose_traversal(&self, methods: &mut Methods) -> Result<(), GpuError> {
-        let n_triangles = self.world.scene().triangles.len();
+        let n_triangles = self.world.scene().n_triangles();
         let Some(candidates) = Candidates::of_traversals(n_triangles, self.workload.n_rays) else { return Ok(()) };
         let _choosing = tracing::info_span!("choose traversal").entered();
         let measure = |traversals: &[Traversal]| unless_lost(measure_traversals(self.context, self.world, traversals));
@@ -33,7 +33,7 @@ impl Trial<'_> {
     /// Replaces the rule's primary visibility by one that is measurably faster, if times are known or a measurement
     /// pays off.
     pub fn choose_primary(&self, methods: &mut Methods) -> Result<(), GpuError> {
-        let n_triangles = self.world.scene().triangles.len();
+        let n_triangles = self.world.scene().n_triangles();
         let Some(candidates) = Candidates::of_primaries(n_triangles, self.workload.n_rays) else { return Ok(()) };
         let _choosing = tracing::info_span!("choose primary rays").entered();
         let ((width, height), traversal) = (self.workload.size, methods.traversal.value);
@@ -46,7 +46,12 @@ impl Trial<'_> {
     }
 
     fn key(&self) -> Key {
-        Key::new(self.context.info(), &self.world.scene().triangles, self.world.accel_options())
+        let scene = self.world.scene();
+        let key = Key::new(self.context.info(), &scene.triangles, self.world.accel_options());
+        match &scene.instances {
+            Some(instances) => key.of_instances(instances),
+            None => key,
+        }
     }
 }
 

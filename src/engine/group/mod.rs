@@ -180,7 +180,7 @@ fn open_members<R: Send>(
 /// Whether devices can share the samples of a picture: each draws some samples of all pixels. The noise filter `edge`
 /// and layers need all samples of a pixel on one device.
 fn can_share_samples(options: &RenderOptions) -> bool {
-    let has_layers = options.pixel_aovs || options.has_light_layers();
+    let has_layers = options.pixel_aovs || !options.mean_layers().is_empty();
     options.integrator == Integrator::Path && !has_layers && options.noise_filter() != Denoise::Edge
 }
 

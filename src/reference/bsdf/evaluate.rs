@@ -14,7 +14,10 @@ use super::{
     terms::{BsdfTerms, NO_ALBEDO, dielectric_albedo, passes_straight, reflected_choice, split_at},
     transmission::{evaluate_refraction, refracting_normal, refraction_pdf, refracts_between},
 };
-use crate::reference::surface::Surface;
+use crate::reference::{
+    maps::{bump_shadowing, is_bent},
+    surface::Surface,
+};
 
 /// The scattered share of light times the cosine, and the pdf of its direction.
 #[derive(Clone, Copy, Debug)]
@@ -115,16 +118,20 @@ pub(super) fn eval_lobes(terms: &BsdfTerms, to_light: Vec3) -> BsdfEval {
     sum
 }
 
-/// Whether a direction is on the same side of the triangle and of the surface's frame. `local`: in this frame.
-pub(super) fn is_consistent(surface: &Surface, direction: Vec3, local: Vec3) -> bool {
-    surface.geometric.dot(direction) * local.z > 0.0
+/// The share of the light from a direction that the surface itself lets pass to its lobes: nothing if the direction is
+/// not on the same side of the surface and of its frame. `local`: the direction in the frame.
+pub(super) fn share_from(surface: &Surface, direction: Vec3, local: Vec3) -> f32 {
+    let up = if is_bent(surface) { surface.interpolated } else { surface.geometric };
+    if up.dot(direction) * local.z > 0.0 { bump_shadowing(surface, direction) } else { 0.0 }
 }
 
 /// Returns the sum of all lobes but the delta lobes, at a surface.
 pub fn eval_bsdf(terms: &BsdfTerms, surface: &Surface, to_light: Vec3) -> BsdfEval {
     let local = to_local(&terms.frame, to_light);
-    if terms.choice == Vec4::ZERO || !is_consistent(surface, to_light, local) {
+    let share = share_from(surface, to_light, local);
+    if terms.choice == Vec4::ZERO || !(share > 0.0) {
         return BsdfEval { value: Vec3::ZERO, pdf: 0.0 };
     }
-    eval_lobes(terms, local)
+    let found = eval_lobes(terms, local);
+    BsdfEval { value: found.value * share, ..found }
 }

@@ -4,8 +4,11 @@ use glam::Vec3;
 
 use super::conductor::conductor_reflectance;
 use crate::{
-    layout::{LEAST_ROUGH_WIDTH, MATERIAL_CONDUCTOR, MATERIAL_PHONG_WIDTH, MATERIAL_UNLIT, Material},
-    reference::microfacet::{metal_reflectance, normal_reflectance},
+    layout::{
+        LEAST_ROUGH_WIDTH, MATERIAL_CONDUCTOR, MATERIAL_FRESNEL, MATERIAL_PHONG_WIDTH, MATERIAL_REFLECT,
+        MATERIAL_REFRACT, MATERIAL_SPECULAR, MATERIAL_UNLIT, Material,
+    },
+    reference::microfacet::{is_microfacet, metal_reflectance, normal_reflectance},
 };
 
 /// Whether the material has an interface, which reflects light or lets it pass. Otherwise its base is Lambertian.
@@ -73,14 +76,36 @@ pub(super) fn with_metal(material: &Material, dielectric: impl FnOnce() -> Vec3,
     dielectric() * (1.0 - material.metallic) + metal() * material.metallic
 }
 
-/// About the share of light that the surface scatters, by colour: what it reflects along its normal, or lets pass. It
-/// is 1 if the surface is perfectly smooth, since that shows other surfaces.
-pub fn surface_albedo(material: &Material) -> Vec3 {
-    if is_smooth(material) {
-        return Vec3::ONE;
+/// The albedo of a material of MTL as the integrator whitted reads it: that of the microfacets which it is for paths.
+fn phong_albedo(material: &Material) -> Vec3 {
+    let has = |flag: u32| material.flags & flag != 0;
+    if has(MATERIAL_REFRACT) {
+        let ratio = (material.ni - 1.0) / (material.ni + 1.0);
+        return material.tf + ratio * ratio;
     }
-    let dielectric = || material.kd + normal_reflectance(material);
-    with_metal(material, dielectric, || metal_fresnel(material, 1.0)).clamp(Vec3::ZERO, Vec3::ONE)
+    if has(MATERIAL_REFLECT) && has(MATERIAL_FRESNEL) {
+        return material.kd + normal_reflectance(material);
+    }
+    if has(MATERIAL_REFLECT) || has(MATERIAL_SPECULAR) { material.kd + material.ks } else { material.kd }
+}
+
+/// About the share of light that the surface scatters, by colour: what it reflects along its normal, or lets pass. Of
+/// metals it is the reflectance, of glass the tint. It is the same for both integrators.
+pub fn hit_albedo(material: &Material) -> Vec3 {
+    let albedo = if material.flags & MATERIAL_UNLIT != 0 {
+        material.kd
+    } else if !is_microfacet(material) {
+        phong_albedo(material)
+    } else {
+        let base = material.kd * (1.0 - material.transmission * (1.0 - material.tf));
+        with_metal(material, || base + normal_reflectance(material), || metal_fresnel(material, 1.0))
+    };
+    albedo.clamp(Vec3::ZERO, Vec3::ONE)
+}
+
+/// Returns the albedo as `hit_albedo` does, but 1 for a perfectly smooth surface, which shows other surfaces.
+pub fn surface_albedo(material: &Material) -> Vec3 {
+    if is_smooth(material) { Vec3::ONE } else { hit_albedo(material) }
 }
 
 /// How narrow the surface scatters light, 0..1: the share of its albedo that is not Lambertian, less the wider its

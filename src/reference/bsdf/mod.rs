@@ -21,7 +21,7 @@ mod transmission;
 
 pub use self::{
     evaluate::eval_bsdf,
-    lobes::{is_smooth, surface_albedo, surface_gloss},
+    lobes::{hit_albedo, is_smooth, surface_albedo, surface_gloss},
     sample::sample_bsdf,
     terms::{BsdfTerms, bsdf_terms},
 };

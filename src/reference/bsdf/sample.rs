@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3, Vec3Swizzles, Vec4};
 
 use super::{
     clearcoat::clearcoat_fresnel,
-    evaluate::{eval_lobes, is_consistent},
+    evaluate::{eval_lobes, share_from},
     ggx::sample_ggx,
     lambert::sample_lambert,
     local_frame::to_world,
@@ -130,14 +130,15 @@ fn delta_sample(terms: &BsdfTerms, surface: &Surface, local: Vec3, (share, proba
 fn rough_sample(terms: &BsdfTerms, surface: &Surface, lobe: &LobeSample) -> BsdfSample {
     let direction = to_world(&terms.frame, lobe.local);
     let is_on_side = lobe.local.z * lobe.side > 0.0;
-    if !is_on_side || !is_consistent(surface, direction, lobe.local) {
+    let share = share_from(surface, direction, lobe.local);
+    if !is_on_side || !(share > 0.0) {
         return BSDF_ABSORBED;
     }
     let found = eval_lobes(terms, lobe.local);
     if !(found.pdf > 0.0) {
         return BSDF_ABSORBED;
     }
-    BsdfSample { direction, weight: found.value / found.pdf, pdf: found.pdf, is_delta: false }
+    BsdfSample { direction, weight: found.value * share / found.pdf, pdf: found.pdf, is_delta: false }
 }
 
 /// Returns a direction from which light is scattered to the viewer. `u`: random numbers in [0, 1). `u.z` selects the

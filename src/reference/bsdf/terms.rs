@@ -22,6 +22,7 @@ use crate::{
     },
     reference::{
         fresnel::{fresnel, refraction_cosine},
+        maps::is_bent,
         microfacet::{dielectric_reflectance, normal_reflectance},
         surface::Surface,
     },
@@ -207,12 +208,34 @@ fn clear_loss(terms: &BsdfTerms, albedo: GgxAlbedo) -> f32 {
     solid_loss(terms.to_viewer.z, terms.width.sqrt(), terms.eta)
 }
 
+/// The mapped normal, turned towards the interpolated one just as far that no mirror image of the viewer is below the
+/// surface.
+fn mirroring_normal(surface: &Surface, to_viewer: Vec3) -> Vec3 {
+    let (up, normal) = (surface.interpolated, surface.shading);
+    let up = (up + (LEAST_COSINE - up.dot(to_viewer)).max(0.0) * to_viewer).normalize();
+    let cosine = normal.dot(to_viewer);
+    if cosine > 0.0 && up.dot(2.0 * cosine * normal - to_viewer) >= 0.0 {
+        return normal;
+    }
+    let horizon = (normal - normal.dot(up) * up).normalize();
+    let seen = (to_viewer.dot(up) * up + to_viewer.dot(horizon) * horizon).normalize();
+    (seen + horizon).normalize()
+}
+
+/// The normal around which the lobes are.
+fn normal_of_lobes(material: &Material, surface: &Surface, to_viewer: Vec3) -> Vec3 {
+    if is_bent(surface) {
+        let is_lambertian = !has_interface(material) && !has_clearcoat(material) && !has_sheen(material);
+        return if is_lambertian { surface.shading } else { mirroring_normal(surface, to_viewer) };
+    }
+    if surface.shading.dot(to_viewer) < LEAST_COSINE { surface.geometric } else { surface.shading }
+}
+
 /// Returns the terms for a viewer. Bounds the colours of the material.
 pub fn bsdf_terms<'a>(material: &'a mut Material, surface: &Surface, to_viewer: Vec3) -> BsdfTerms<'a> {
     material.kd = material.kd.clamp(Vec3::ZERO, Vec3::ONE);
     material.sheen_colour = material.sheen_colour.clamp(Vec3::ZERO, Vec3::ONE);
-    let is_behind = surface.shading.dot(to_viewer) < LEAST_COSINE;
-    let frame = frame_around(if is_behind { surface.geometric } else { surface.shading });
+    let frame = frame_around(normal_of_lobes(material, surface, to_viewer));
     let mut to_viewer = to_local(&frame, to_viewer);
     to_viewer.z = to_viewer.z.max(LEAST_COSINE);
     let material = &*material;

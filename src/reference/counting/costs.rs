@@ -8,6 +8,7 @@ use super::table::ReadCounts;
 use crate::reference::{
     RAYS_PER_TASK,
     inputs::KernelInputs,
+    search_ray::SearchRay,
     shadow::shadow_ray_of,
     traverser::{Tracer, Traverser},
 };
@@ -25,18 +26,21 @@ pub fn count_rasterized(rays: &[PathRay], hits: &[Hit], pixel_aovs: &mut [PixelA
     }
 }
 
-/// Adds the cost of rays whose closest hits, or with `ANY_HIT` any hits, are found by a search.
+/// Adds the cost of rays, with their pixels, whose closest hits, or with `ANY_HIT` any hits, are found by a search.
 pub fn count_rays<const ANY_HIT: bool>(
     inputs: &KernelInputs,
     traversal: Traversal,
-    rays: &[PathRay],
+    rays: &[(u32, SearchRay)],
     pixel_aovs: &mut [PixelAovs],
 ) {
     let steps: Vec<_> = (rays.par_iter().with_min_len(RAYS_PER_TASK))
-        .map_init(|| Traverser::new(inputs, traversal), |traverser, ray| steps_of::<ANY_HIT>(inputs, traverser, ray))
+        .map_init(
+            || Traverser::new(inputs, traversal),
+            |traverser, (_, ray)| steps_of::<ANY_HIT>(inputs, traverser, ray),
+        )
         .collect();
-    for (ray, n_steps) in rays.iter().zip(steps) {
-        add(pixel_aovs, ray, n_steps);
+    for (&(pixel_ix, _), n_steps) in rays.iter().zip(steps) {
+        add(pixel_aovs, pixel_ix, n_steps);
     }
 }
 
@@ -56,31 +60,31 @@ pub fn count_shadow(
                 |traverser, (ray, hit)| {
                     let is_hit = hit.triangle_ix != NO_TRIANGLE;
                     let shadow_ray = is_hit.then(|| shadow_ray_of(inputs, ray, hit, light)).flatten()?;
-                    Some(steps_of::<true>(inputs, traverser, &shadow_ray))
+                    Some(steps_of::<true>(inputs, traverser, &(&shadow_ray).into()))
                 },
             )
             .collect();
         for (ray, n_steps) in rays.iter().zip(steps) {
             if let Some(n_steps) = n_steps {
-                add(pixel_aovs, ray, n_steps);
+                add(pixel_aovs, ray.pixel_ix, n_steps);
             }
         }
     }
 }
 
 /// Returns the number of nodes and triangles that a ray reads.
-fn steps_of<const ANY: bool>(inputs: &KernelInputs, traverser: &mut Traverser, ray: &PathRay) -> u32 {
+fn steps_of<const ANY: bool>(inputs: &KernelInputs, traverser: &mut Traverser, ray: &SearchRay) -> u32 {
     if matches!(traverser, Traverser::Brute) {
         return inputs.triangles.len() as u32;
     }
     let counts = ReadCounts::default();
-    traverser.traverse::<ANY>(&inputs.counted(&counts), &ray.into());
+    traverser.traverse::<ANY>(&inputs.counted(&counts), ray);
     (counts.n_nodes.get() + counts.n_triangles.get()) as u32
 }
 
 /// Adds a ray and its steps to its pixel.
-fn add(pixel_aovs: &mut [PixelAovs], ray: &PathRay, n_steps: u32) {
-    let aovs = &mut pixel_aovs[ray.pixel_ix as usize];
+fn add(pixel_aovs: &mut [PixelAovs], pixel_ix: u32, n_steps: u32) {
+    let aovs = &mut pixel_aovs[pixel_ix as usize];
     aovs.n_rays += 1;
     aovs.n_steps += n_steps;
 }

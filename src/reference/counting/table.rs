@@ -62,9 +62,25 @@ impl<'a, T, R> CountedSlice<'a, T, R> {
     pub fn with_counter<S>(self, reads: S) -> CountedSlice<'a, T, S> {
         CountedSlice { items: self.items, reads }
     }
+
+    /// Returns another slice with the same counter.
+    pub fn with_items(self, items: &'a [T]) -> Self {
+        Self { items, ..self }
+    }
+
+    /// Returns a part of the slice, or of an empty slice nothing.
+    pub fn part(self, range: Range<usize>) -> Self {
+        Self { items: self.items.get(range).unwrap_or_default(), ..self }
+    }
 }
 
 impl<'a, T, R: ReadCounter> CountedSlice<'a, T, R> {
+    /// Counts reads of what stands for elements elsewhere.
+    #[inline(always)]
+    pub fn count(&self, n: usize) {
+        self.reads.read(n);
+    }
+
     /// Returns the element if there is one. Only then is a read counted.
     #[inline(always)]
     pub fn get(&self, ix: usize) -> Option<&'a T> {

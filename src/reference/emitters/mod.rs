@@ -97,5 +97,5 @@ pub fn emission_pdf(inputs: &KernelInputs, triangle_ix: u32, point_world: Vec3, 
     if emitters.has_tree() {
         probability *= tree_probability(&emitters.light_nodes, point_world, alias_ix);
     }
-    probability * area_pdf(&inputs.triangles[triangle_ix as usize], direction, distance)
+    probability * area_pdf(&inputs.triangle(triangle_ix), direction, distance)
 }

@@ -14,7 +14,7 @@ use crate::{
 /// The radiance that a triangle emits at barycentric weights of its second and third corner, by the largest level of
 /// its texture. A surface without shading (`unlit`) emits nothing.
 pub fn emission_at(inputs: &KernelInputs, triangle_ix: u32, u: f32, v: f32) -> Vec3 {
-    let material_ix = inputs.triangle_materials[triangle_ix as usize] as usize;
+    let material_ix = inputs.material_ix_of(triangle_ix) as usize;
     let material = &inputs.materials[material_ix];
     if material.flags & MATERIAL_UNLIT != 0 {
         return Vec3::ZERO;
@@ -25,7 +25,7 @@ pub fn emission_at(inputs: &KernelInputs, triangle_ix: u32, u: f32, v: f32) -> V
         return material.ke;
     }
     let map = &textures.textures[texture_ix as usize];
-    let uv = textures.uv_at(triangle_ix, uv_set_of(map), u, v);
+    let uv = textures.uv_at(&inputs.stored(triangle_ix), uv_set_of(map), u, v);
     material.ke * sample_texture(&textures.texels, map, uv, 0.0).truncate().max(Vec3::ZERO)
 }
 
@@ -51,7 +51,7 @@ pub(super) fn sample_triangle(
     u: Vec2,
     probability: f32,
 ) -> LightSample {
-    let t = &inputs.triangles[triangle_ix as usize];
+    let t = &inputs.triangle(triangle_ix);
     let weights = triangle_weights(u);
     let point = t.v0 + weights.x * (t.v1 - t.v0) + weights.y * (t.v2 - t.v0);
     let way = towards(point_world, point);

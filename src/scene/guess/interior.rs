@@ -1,16 +1,17 @@
 //! Interiors: scenes whose outer walls are made to be seen from inside. Seen from outside, they would show the backs of
 //! their walls, or nothing but these. Rays from the middle tell them from bodies: a body's outermost surface turns its
 //! front outwards, that of a room without thickness turns it inwards, and walls with thickness have a front on the
-//! inside as well. A plain box whose sides face outwards counts, too, if there are things in it, which nobody would see
-//! from outside.
+//! inside as well. A plain box whose sides face outwards has walls, too, if there are things in it, which nobody would
+//! see from outside. What speaks for a room then tells rooms from hollow things ([`room`](super::room)).
 
-use std::f32::consts::PI;
+use std::{f32::consts::PI, path::Path};
 
 use glam::Vec3;
 
 use super::{
     few_rays::{Hit, Hits, Ray, hits, view_rays},
     framing::{self, Frame},
+    room::{LEAST_HITS_OF_THINGS, Walls},
 };
 use crate::scene::model::{Camera, Projection, Scene};
 
@@ -38,19 +39,20 @@ const VIEW_RAYS: (usize, usize) = (6, 4);
 /// Least share of a view's rays that meet the fronts of surfaces. Where there are fewer, the eye is in a body.
 const FREE: f32 = 0.5;
 
+/// Places of a side of the box, in half extents from its middle, through which rays tell whether it is open.
+const PLACES_OF_SIDE: [(f32, f32); 5] = [(0.0, 0.0), (0.5, 0.5), (0.5, -0.5), (-0.5, 0.5), (-0.5, -0.5)];
+
 /// A hit is on the bounding box if it lies beyond this share of the ray's way to it.
 const ON_BOX: f32 = 0.999;
 /// Ratio of the distances of a wall's two sides, where they stand for one face. Those with a material for each side
 /// have been moved apart.
 const THICKEST_SHELL: f32 = 1.0001;
-/// Least number of the rays that meet a thing in a closed box.
-const LEAST_HITS_OF_THINGS: usize = 3;
-
-/// Returns whether walls surround the middle of a scene.
-pub(crate) fn is_interior(scene: &Scene, (min, max): (Vec3, Vec3)) -> bool {
+/// Returns what speaks for an interior, if walls surround the middle of a scene and it is no hollow thing. `path` is
+/// the scene's file, `up` a unit vector.
+pub(crate) fn signs(scene: &Scene, (path, up): (&Path, Vec3), bounds @ (min, max): (Vec3, Vec3)) -> Option<String> {
     let (centre, half) = ((min + max) / 2.0, (max - min) / 2.0);
     if half.min_element() <= 0.0 {
-        return false;
+        return None;
     }
     let ray = |ix: usize| Ray { origin: centre, direction: on_sphere(ix) * half };
     // Few rays are enough to tell most bodies, of which some have millions of triangles.
@@ -58,12 +60,28 @@ pub(crate) fn is_interior(scene: &Scene, (min, max): (Vec3, Vec3)) -> bool {
     let hits_of_few = hits(scene, &few);
     let may_be_closed = hides_things(half, &few, &hits_of_few, 0);
     if n_walls(half, &few, &hits_of_few) < N_FIRST_RAYS / 2 && !may_be_closed {
-        return false;
+        return None;
     }
     let rays: Vec<Ray> = (0..N_RAYS).map(ray).collect();
-    let hits = hits(scene, &rays);
-    n_walls(half, &rays, &hits) as f32 >= ENCLOSED * N_RAYS as f32 && !is_empty_shell(&hits)
-        || may_be_closed && hides_things(half, &rays, &hits, LEAST_HITS_OF_THINGS)
+    let to_top = PLACES_OF_SIDE.map(|place| ray_to_side(centre, half, up, up.any_orthonormal_vector(), place));
+    let mut hits = hits(scene, &[&rays[..], &to_top].concat());
+    let is_open_above = is_open(&hits.split_off(N_RAYS));
+    let has_walls = n_walls(half, &rays, &hits) as f32 >= ENCLOSED * N_RAYS as f32 && !is_empty_shell(&hits)
+        || may_be_closed && hides_things(half, &rays, &hits, LEAST_HITS_OF_THINGS);
+    let is_thing = |(ray, hits): &(&Ray, &Hits)| hits.first.is_some_and(|hit| hit.t < WALLS_BEGIN * exit(ray, half));
+    let n_things = rays.iter().zip(&hits).filter(is_thing).count();
+    let walls = Walls { scene, path, bounds, up, hits: &hits, n_things, is_open_above };
+    if has_walls { walls.room() } else { None }
+}
+
+/// Returns whether a side is open: rays to it meet things at most, and no wall.
+fn is_open(hits: &[Hits]) -> bool {
+    hits.iter().all(|hits| hits.last.is_none_or(|hit| hit.t < WALLS_BEGIN))
+}
+
+/// Returns a ray from the middle of a box to a place of one of its sides, where t is 1.
+fn ray_to_side(centre: Vec3, half: Vec3, side: Vec3, up: Vec3, (x, y): (f32, f32)) -> Ray {
+    Ray { origin: centre, direction: half * (side + x * side.cross(up) + y * up) }
 }
 
 /// Returns the number of rays from the middle of a box with half extents that meet a wall.
@@ -117,18 +135,15 @@ pub(crate) fn camera(scene: &Scene, bounds: (Vec3, Vec3), [outside, inside]: [&F
     }
 }
 
-/// Returns the azimuth of the first open side, from the front to the right, in degrees. No ray from the middle to it
-/// hits anything.
+/// Returns the azimuth of the first open side, from the front to the right, in degrees.
 fn open_side(scene: &Scene, (min, max): (Vec3, Vec3), frame: &Frame) -> Option<u32> {
-    const PLACES: [(f32, f32); 5] = [(0.0, 0.0), (0.5, 0.5), (0.5, -0.5), (-0.5, 0.5), (-0.5, -0.5)];
-    let (origin, half) = ((min + max) / 2.0, (max - min) / 2.0);
+    let (centre, half) = ((min + max) / 2.0, (max - min) / 2.0);
     let [right, front, up] = [frame.axes.right, frame.axes.front, frame.axes.up].map(|axis| axis.as_vec3());
     let sides = [front, right, -front, -right];
-    let ray = |side: Vec3, (x, y): (f32, f32)| Ray { origin, direction: half * (side + x * side.cross(up) + y * up) };
-    let rays: Vec<Ray> = sides.iter().flat_map(|side| PLACES.map(|place| ray(*side, place))).collect();
+    let to_side = |side: &Vec3| PLACES_OF_SIDE.map(|place| ray_to_side(centre, half, *side, up, place));
+    let rays: Vec<Ray> = sides.iter().flat_map(to_side).collect();
     let hits = hits(scene, &rays);
-    let is_open = |hits: &[Hits]| hits.iter().all(|hits| hits.first.is_none());
-    let side_ix = hits.chunks(PLACES.len()).position(is_open)?;
+    let side_ix = hits.chunks(PLACES_OF_SIDE.len()).position(is_open)?;
     Some(90 * side_ix as u32)
 }
 

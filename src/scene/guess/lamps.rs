@@ -14,8 +14,11 @@ use crate::{
     scene::model::{Instance, Material, Scene, lighting::N_PLACES},
 };
 
-/// Least power of all lamps of a scene for its whole area, in units of white paper in full light.
+/// Least power of all lamps of a scene for its whole area, in units of white paper in full light. In an interior, the
+/// walls send the light on, and the exposure is measured: the lamp of a Cornell box has less than a hundredth of its
+/// surface.
 const LEAST_LAMPLIGHT: f64 = 0.1;
+const LEAST_LAMPLIGHT_INSIDE: f64 = 0.01;
 /// Numbers of places in the picture whose light is estimated, across and down.
 const N_SEEN: (usize, usize) = (12, 8);
 /// Number of points on lamps that stand for all of them.
@@ -44,10 +47,9 @@ struct Triangle {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lamplight {
     /// Mean radiance of white paper at the places that the camera sees, as if nothing cast shadows. It is 0 in
-    /// interiors, if the camera sees nothing but lamps, and if surfaces count as lamps only because the file states the
-    /// integrator `path`.
+    /// interiors, if the camera sees nothing but lamps, and if the integrator `path` is stated.
     pub mean: f32,
-    /// Whether surfaces count as lamps only because the file states the integrator `path`.
+    /// Whether surfaces count as lamps only because the integrator `path` is stated.
     pub is_stated: bool,
 }
 
@@ -60,8 +62,8 @@ impl Scene {
     /// light, and together they give off so much light that other surfaces get some of it. In an interior that is
     /// enough, since its walls send the light everywhere. Outside, the lamps must reach most of what the camera sees.
     ///
-    /// `stated`: the integrator that the file states. `Path` shows the light of all bright surfaces, and that is why it
-    /// is stated; `Whitted` shows none.
+    /// `stated`: the integrator that the file or the user states. `Path` shows the light of all bright surfaces, and
+    /// that is why it is stated; `Whitted` shows none.
     pub(crate) fn lamplight(&self, is_interior: bool, stated: Option<Integrator>) -> Option<Lamplight> {
         let is_bright = self.materials.iter().any(|material| material.ke.max_element() > 1.0);
         if !is_bright || stated == Some(Integrator::Whitted) {
@@ -70,12 +72,13 @@ impl Scene {
         let emission: Vec<f32> = self.materials.iter().map(|material| self.mean_emission(material)).collect();
         let (area, lamps) = self.lamps(&emission);
         let (power, _) = *lamps.last()?;
-        let by_rule = if power < LEAST_LAMPLIGHT * area {
-            None
-        } else if is_interior {
-            Some(0.0)
-        } else {
-            self.even_lamplight(&emission, &lamps)
+        let least = if is_interior { LEAST_LAMPLIGHT_INSIDE } else { LEAST_LAMPLIGHT };
+        let by_rule = match is_interior {
+            _ if power < least * area => None,
+            true => Some(0.0),
+            // Asked for paths, somebody wants to see the light of the lamps, and it alone.
+            false if stated.is_some() => self.even_lamplight(&emission, &lamps).map(|_| 0.0),
+            false => self.even_lamplight(&emission, &lamps),
         };
         match (by_rule, stated) {
             (Some(mean), _) => Some(Lamplight { mean, is_stated: false }),
@@ -145,7 +148,7 @@ impl Scene {
         Triangle { corners, area: cross.length() / 2.0, normal: cross.normalize_or_zero() }
     }
 
-    fn material_ix(&self, Instance { mesh_ix, materials, .. }: &Instance, face_ix: usize) -> usize {
+    pub(super) fn material_ix(&self, Instance { mesh_ix, materials, .. }: &Instance, face_ix: usize) -> usize {
         materials[self.meshes[*mesh_ix].slots[face_ix] as usize % materials.len()] as usize
     }
 

@@ -5,6 +5,7 @@ pub(crate) mod framing;
 pub(crate) mod interior;
 pub(crate) mod lamps;
 pub(crate) mod near;
+pub(crate) mod room;
 pub(crate) mod standard;
 #[cfg(feature = "files")]
 pub(crate) mod up_axis;

@@ -18,8 +18,9 @@ use crate::scene::{
 const FAR: usize = 32;
 /// Most of the area of all triangles that things far away may have together, as a share.
 const FAR_AREA: f64 = 0.01;
-/// Most of all triangles that may be far away, as a share.
-const FAR_TRIANGLES: f64 = 0.1;
+/// Most of all triangles that may be far away, as a share. A house of a dozen triangles counts more than a marker of
+/// three dozen; what has nearly all triangles is what a scene is about.
+const FAR_TRIANGLES: f64 = 0.8;
 
 /// Number of slices into which a box is cut along each axis.
 const N_SLICES: usize = 1024;

@@ -43,13 +43,17 @@ pub(crate) fn fill_in(path: &Path, scene: &mut Scene, lacks: Lacks, options: &Lo
     let needs_bounds = lacks.camera || lacks_light || needs_ground;
     let near = if needs_bounds { NearPart::of(scene, &scene.instances) } else { NearPart::default() };
     let bounds = near.bounds;
-    let is_interior = needs_bounds && interior::is_interior(scene, bounds);
+    let signs = if needs_bounds { interior::signs(scene, (path, up.vector()), bounds) } else { None };
+    let is_interior = signs.is_some();
     if lacks.camera {
         let aspect = options.aspect.unwrap_or(scene.defaults.width as f32 / scene.defaults.height as f32);
         let fov = |standard| look.vertical_fov_degrees.unwrap_or(standard);
         let frame = |standard| Frame { axes, aspect: f64::from(aspect), vertical_fov_degrees: fov(standard) };
         let (outside, inside) = (frame(framing::VERTICAL_FOV_DEGREES), frame(interior::VERTICAL_FOV_DEGREES));
         let of_interior = if is_interior { interior::camera(scene, bounds, [&outside, &inside]) } else { None };
+        if let (Some(signs), Some(_), None) = (&signs, of_interior, look.eye) {
+            tracing::info!("{}: is shown as a room: it has {signs}; --eye shows it from elsewhere", path.display());
+        }
         scene.camera = of_interior.unwrap_or_else(|| framing::camera(scene, &near, &outside));
         if look.eye.is_none() {
             near.warn_of_far(path, scene);
@@ -63,7 +67,7 @@ pub(crate) fn fill_in(path: &Path, scene: &mut Scene, lacks: Lacks, options: &Lo
             scene.add_ground(bounds, up)?;
         }
     }
-    let stated = (!lacks.integrator).then_some(scene.defaults.integrator);
+    let stated = options.integrator.or((!lacks.integrator).then_some(scene.defaults.integrator));
     let lamplight = if lacks_light { scene.lamplight(is_interior, stated) } else { None };
     // Surfaces that only glow light nothing else. `Whitted` shows them, sooner and without noise.
     let only_glows = lacks_light && lamplight.is_none();
@@ -92,14 +96,18 @@ fn set_lamplight(
     scene.chosen_light = Some(ChosenLight::Surfaces);
     if lamplight.is_stated && !has_users_light {
         tracing::info!(
-            "{}: the surfaces that shine are its only light, since it states `integrator = \"path\"`, though they \
-             light little of what is seen; `ambient = [0.3, 0.3, 0.3]` adds some",
+            "{}: the surfaces that shine are its only light, since the integrator `path` is stated, though they light \
+             little of what is seen; `ambient = [0.3, 0.3, 0.3]` in a scene file adds some",
             path.display()
         );
     }
     scene.defaults.is_metered |= lacks.exposure && (lacks.description || lamplight.is_stated);
-    // With the user's light, the exposure is not measured.
-    if lacks.description && !has_users_light && lamplight.mean > 0.0 {
+    // With the user's light, the exposure is not measured. A file with a camera shows what its maker saw.
+    if lacks.description && lacks.camera && !has_users_light && lamplight.mean > 0.0 {
+        tracing::info!(
+            "{}: its lamps light it, with half of the standard ambient light; `--integrator path` leaves that out",
+            path.display()
+        );
         let scale = BESIDE_LAMPS * lamplight.mean;
         let [sky, ground] = AMBIENT.map(|ambient| ambient * scale);
         (scene.ambient, scene.ground) = (sky, Some(Ground { ambient: ground, up }));

@@ -53,7 +53,7 @@ impl Scene {
         let mesh = DISC.build(&TriangleBudget::default())?;
         let mesh = Mesh { uvs: Default::default(), ..mesh };
         let transform = Ground::below(bounds, up).transform()?;
-        mesh.placed(&transform)?;
+        mesh.check_place(&transform, mesh.bounds())?;
         let albedo = Vec3::splat(Sky::GROUND_ALBEDO);
         let material = Material { name: GROUND.to_owned(), ka: albedo, kd: albedo, ..Material::default() };
         let material = self.push_material(material);

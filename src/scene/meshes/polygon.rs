@@ -11,7 +11,7 @@ const TURNED_TOLERANCE: f64 = 1e-6;
 /// Share of a polygon's area by which that of its ears may differ from it, if there are fewer than the polygon has.
 const CLIPPED_TOLERANCE: f64 = 0.01;
 /// Largest number of corners of a polygon that is cut by ear clipping, whose time can grow with the square of the
-/// number. Larger polygons become fans.
+/// number. Larger polygons become fans, which is told once.
 const MAX_CLIPPED_CORNERS: usize = 1 << 14;
 
 /// Divides polygons into triangles. It keeps its memory from one polygon to the next.
@@ -20,6 +20,7 @@ pub(crate) struct Triangulator {
     clipper: Earcut<f64>,
     flat: Vec<[f64; 2]>,
     clipped: Vec<u32>,
+    has_told: bool,
 }
 
 impl Triangulator {
@@ -39,7 +40,7 @@ impl Triangulator {
     /// Clips the ears of a polygon that is no fan. Returns false for a fan, for a polygon without a plane, and for one
     /// that crosses itself, so that the ears do not cover it.
     fn clips(&mut self, corners: &[Vec3]) -> bool {
-        if !(4..=MAX_CLIPPED_CORNERS).contains(&corners.len()) {
+        if corners.len() < 4 {
             return false;
         }
         let normal = newell_normal(corners);
@@ -47,6 +48,16 @@ impl Triangulator {
         let first = corners[0].as_dvec3();
         let doubled = |pair: &[Vec3; 2]| (pair[0].as_dvec3() - first).cross(pair[1].as_dvec3() - first).dot(normal);
         if corners[1..].array_windows().all(|pair| doubled(pair) >= turned) || normal.try_normalize().is_none() {
+            return false;
+        }
+        if corners.len() > MAX_CLIPPED_CORNERS {
+            if !std::mem::replace(&mut self.has_told, true) {
+                tracing::warn!(
+                    "a concave polygon of {} corners is filled as if it were convex: those of more than \
+                     {MAX_CLIPPED_CORNERS} are not cut",
+                    corners.len()
+                );
+            }
             return false;
         }
         let (x, y) = normal.normalize().any_orthonormal_pair();

@@ -89,6 +89,18 @@ pub enum Light {
 }
 
 impl Light {
+    /// Returns where the light is, unless it is infinitely far away.
+    pub(crate) fn position(&self) -> Option<Vec3> {
+        match *self {
+            Self::Point { position, .. }
+            | Self::Spot { position, .. }
+            | Self::Rectangle { position, .. }
+            | Self::Disk { position, .. }
+            | Self::Sphere { position, .. } => Some(position),
+            Self::Directional { .. } | Self::Sun { .. } => None,
+        }
+    }
+
     /// Returns whether the light's power is zero: it is black, or has no area.
     pub fn is_black(&self) -> bool {
         match self {

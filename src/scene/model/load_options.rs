@@ -1,7 +1,7 @@
 //! Options of loading a scene.
 
 use super::Look;
-use crate::util::progress::Progress;
+use crate::{frame::Integrator, util::progress::Progress};
 
 /// Options of loading a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -16,6 +16,9 @@ pub struct LoadOptions {
     /// Width of the picture divided by its height, which a camera is made for where the file has none. Where absent, it
     /// is that of [`Scene::defaults`](super::Scene::defaults).
     pub aspect: Option<f32>,
+    /// The integrator that the user asks for. It decides as one of a scene file whether surfaces that shine count as
+    /// lamps.
+    pub integrator: Option<Integrator>,
     /// Whether a scene is moved to the origin if its coordinates are so large that single precision loses details.
     /// [`Scene::origin`](super::Scene::origin) says by how much. Cameras and lights of the file and of `look` are moved
     /// with it.

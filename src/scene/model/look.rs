@@ -45,6 +45,8 @@ pub struct Look {
     pub sky: Option<SkyChoice>,
     /// Radiance of rays that leave the scene, linear RGB, at least 0.
     pub background: Option<Vec3>,
+    /// Whether camera rays meet the back faces of single-sided materials, too.
+    pub shows_back_faces: bool,
     /// Materials in place of the scene's own. Of several for a material the last one counts.
     pub materials: Vec<MaterialChoice>,
 }

@@ -47,8 +47,8 @@ pub struct Material {
     pub alpha: Alpha,
     /// Whether the surface shows `kd` as it is, without any light.
     pub is_unlit: bool,
-    /// Whether the file declares the material for both sides of a surface. It is only reported: both sides of every
-    /// surface are always shown.
+    /// Whether the camera sees both sides of the surface. If not, camera rays pass through its back faces: those whose
+    /// corners turn clockwise as the camera sees them. All other rays meet both sides.
     pub is_double_sided: bool,
     /// A clear layer above the surface. The path tracer alone shows it, with microfacets.
     pub clearcoat: Clearcoat,

@@ -1,6 +1,6 @@
 //! Indexed meshes in object space.
 
-use glam::{Vec2, Vec3, Vec4};
+use glam::{BVec3, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::{Transform, error::Checked};
@@ -122,6 +122,24 @@ impl Mesh {
         self.positions.iter().zip(is_corner).filter(|(_, is_corner)| *is_corner).map(|(p, _)| *p).collect()
     }
 
+    /// Returns the least and the greatest coordinates of all positions, object space.
+    pub(crate) fn bounds(&self) -> (Vec3, Vec3) {
+        bounds_of(self.positions.par_iter().copied())
+    }
+
+    /// Checks that the mesh can be placed by a transform, by its bounds alone if these lie within [`MAX_COORDINATE`].
+    ///
+    /// # Errors
+    /// Fails as [`Mesh::placed`] does.
+    pub(crate) fn check_place(&self, transform: &Transform, (min, max): (Vec3, Vec3)) -> Checked<()> {
+        // Rounding may move a position by less than the difference.
+        let is_inside = |p: Vec3| p.is_finite() && p.abs().max_element() <= 0.999 * MAX_COORDINATE;
+        if self.positions.is_empty() || box_corners(min, max).into_iter().all(|p| is_inside(transform.point(p))) {
+            return Ok(());
+        }
+        self.placed(transform).map(drop)
+    }
+
     /// Returns the positions in world space.
     ///
     /// # Errors
@@ -150,6 +168,11 @@ fn append_corners<T: Copy>(corners: &mut Vec<T>, others: Vec<T>, n_faces: (usize
     corners.resize(n_faces.0, missing);
     corners.extend(others);
     corners.resize(n_faces.0 + n_faces.1, missing);
+}
+
+/// Returns the corners of a box.
+pub(crate) fn box_corners(min: Vec3, max: Vec3) -> [Vec3; 8] {
+    [0, 1, 2, 3, 4, 5, 6, 7].map(|ix| Vec3::select(BVec3::new(ix & 1 > 0, ix & 2 > 0, ix & 4 > 0), min, max))
 }
 
 /// Returns the least and the greatest coordinates of points.

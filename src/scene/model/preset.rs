@@ -136,7 +136,8 @@ pub(crate) fn replace(scene: &mut Scene, choices: &[MaterialChoice]) -> Checked<
     let mut replaced = vec![false; scene.materials.len()];
     for (material, is_replaced) in scene.materials.iter_mut().zip(&mut replaced) {
         if let Some(choice) = choices.iter().rev().find(|choice| choice.concerns(&material.name)) {
-            *material = choice.preset.material(&material.name);
+            let is_double_sided = material.is_double_sided;
+            *material = Material { is_double_sided, ..choice.preset.material(&material.name) };
             *is_replaced = true;
         }
     }

@@ -97,6 +97,17 @@ impl Scene {
         self.instances.iter().filter_map(mesh_of).map(|mesh| mesh.faces.len()).sum()
     }
 
+    /// Returns the number of triangles of the meshes that have an instance: each counts once, however often it occurs.
+    pub fn n_stored(&self) -> usize {
+        let mut occurs = vec![false; self.meshes.len()];
+        for instance in &self.instances {
+            if let Some(occurs) = occurs.get_mut(instance.mesh_ix) {
+                *occurs = true;
+            }
+        }
+        self.meshes.iter().zip(&occurs).filter(|(_, occurs)| **occurs).map(|(mesh, _)| mesh.faces.len()).sum()
+    }
+
     /// Returns the smallest and the largest coordinates of all triangles, world space.
     ///
     /// # Panics
@@ -123,7 +134,7 @@ impl Scene {
     /// # Errors
     /// The mesh reaches beyond `mesh::MAX_COORDINATE` in world space. The error is a message for people.
     pub(crate) fn push_mesh(&mut self, mesh: Mesh, transform: Transform, materials: Vec<u32>) -> Result<(), String> {
-        mesh.placed(&transform)?;
+        mesh.check_place(&transform, mesh.bounds())?;
         self.instances.push(Instance { mesh_ix: self.meshes.len(), transform, materials });
         self.meshes.push(mesh);
         Ok(())
@@ -163,19 +174,27 @@ impl Scene {
         (self.materials.len() - 1) as u32
     }
 
+    /// Lets the camera see both sides of all surfaces.
+    pub(crate) fn show_back_faces(&mut self) {
+        self.materials.iter_mut().for_each(|material| material.is_double_sided = true);
+    }
+
     /// Returns the index of the default material, for meshes and faces that name none. Adds it at the first call.
-    pub(crate) fn default_material(&mut self) -> u32 {
-        if let Some(ix) = self.materials.iter().position(|material| material.name == DEFAULT_MATERIAL) {
-            return ix as u32;
+    /// Colours of a mesh are its albedo, so the default material of such a mesh is white.
+    pub(crate) fn default_material(&mut self, has_colours: bool) -> u32 {
+        let mut default = Material { name: DEFAULT_MATERIAL.to_owned(), ..Material::default() };
+        if has_colours {
+            (default.ka, default.kd) = (Vec3::ONE, Vec3::ONE);
         }
-        self.push_material(Material { name: DEFAULT_MATERIAL.to_owned(), ..Material::default() })
+        let ix = self.materials.iter().position(|material| *material == default);
+        ix.map_or_else(|| self.push_material(default), |ix| ix as u32)
     }
 
     /// Adds the materials of a mesh that came with them. Returns their indices for the slots of the mesh; the last one
     /// is the default material, for faces without one.
-    pub(crate) fn push_materials(&mut self, materials: Vec<Material>) -> Vec<u32> {
+    pub(crate) fn push_materials(&mut self, materials: Vec<Material>, mesh: &Mesh) -> Vec<u32> {
         let mut slots: Vec<u32> = materials.into_iter().map(|material| self.push_material(material)).collect();
-        slots.push(self.default_material());
+        slots.push(self.default_material(!mesh.colours.is_empty()));
         slots
     }
 }

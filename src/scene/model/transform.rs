@@ -131,6 +131,16 @@ impl Transform {
         (self.linear.transpose() * direction, direction.dot(self.translation - above))
     }
 
+    /// Returns the linear map from object space to world space.
+    pub(crate) fn linear(&self) -> DMat3 {
+        self.linear
+    }
+
+    /// Returns where the origin of object space is in world space.
+    pub(crate) fn translation(&self) -> DVec3 {
+        self.translation
+    }
+
     /// Returns a surface normal of object space in world space: unit length, or zero if `n` is zero.
     pub fn normal(&self, n: Vec3) -> Vec3 {
         (self.normals * n.as_dvec3()).normalize_or_zero().as_vec3()

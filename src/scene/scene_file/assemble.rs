@@ -45,7 +45,7 @@ use crate::{
             transform::finite,
         },
     },
-    util::memory,
+    util::{memory, text::escape_controls},
 };
 
 /// Memory of a pixel of an environment while its tables are made, bytes: the colour as it is read (12), luminance and
@@ -157,6 +157,16 @@ fn assemble(file: &File, description: Description, options: &LoadOptions) -> Res
     scene.images = images.finish();
     if let Some(spec) = &description.replace {
         file.check("replace", spec, |_| preset::replace(&mut scene, &replace))?;
+    }
+    if let Some(spec) = &description.cull {
+        let shows_back_faces = file.check("cull", spec, |word| match &**word {
+            "auto" => Ok(false),
+            "off" => Ok(true),
+            _ => Err(format!("`{}` is not one of auto, off", escape_controls(word))),
+        })?;
+        if shows_back_faces {
+            scene.show_back_faces();
+        }
     }
     if scene.n_triangles() == 0 {
         return Err(SceneError::file(file.path, "has no triangles"));

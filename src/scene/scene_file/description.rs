@@ -33,6 +33,8 @@ pub(crate) struct Description {
     pub environment: Option<Spanned<EnvironmentSpec>>,
     /// The sky and its sun, for `path`, in place of `environment`.
     pub sky: Option<Spanned<SkySpec>>,
+    /// Whether camera rays pass through back faces of single-sided materials, as `--cull` takes it: `auto` or `off`.
+    pub cull: Option<Spanned<String>>,
     /// Presets in place of materials, as `--material` takes them.
     pub replace: Option<Spanned<Vec<String>>>,
     #[serde(default)]
@@ -167,7 +169,7 @@ pub(crate) struct RenderSpec {
     pub exposure: Option<f32>,
     /// Whether the exposure is measured in the first view, for lights in physical units; an error beside `exposure`.
     pub metered: Option<bool>,
-    /// `linear`, `agx` or `aces`.
+    /// `linear`, `agx`, `aces` or `neutral`.
     pub tonemap: Option<String>,
     pub denoise: Option<SceneDenoise>,
     pub denoise_threshold: Option<f32>,
@@ -203,6 +205,8 @@ pub(crate) enum Source {
 #[serde(default, deny_unknown_fields)]
 pub(crate) struct CommonSpec {
     pub transform: TransformSpec,
+    /// A NumPy file of transforms, each of which places the mesh once; relative to the scene file's folder.
+    pub instances: Option<String>,
     /// Name of the material of the whole mesh. Where it is absent, a mesh from a file keeps its own materials.
     pub material: Option<String>,
     /// Names of materials, one for each slot of the mesh (a room's walls, a checkered plane's fields). If there are
@@ -234,7 +238,7 @@ struct FileSpec {
 /// Largest coordinate of an origin. Farther away, double precision is coarse, too.
 const MAX_ORIGIN: f64 = 1e12;
 
-const COMMON_KEYS: [&str; 6] = ["transform", "material", "materials", "smooth", "uv_scale", "override"];
+const COMMON_KEYS: [&str; 7] = ["transform", "instances", "material", "materials", "smooth", "uv_scale", "override"];
 
 impl MeshSpec {
     /// Splits a mesh's table into the keys that all meshes have and those of its own kind. An unknown key is an

@@ -8,3 +8,4 @@ pub(crate) mod path;
 pub(crate) mod placed;
 pub(crate) mod sources;
 pub(crate) mod terms;
+pub(crate) mod transforms;

@@ -14,6 +14,7 @@ use super::{
     assemble::File,
     description::{CommonSpec, MeshSpec, Source},
     overrides::NamedMaterials,
+    transforms,
 };
 use crate::{
     scene::{
@@ -25,7 +26,6 @@ use crate::{
         },
         meshes::{
             generate::{Generator, TriangleBudget},
-            needs::{MeshSize, require_for_mesh},
             smooth::{DEFAULT_CREASE, Shading},
         },
         model::{
@@ -203,10 +203,10 @@ impl<'a> Placer<'a> {
     pub fn add(&mut self, table: &MeshTable) -> Result<(), SceneError> {
         let failed = |what: String| self.file.at(&table.span, format!("mesh {}: {what}", table.number));
         let MeshSpec { source, common } = &table.spec;
-        let transform = common.transform.transform().map_err(failed)?;
+        let places = self.places(common).map_err(failed)?;
         let named = self.materials.of_mesh(common).map_err(failed)?;
         match source {
-            Source::Generator(generator) => self.generate(generator, common, (transform, named)).map_err(failed),
+            Source::Generator(generator) => self.generate(generator, common, (&places, named)).map_err(failed),
             Source::File { crease, .. } => {
                 let reading =
                     Reading::of(self.file, &table.spec, self.recentre).map_err(failed)?.expect("the source is a file");
@@ -218,9 +218,17 @@ impl<'a> Placer<'a> {
                     let what = "`crease` has no effect: no normals of the file's faces are computed";
                     tracing::warn!("{}", failed(what.to_owned()));
                 }
-                self.place(&reading, common, (transform, named)).map_err(failed)
+                self.place(&reading, common, (&places, named)).map_err(failed)
             }
         }
+    }
+
+    /// Returns the transforms by which a table places its mesh: its own, followed by each of its array, if it has one.
+    fn places(&self, common: &CommonSpec) -> Checked<Vec<Transform>> {
+        let own = common.transform.transform()?;
+        let Some(name) = &common.instances else { return Ok(vec![own]) };
+        let path = self.file.access.beside(self.file.path).exact(name)?;
+        transforms::read(&path, &own)
     }
 
     /// Adds a generator's mesh.
@@ -228,10 +236,10 @@ impl<'a> Placer<'a> {
         &mut self,
         generator: &Generator,
         common: &CommonSpec,
-        (transform, named): (Transform, Vec<u32>),
+        (places, named): (&[Transform], Vec<u32>),
     ) -> Checked<()> {
         let scene = &mut self.scene;
-        let budget = TriangleBudget { n_generated: self.n_generated, n_triangles: scene.n_triangles() as u64 };
+        let budget = TriangleBudget { n_generated: self.n_generated, n_triangles: scene.n_stored() as u64 };
         let mut mesh = generator.build(&budget)?;
         if mesh.faces.is_empty() {
             return Err("makes no triangles".to_owned());
@@ -239,13 +247,16 @@ impl<'a> Placer<'a> {
         if common.smooth == Some(false) {
             mesh.normals.fill([Vec3::ZERO; 3]);
         }
-        let slots = if named.is_empty() { vec![scene.default_material()] } else { named };
+        let slots = if named.is_empty() { vec![scene.default_material(false)] } else { named };
         if !slots.iter().any(|ix| scene.materials[*ix as usize].maps.textures().next().is_some()) {
             mesh.uvs = Default::default();
         }
         scale_uvs(&mut mesh, common.uv_scale)?;
         self.n_generated += mesh.faces.len() as u64;
-        scene.push_mesh(mesh, transform, slots)
+        let mesh_ix = scene.meshes.len();
+        require_for_places(scene, places.len(), 1)?;
+        scene.meshes.push(mesh);
+        push_instances(scene, Instance { mesh_ix, transform: Transform::IDENTITY, materials: slots }, places)
     }
 
     /// Reads a mesh file and adds its meshes, without instances. Of a glTF file, lights and cameras are left out.
@@ -255,7 +266,7 @@ impl<'a> Placer<'a> {
         let path = &reading.path;
         let content = self.shapes.remove(reading).unwrap_or_else(|| read_mesh(path).map(Content::Bytes));
         let content = content.map_err(|error| failed(error.to_string()))?;
-        let n_loaded = self.scene.n_triangles();
+        let n_loaded = self.scene.n_stored();
         let first_mesh = self.scene.meshes.len();
         let uv_scale = table.spec.common.uv_scale;
         let before = gltf::LoadedBefore { n_triangles: n_loaded as u64, n_pixels: self.images.n_pixels() };
@@ -322,15 +333,17 @@ impl<'a> Placer<'a> {
         &mut self,
         reading: &Reading,
         common: &CommonSpec,
-        (transform, named): (Transform, Vec<u32>),
+        (places, named): (&[Transform], Vec<u32>),
     ) -> Checked<()> {
         let read = self.read.get_mut(reading).expect("the file is read");
         let scene = &mut self.scene;
         if named.is_empty() && read.material_ixs[usize::from(common.overrides)].is_none() {
             let n_materials = scene.materials.len();
+            let has_colours = |instance: &Instance| !scene.meshes[instance.mesh_ix].colours.is_empty();
+            let has_colours = read.instances.iter().any(has_colours);
             let add = |material: &Option<Material>| match material {
                 Some(material) => scene.push_material(material.clone()),
-                None => scene.default_material(),
+                None => scene.default_material(has_colours),
             };
             let material_ixs = read.materials.iter().map(add).collect();
             read.material_ixs[usize::from(common.overrides)] = Some(material_ixs);
@@ -339,20 +352,37 @@ impl<'a> Placer<'a> {
             }
         }
         let own = read.material_ixs[usize::from(common.overrides)].as_ref();
-        let mut n_triangles = scene.n_triangles() as u64;
+        require_for_places(scene, places.len(), read.instances.len())?;
         for instance in &read.instances {
-            let mesh = &scene.meshes[instance.mesh_ix];
-            let transform = transform.after(&instance.transform);
-            mesh.placed(&transform)?;
-            n_triangles += mesh.faces.len() as u64;
             let materials = match own.filter(|_| named.is_empty()) {
                 Some(own) => instance.materials.iter().map(|ix| own[*ix as usize]).collect(),
                 None => named.clone(),
             };
-            scene.instances.push(Instance { mesh_ix: instance.mesh_ix, transform, materials });
+            push_instances(scene, Instance { materials, ..instance.clone() }, places)?;
         }
-        require_for_mesh(n_triangles, &MeshSize::default())
+        Ok(())
     }
+}
+
+/// Refuses to place instances if there is not enough memory for all places. The memory of the triangles depends on
+/// whether they are copied for each place, and is checked before that.
+fn require_for_places(scene: &Scene, n_places: usize, n_instances: usize) -> Checked<()> {
+    let n_bytes_of_one = (size_of::<Instance>() + size_of::<u32>() * scene.materials.len()) as u64;
+    let n_bytes = (n_places as u64).saturating_mul(n_instances as u64).saturating_mul(n_bytes_of_one);
+    require("placing a mesh many times", n_bytes).map_err(|error| error.to_string())
+}
+
+/// Adds an instance once for each transform that follows its own.
+fn push_instances(scene: &mut Scene, instance: Instance, places: &[Transform]) -> Checked<()> {
+    let mesh = &scene.meshes[instance.mesh_ix];
+    let bounds = mesh.bounds();
+    for (ix, place) in places.iter().enumerate() {
+        let transform = place.after(&instance.transform);
+        let named = |what: String| if places.len() > 1 { format!("instance {ix}: {what}") } else { what };
+        mesh.check_place(&transform, bounds).map_err(named)?;
+        scene.instances.push(Instance { transform, ..instance.clone() });
+    }
+    Ok(())
 }
 
 impl Reading {

@@ -28,25 +28,26 @@ pub fn source_files_with(path: &Path, options: &LoadOptions) -> Vec<PathBuf> {
         return vec![pack.to_owned()];
     }
     let access = Access::of(options);
-    let (meshes, maps) = if is_scene_file(path) { named(path, access) } else { (vec![path.to_owned()], Vec::new()) };
+    let (meshes, others) = if is_scene_file(path) { named(path, access) } else { (vec![path.to_owned()], Vec::new()) };
     let libraries: Vec<_> = meshes.iter().flat_map(|mesh| libraries(mesh, access)).collect();
-    let mut files = [vec![path.to_owned()], meshes, maps, libraries].concat();
+    let mut files = [vec![path.to_owned()], meshes, others, libraries].concat();
     files.sort();
     files.dedup();
     files
 }
 
-/// Returns the meshes and the images that a scene file names.
+/// Returns the meshes that a scene file names, and the other files: images and arrays.
 fn named(scene: &Path, access: Access) -> (Vec<PathBuf>, Vec<PathBuf>) {
     let table: Table = read_utf8(scene).ok().and_then(|text| text.parse().ok()).unwrap_or_default();
     let path = |name: &str| access.beside(scene).exact(name).ok();
-    let meshes = table.get("mesh").and_then(Value::as_array).into_iter().flatten();
-    let meshes = meshes.filter_map(|mesh| path(mesh.get("file")?.as_str()?)).collect();
+    let tables = || table.get("mesh").and_then(Value::as_array).into_iter().flatten();
+    let named = |key: &'static str| tables().filter_map(move |mesh| mesh.get(key)?.as_str()).filter_map(path);
+    let (meshes, arrays) = (named("file").collect(), named("instances"));
     let materials = table.get("materials").and_then(Value::as_table).into_iter().flat_map(Table::values);
     let maps = materials.flat_map(|material| MAP_KEYS.iter().filter_map(|key| material.get(key)));
     let name = |map: &Value| path(map.as_str().or_else(|| map.get("file")?.as_str())?);
     let environment = table.get("environment").and_then(|it| path(it.get("file")?.as_str()?));
-    (meshes, maps.filter_map(name).chain(environment).collect())
+    (meshes, maps.filter_map(name).chain(environment).chain(arrays).collect())
 }
 
 /// Returns whether a file's name is that of a scene file in TOML.

@@ -13,11 +13,13 @@ use crate::{
 };
 
 /// Shows the controls. Changes take effect with the next frame. `accel` is the structure in use: only a kd-tree has a
-/// choice of traversals.
-pub fn show(ui: &mut Ui, settings: &mut Settings, projection: &mut Projection, accel: AccelKind) {
+/// choice of traversals. The CPU engine has no views but the picture, and primary rays of one kind.
+pub fn show(ui: &mut Ui, settings: &mut Settings, projection: &mut Projection, (accel, is_on_cpu): (AccelKind, bool)) {
     Grid::new("controls").num_columns(2).spacing([10.0, 3.0]).show(ui, |ui| {
         let Settings { options, in_motion, max_samples, budget_ms, vsync, view, gain } = settings;
-        choice(ui, "view", view, View::ALL);
+        if !is_on_cpu {
+            choice(ui, "view", view, View::ALL);
+        }
         if matches!(view, View::Depth | View::Cost | View::Rays) {
             row(ui, "brightness", |ui| ui.add(Slider::new(gain, 0.01..=100.0).logarithmic(true)));
         }
@@ -34,7 +36,7 @@ pub fn show(ui: &mut Ui, settings: &mut Settings, projection: &mut Projection, a
         if accel == AccelKind::KdTree {
             choice(ui, "traversal", &mut options.traversal, Traversal::ALL);
         }
-        if options.integrator == Integrator::Whitted {
+        if options.integrator == Integrator::Whitted && !is_on_cpu {
             choice(ui, "primary rays", &mut options.primary, Primary::ALL);
         }
         row(ui, "budget, ms", |ui| ui.add(Slider::new(budget_ms, 1.0..=200.0).logarithmic(true)));

@@ -81,6 +81,8 @@ impl Layers {
 pub struct Facts<'a> {
     /// The device's name.
     pub device: &'a str,
+    /// Whether the CPU engine draws. It has no views but the picture, and takes no device memory.
+    pub is_on_cpu: bool,
     /// The scene and its acceleration structure.
     pub loaded: &'a LoadedScene,
     /// Width and height of the window, pixels.
@@ -115,13 +117,23 @@ pub struct Facts<'a> {
     pub message: Option<&'a Message>,
 }
 
-/// Lays out the overlay and applies the user's changes to `edited`.
-pub fn show(ui: &mut Ui, layers: Layers, edited: &mut Edited, facts: &Facts) {
-    let style = ui.ctx().global_style();
-    let frame = Frame::window(&style)
+/// Lays out a line in the window's middle, which says what the window waits for.
+pub fn show_waiting(ui: &mut Ui, text: &str) {
+    let middle = Area::new(Id::new("waiting")).anchor(Align2::CENTER_CENTER, [0.0, 0.0]).interactable(false);
+    middle.show(ui.ctx(), |ui| frame(ui).show(ui, |ui| ui.label(RichText::new(text).strong())));
+}
+
+/// Returns the frame of the parts of the overlay.
+fn frame(ui: &Ui) -> Frame {
+    Frame::window(&ui.ctx().global_style())
         .fill(Color32::from_black_alpha(200))
         .corner_radius(CornerRadius::same(4))
-        .inner_margin(Margin::same(8));
+        .inner_margin(Margin::same(8))
+}
+
+/// Lays out the overlay and applies the user's changes to `edited`.
+pub fn show(ui: &mut Ui, layers: Layers, edited: &mut Edited, facts: &Facts) {
+    let frame = frame(ui);
     if layers.panel {
         legend::show(ui, frame, facts);
         panel(ui, frame, edited, facts);
@@ -163,11 +175,14 @@ fn sections(ui: &mut Ui, edited: &mut Edited, facts: &Facts) {
     }
     section(ui, "Passes", true, |ui| graph::show(ui, facts.history, facts.profile));
     section(ui, "Picture", true, |ui| {
-        controls::show(ui, &mut edited.settings, &mut edited.projection, facts.loaded.built.world.accel().kind());
+        let accel = facts.loaded.built.world.accel().kind();
+        controls::show(ui, &mut edited.settings, &mut edited.projection, (accel, facts.is_on_cpu));
     });
     section(ui, "Rays", true, |ui| tables::rays(ui, facts.profile));
     section(ui, "Acceleration structure", false, |ui| tables::accel(ui, facts.loaded));
-    section(ui, "Memory", false, |ui| tables::memory(ui, &facts.memory));
+    if !facts.is_on_cpu {
+        section(ui, "Memory", false, |ui| tables::memory(ui, &facts.memory));
+    }
 }
 
 /// Shows what to do while no file is open, and the last message below it.
@@ -208,7 +223,7 @@ fn section(ui: &mut Ui, name: &str, is_open: bool, body: impl FnOnce(&mut Ui)) {
 
 fn status(ui: &mut Ui, facts: &Facts) {
     let Facts { loaded, picture, window, n_samples, n_wanted, .. } = facts;
-    ui.label(format!("{}: {} triangles", loaded.scene().name, loaded.scene().triangles.len()));
+    ui.label(format!("{}: {} triangles", loaded.scene().name, loaded.scene().n_triangles()));
     ui.label(facts.device);
     ui.label(format!("{}x{} in {}x{}", picture.0, picture.1, window.0, window.1));
     let way = if facts.is_flying { "fly" } else { "orbit" };

@@ -18,6 +18,7 @@ use tempfile::TempDir;
 
 use super::{
     facet_normal, flattened, load,
+    materials::load_scene,
     mesh_files::{CORNERS, SIDES, obj},
     support::random::Random,
 };
@@ -120,6 +121,12 @@ impl Model {
 
     pub fn scene(&self) -> Scene {
         self.load().unwrap_or_else(|error| panic!("{error}\n{}", self.json))
+    }
+
+    /// Returns the scene and the warnings, joined.
+    pub fn told(&self) -> (Scene, String) {
+        let (scene, warnings) = load_scene(&[("model.glb", &self.glb())]);
+        (scene.unwrap_or_else(|error| panic!("{error}\n{}", self.json)), warnings.join("\n"))
     }
 
     pub fn flat(&self) -> FlatScene {

@@ -86,6 +86,22 @@ impl<'a> Accessor<'a> {
         Ok(accessor)
     }
 
+    /// Returns whether the file has elements, so that not all are 0.
+    pub fn has_elements(&self) -> bool {
+        self.elements.is_some() || self.replacements.is_some()
+    }
+
+    /// Takes the elements from bytes without gaps, if `decoded` has any of the accessor's kind. There are as many as
+    /// the accessor has.
+    pub fn or_decoded(mut self, decoded: impl FnOnce(ComponentType) -> Option<&'a [u8]>) -> Self {
+        let stride = self.n_components * self.kind.size();
+        if let Some(bytes) = decoded(self.kind) {
+            assert_eq!(bytes.len(), self.n * stride, "the data is checked to be the accessor's");
+            self.elements = Some(Elements { bytes, stride });
+        }
+        self
+    }
+
     /// Reads which elements are replaced. `ix` is the accessor's index.
     fn replace(&mut self, document: &'a Document, (ix, sparse): (usize, &sparse::Sparse), size: usize) -> Checked<()> {
         let n = usize::try_from(sparse.count.0).ok().filter(|n| *n <= self.n);

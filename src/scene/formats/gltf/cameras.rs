@@ -21,12 +21,13 @@ pub(super) fn cameras(
     document: &Document,
     nodes: &Nodes,
     (bounds, origin): ((Vec3, Vec3), DVec3),
-) -> Checked<Vec<(String, Camera)>> {
+) -> Vec<(String, Camera)> {
     let mut cameras = Vec::new();
     for &ix in &nodes.shown {
         let node = &document.root.nodes[ix];
         let Some(index) = node.camera else { continue };
-        let json = item(&document.root.cameras, "cameras", index.value(), &format_args!("nodes[{ix}].camera"))?;
+        let json = item(&document.root.cameras, "cameras", index.value(), &format_args!("nodes[{ix}].camera"));
+        let Some(json) = document.or_left_out(json) else { continue };
         let name = node.name.clone().or_else(|| json.name.clone());
         let name = name.unwrap_or_else(|| format!("camera {}", cameras.len() + 1));
         let view = nodes
@@ -36,11 +37,12 @@ pub(super) fn cameras(
             document.note("cameras whose nodes flatten them or lie too far away, which are left out", name);
             continue;
         };
-        let projection = projection(json).map_err(|what| format!("cameras[{index}]: {what}"))?;
+        let projection = projection(json).map_err(|what| format!("cameras[{index}]: {what}"));
+        let Some(projection) = document.or_left_out(projection) else { continue };
         let View { eye, target, up } = view;
         cameras.push((name, Camera { eye, target, up, projection }));
     }
-    Ok(cameras)
+    cameras
 }
 
 /// Where a camera stands.

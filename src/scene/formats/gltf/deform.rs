@@ -5,7 +5,12 @@ use std::collections::HashMap;
 use glam::{DMat3, DMat4, DVec3, Vec3};
 use gltf::{
     Semantic,
-    json::{Index, accessor::Type, mesh::MorphTarget},
+    json::{
+        Index,
+        accessor::Type,
+        mesh::{MorphTarget, Primitive},
+        validation::Checked::Valid,
+    },
 };
 use serde::Deserialize;
 
@@ -47,6 +52,7 @@ impl<'a> Morph<'a> {
 }
 
 /// What the morph targets of a primitive add to texture coordinates or colours.
+#[derive(Default)]
 pub(super) struct Added<'a>(Vec<(f32, Accessor<'a>)>);
 
 impl<'a> Added<'a> {
@@ -122,6 +128,11 @@ impl<'a> Target<'a> {
         let added = [accessor(positions, "POSITION")?, accessor(normals, "NORMAL")?, accessor(tangents, "TANGENT")?];
         Ok(Self { weight, added })
     }
+}
+
+/// Returns whether a skin can move a primitive.
+pub(super) fn has_joints(primitive: &Primitive) -> bool {
+    [Semantic::Joints(0), Semantic::Weights(0)].into_iter().all(|it| primitive.attributes.contains_key(&Valid(it)))
 }
 
 /// A skin: for each joint the transform of vertices that it moves alone.

@@ -10,12 +10,13 @@ use std::{
 };
 
 use gltf::json::{self, Index, Root, image};
-use hashbrown::HashMap;
+use hashbrown::{HashMap, HashSet};
 
 use super::{
     deform::MorphTargets,
+    draco,
     glb::split,
-    meshopt,
+    lenient, meshopt,
     uri::{Uri, is_data},
 };
 use crate::{
@@ -27,15 +28,16 @@ use crate::{
         },
         model::error::Checked,
     },
-    util::{memory::require, progress::Progress, text::one_line},
+    util::{memory::require, progress::Progress, text::short_line},
 };
 
 /// Extensions that are read. A file that requires another one is refused, unless the other one changes only how
 /// surfaces look, such as `KHR_materials_…`.
-const SUPPORTED: [&str; 18] = [
+const SUPPORTED: [&str; 20] = [
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",
+    "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_clearcoat",
     "KHR_materials_emissive_strength",
@@ -48,23 +50,18 @@ const SUPPORTED: [&str; 18] = [
     "KHR_materials_volume",
     "KHR_mesh_quantization",
     "KHR_meshopt_compression",
+    "KHR_texture_basisu",
     "KHR_texture_transform",
     "KHR_xmp_json_ld",
     "MSFT_texture_dds",
 ];
 
 /// Extensions that are not read, but change no picture of a file that does not require them.
-const WITHOUT_EFFECT: [&str; 6] = [
-    "KHR_animation_pointer",
-    "KHR_draco_mesh_compression",
-    "KHR_materials_variants",
-    "KHR_texture_basisu",
-    "KHR_xmp",
-    "MSFT_packing_normalRoughnessMetallic",
-];
+const WITHOUT_EFFECT: [&str; 4] =
+    ["KHR_animation_pointer", "KHR_materials_variants", "KHR_xmp", "MSFT_packing_normalRoughnessMetallic"];
 
-/// The extension of files whose triangles are compressed by Draco.
-const DRACO: &str = "KHR_draco_mesh_compression";
+/// Begins the warning that lists what is left out because it cannot be read.
+pub(super) const LEFT_OUT: &str = "parts that cannot be read, which are left out";
 
 /// Returns whether a file that requires an extension can be shown without it, though some surfaces look different.
 fn changes_only_looks(extension: &str) -> bool {
@@ -83,12 +80,26 @@ pub(super) struct Document {
     /// Contents of the files that buffers name.
     files: RefCell<HashMap<PathBuf, Rc<Vec<u8>>>>,
     /// Indices of the elements that sparse accessors replace, by the accessor's index.
-    replaced: RefCell<HashMap<usize, Rc<[u32]>>>,
+    replaced: RefCell<HashMap<usize, Checked<Rc<[u32]>>>>,
     /// Contents of the compressed buffer views, by the view's index.
     decoded: HashMap<usize, Vec<u8>>,
-    notes: RefCell<Vec<(&'static str, Vec<String>)>>,
+    /// What Draco's data holds.
+    pub draco: draco::Decoded,
+    notes: RefCell<Vec<Notes>>,
     /// Who is told of the progress of loading.
     pub progress: Progress,
+}
+
+/// Most things of one kind that a warning lists.
+const MAX_LISTED: usize = 8;
+
+/// Things of one kind that are not shown.
+struct Notes {
+    /// Begins the warning.
+    kind: &'static str,
+    /// The first of them.
+    listed: Vec<String>,
+    n: usize,
 }
 
 /// A part of a file or of the data in a URI. Several buffers can share a file.
@@ -119,36 +130,25 @@ impl Document {
     /// Reads a glTF file from its content, and its buffers.
     pub fn read(path: &Path, bytes: Vec<u8>, access: Access) -> Checked<Self> {
         let (json, chunk) = split(&bytes)?;
-        let json = &bytes[json];
-        let root = json::deserialize::from_slice(json);
-        let root: Root = root.map_err(|error| version_error(json).unwrap_or_else(|| format!("the JSON: {error}")))?;
+        let lenient::Parsed { root, morph_targets, left_out } = lenient::parse(&bytes[json])?;
         let path = path.to_owned();
-        let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
-        let morph_targets = match primitives.flat_map(|primitive| &primitive.targets).next() {
-            Some(_) => json::deserialize::from_slice(json).map_err(|error| format!("the JSON: {error}"))?,
-            None => MorphTargets::default(),
-        };
         let (buffers, files, replaced) = (Vec::new(), RefCell::default(), RefCell::default());
         let (decoded, notes, progress) = (HashMap::new(), RefCell::default(), Progress::default());
+        let draco = draco::Decoded::default();
         let mut document =
-            Self { root, morph_targets, path, access, buffers, files, replaced, decoded, notes, progress };
-        document.check_version()?;
+            Self { root, morph_targets, path, access, buffers, files, replaced, decoded, draco, notes, progress };
+        left_out.into_iter().for_each(|what| document.note(LEFT_OUT, what));
         document.check_extensions()?;
         let chunk = chunk.map(|part| Buffer { content: Rc::new(bytes), part });
+        let shown = document.shown_buffers();
         for ix in 0..document.root.buffers.len() {
-            let buffer = document.buffer(ix, chunk.as_ref()).map_err(|what| format!("buffers[{ix}]: {what}"))?;
+            let buffer =
+                document.buffer(ix, (chunk.as_ref(), &shown)).map_err(|what| format!("buffers[{ix}]: {what}"))?;
             document.buffers.push(buffer);
         }
-        document.decode_views()?;
+        document.decode_views();
+        document.draco = draco::Decoded::of(&document)?;
         Ok(document)
-    }
-
-    fn check_version(&self) -> Checked<()> {
-        let asset = &self.root.asset;
-        match asset.min_version.as_ref().unwrap_or(&asset.version) {
-            version if version.starts_with("2.") => Ok(()),
-            version => Err(refused_version(version)),
-        }
     }
 
     fn check_extensions(&self) -> Checked<()> {
@@ -156,11 +156,7 @@ impl Document {
         let refused: Vec<_> = self.root.extensions_required.iter().filter(is_needed).collect();
         if !refused.is_empty() {
             let names: Vec<_> = refused.iter().map(|name| format!("`{name}`")).collect();
-            let remedy = match refused.iter().any(|name| *name == DRACO) {
-                true => ": its triangles are compressed by Draco. Blender, for example, reads it and saves it without",
-                false => "",
-            };
-            return Err(format!("extensionsRequired: the file needs {}, which is not read{remedy}", names.join(", ")));
+            return Err(format!("extensionsRequired: the file needs {}, which is not read", names.join(", ")));
         }
         let is_known = |name: &str| SUPPORTED.contains(&name) || WITHOUT_EFFECT.contains(&name);
         for name in self.root.extensions_used.iter().filter(|name| !is_known(name)) {
@@ -169,8 +165,9 @@ impl Document {
         Ok(())
     }
 
-    /// Returns the content of a buffer. Buffers that only stand in for compressed views are empty.
-    fn buffer(&self, ix: usize, chunk: Option<&Buffer>) -> Checked<Buffer> {
+    /// Returns the content of a buffer. Buffers that only stand in for compressed views, and those without content, are
+    /// empty. One that is too short ends where its content ends.
+    fn buffer(&self, ix: usize, (chunk, shown): (Option<&Buffer>, &HashSet<usize>)) -> Checked<Buffer> {
         let buffer = &self.root.buffers[ix];
         let extensions = buffer.extensions.as_ref();
         if extensions.is_some_and(|extensions| meshopt::is_fallback(&extensions.others)) {
@@ -179,29 +176,48 @@ impl Document {
         let Buffer { content, part } = match (&buffer.uri, chunk) {
             (Some(uri), _) => self.fetch(uri).map(|content| Buffer { part: 0..content.len(), content })?,
             (None, Some(chunk)) if ix == 0 => Buffer { content: chunk.content.clone(), part: chunk.part.clone() },
-            (None, _) => return Err("has no uri, and there is no binary chunk for it".to_owned()),
+            (None, _) => {
+                if shown.contains(&ix) {
+                    self.note(LEFT_OUT, format!("buffers[{ix}]: has no uri, and there is no binary chunk for it"));
+                }
+                return Ok(Buffer::default());
+            }
         };
         let n_bytes = buffer.byte_length.0;
         if (part.len() as u64) < n_bytes {
-            return Err(format!("has {} bytes, but byteLength = {n_bytes}", part.len()));
+            self.note(LEFT_OUT, format!("buffers[{ix}]: has {} bytes, but byteLength = {n_bytes}", part.len()));
         }
-        Ok(Buffer { content, part: part.start..part.start + n_bytes as usize })
+        let n_bytes = n_bytes.min(part.len() as u64) as usize;
+        Ok(Buffer { content, part: part.start..part.start + n_bytes })
+    }
+
+    /// Returns the indices of the buffers that views show. Others stand in for views that are compressed, though they
+    /// do not say so.
+    fn shown_buffers(&self) -> HashSet<usize> {
+        let is_packed = |view: &&json::buffer::View| {
+            view.extensions.as_ref().is_some_and(|extensions| meshopt::packed(&extensions.others).is_some())
+        };
+        self.root.buffer_views.iter().filter(|view| !is_packed(view)).map(|view| view.buffer.value()).collect()
     }
 
     /// Decodes the compressed buffer views.
-    fn decode_views(&mut self) -> Checked<()> {
+    fn decode_views(&mut self) {
         let mut n_total = 0;
         for (ix, view) in self.root.buffer_views.iter().enumerate() {
             let Some(packed) = view.extensions.as_ref().and_then(|it| meshopt::packed(&it.others)) else { continue };
-            let failed = |what: String| format!("bufferViews[{ix}].extensions: meshopt_compression: {what}");
-            let packed = packed.map_err(failed)?;
-            n_total = packed.n_bytes().map_err(failed)?.saturating_add(n_total);
-            require("decoding the buffer views", n_total).map_err(|error| failed(error.to_string()))?;
-            let buffer = item(&self.buffers, "buffers", packed.buffer, &"buffer").map_err(failed)?;
-            let bytes = part(buffer.bytes(), packed.byte_offset, packed.byte_length).map_err(failed)?;
-            self.decoded.insert(ix, packed.decode(bytes).map_err(failed)?);
+            let decoded = packed.and_then(|packed| self.decoded_view(&packed, &mut n_total));
+            let decoded = decoded.map_err(|what| format!("bufferViews[{ix}].extensions: meshopt_compression: {what}"));
+            let decoded = self.or_left_out(decoded);
+            self.decoded.extend(decoded.map(|bytes| (ix, bytes)));
         }
-        Ok(())
+    }
+
+    /// Decodes a buffer view. `n_total` is the number of bytes of all so far.
+    fn decoded_view(&self, packed: &meshopt::Packed, n_total: &mut u64) -> Checked<Vec<u8>> {
+        *n_total = packed.n_bytes()?.saturating_add(*n_total);
+        require("decoding the buffer views", *n_total).map_err(|error| error.to_string())?;
+        let buffer = item(&self.buffers, "buffers", packed.buffer, &"buffer")?;
+        packed.decode(part(buffer.bytes(), packed.byte_offset, packed.byte_length)?)
     }
 
     /// Returns what a buffer's URI stands for. A file that several buffers name is read once.
@@ -234,11 +250,11 @@ impl Document {
     /// first call.
     pub fn replaced(&self, accessor_ix: usize, read: impl FnOnce() -> Checked<Rc<[u32]>>) -> Checked<Rc<[u32]>> {
         if let Some(known) = self.replaced.borrow().get(&accessor_ix) {
-            return Ok(known.clone());
+            return known.clone();
         }
-        let replaced = read()?;
+        let replaced = read();
         self.replaced.borrow_mut().insert(accessor_ix, replaced.clone());
-        Ok(replaced)
+        replaced
     }
 
     /// Returns where the bytes of an image are. `from` is the JSON path that names the image.
@@ -298,38 +314,50 @@ impl Document {
         Ok(View { bytes, stride })
     }
 
+    /// Returns what could be read, or remembers that it is left out.
+    pub fn or_left_out<T>(&self, read: Checked<T>) -> Option<T> {
+        read.map_err(|what| self.note(LEFT_OUT, what)).ok()
+    }
+
+    /// Returns the first thing that is left out because it cannot be read.
+    pub fn first_left_out(&self) -> Option<String> {
+        let notes = self.notes.borrow();
+        notes.iter().find(|notes| notes.kind == LEFT_OUT).and_then(|notes| notes.listed.first().cloned())
+    }
+
+    /// Returns the nearest number from `min` to `max`, and remembers that it is not the file's. NaN becomes `min`.
+    pub fn clamped(&self, path: &str, name: &str, value: f32, (min, max): (f32, f32)) -> f32 {
+        if (min..=max).contains(&value) {
+            return value;
+        }
+        let taken = if value.is_nan() { min } else { value.clamp(min, max) };
+        self.note("numbers out of range, which are clamped", format!("{path}.{name} = {value} (to {taken})"));
+        taken
+    }
+
     /// Remembers that something is not shown. `kind` begins the warning, in which things of one kind are listed.
     pub fn note(&self, kind: &'static str, what: impl Display) {
-        let mut notes = self.notes.borrow_mut();
-        match notes.iter_mut().find(|(other, _)| *other == kind) {
-            Some((_, list)) => list.push(what.to_string()),
-            None => notes.push((kind, vec![what.to_string()])),
+        let mut all = self.notes.borrow_mut();
+        let known = all.iter().position(|notes| notes.kind == kind);
+        let ix = known.unwrap_or_else(|| {
+            all.push(Notes { kind, listed: Vec::new(), n: 0 });
+            all.len() - 1
+        });
+        let notes = &mut all[ix];
+        notes.n += 1;
+        if notes.listed.len() < MAX_LISTED {
+            notes.listed.push(short_line(&what.to_string()));
         }
     }
 
     /// Returns a warning for each kind of thing that is not shown.
     pub fn warnings(&self, path: &Path) -> Vec<String> {
-        const MAX_LISTED: usize = 8;
-        let warning = |(kind, list): (&'static str, Vec<String>)| {
-            let mut listed = list[..list.len().min(MAX_LISTED)].join(", ");
-            if list.len() > MAX_LISTED {
-                listed += &format!(" and {} more", list.len() - MAX_LISTED);
-            }
-            format!("{}: {kind}: {}", path.display(), one_line(&listed))
+        let warning = |Notes { kind, listed, n }: Notes| {
+            let more = if n > listed.len() { format!(" and {} more", n - listed.len()) } else { String::new() };
+            format!("{}: {kind}: {}{more}", path.display(), listed.join(", "))
         };
         self.notes.take().into_iter().map(warning).collect()
     }
-}
-
-/// Returns what is wrong with JSON that is no glTF 2, if it is that of another version.
-fn version_error(json: &[u8]) -> Option<String> {
-    let root: json::Value = json::deserialize::from_slice(json).ok()?;
-    let version = root.get("asset")?.get("version")?.as_str()?;
-    (!version.starts_with("2.")).then(|| refused_version(version))
-}
-
-fn refused_version(version: &str) -> String {
-    format!("asset: this is glTF {version}, and only glTF 2 is read")
 }
 
 impl Buffer {

@@ -15,7 +15,8 @@ use rayon::prelude::*;
 use super::{
     accessor::Accessor,
     deform::{Added, Morph, Skin, Skinning, TargetAttributes},
-    document::Document,
+    document::{Document, LEFT_OUT},
+    draco,
 };
 use crate::scene::{
     meshes::needs::{self, MeshSize, require_for_mesh},
@@ -67,10 +68,14 @@ pub(super) fn attributes_of(primitives: &[Primitive]) -> needs::Attributes {
     }
 }
 
-/// Returns the mesh of a primitive, or `None` for points and lines. `n_read` is the number of triangles that have been
-/// read already, and those of the primitive are added. The faces without area that join strips count: they are in no
-/// mesh, but a short file can state any number of them.
-pub(super) fn mesh(document: &Document, part: &Part, pose: Pose, n_read: &mut u64) -> Checked<Option<Mesh>> {
+/// Returns the mesh of a primitive, or `None` for points and lines and for what cannot be read. `n_read` is the number
+/// of triangles that have been read already, and those of the primitive are added. The faces without area that join
+/// strips count: they are in no mesh, but a short file can state any number of them. Also returns whether the skin
+/// moves the vertices.
+///
+/// # Errors
+/// The mesh needs more memory than there is.
+pub(super) fn mesh(document: &Document, part: &Part, pose: Pose, n_read: &mut u64) -> Checked<Option<(Mesh, bool)>> {
     let &Part { primitive, targets, ref path, slot, .. } = part;
     let mode = match primitive.mode {
         Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) => mode,
@@ -78,15 +83,17 @@ pub(super) fn mesh(document: &Document, part: &Part, pose: Pose, n_read: &mut u6
             document.note("points and lines, which are not shown", path);
             return Ok(None);
         }
-        _ => return Err(format!("{path}: its mode is none of 0 to 6")),
+        _ => {
+            document.note(LEFT_OUT, format!("{path}: its mode is none of 0 to 6"));
+            return Ok(None);
+        }
     };
     let attributes = Attributes { document, primitive, targets, path };
-    let positions = attributes.find(Semantic::Positions, &[Type::Vec3], None)?;
-    let Some(positions) = positions else { return Err(format!("{path}.attributes: there is no POSITION")) };
-    let mut faces = attributes.faces(mode, positions.n, (part.whole, n_read))?;
-    let used = renumber(&mut faces);
-    let skin = pose.skin.map(|skin| skin.of(&attributes, positions.n)).transpose()?;
-    let vertices = attributes.vertices(&positions, &used, pose.weights, skin.as_ref())?;
+    let Some((positions, indices)) = document.or_left_out(attributes.positions_and_indices()) else { return Ok(None) };
+    let mut faces = attributes.faces(mode, (indices, positions.n), (part.whole, n_read))?;
+    let (used, places) = attributes.places(&positions, &mut faces);
+    let skin = pose.skin.and_then(|skin| document.or_left_out(skin.of(&attributes, positions.n)));
+    let vertices = attributes.vertices(places, (&used, positions.n), pose.weights, skin.as_ref());
     if pose.is_turned {
         faces.iter_mut().for_each(|face| face.swap(1, 2));
     }
@@ -96,19 +103,23 @@ pub(super) fn mesh(document: &Document, part: &Part, pose: Pose, n_read: &mut u6
     mesh.tangents = corners(&faces, &vertices.tangents).unwrap_or_default();
     for (set, uvs) in mesh.uvs.iter_mut().enumerate() {
         let semantic = Semantic::TexCoords(set as u32);
-        let added = Added::new(&attributes, &semantic, &[Type::Vec2], (pose.weights, positions.n))?;
-        let Some(found) = attributes.find(semantic, &[Type::Vec2], Some(positions.n))? else { continue };
-        let found = read(&used, |ix| added.to(ix, found.numbers(ix, 0.0)?).map(Vec2::from_array))?;
+        let Some(found) = attributes.readable(semantic.clone(), &[Type::Vec2], positions.n) else { continue };
+        let added = Added::new(&attributes, &semantic, &[Type::Vec2], (pose.weights, positions.n));
+        let added = document.or_left_out(added).unwrap_or_default();
+        let uv = |ix| added.to(ix, found.numbers(ix, 0.0)?).map(Vec2::from_array);
+        let found = read(document, &used, Vec2::ZERO, uv);
         *uvs = corners(&faces, &found).unwrap_or_default();
     }
     let (semantic, types) = (Semantic::Colors(0), [Type::Vec3, Type::Vec4]);
-    let added = Added::new(&attributes, &semantic, &types, (pose.weights, positions.n))?;
-    if let Some(found) = attributes.find(semantic, &types, Some(positions.n))? {
-        let found = read(&used, |ix| added.to_colour(ix, found.numbers(ix, 1.0)?).map(Vec4::from_array))?;
+    if let Some(found) = attributes.readable(semantic.clone(), &types, positions.n) {
+        let added = Added::new(&attributes, &semantic, &types, (pose.weights, positions.n));
+        let added = document.or_left_out(added).unwrap_or_default();
+        let colour = |ix| added.to_colour(ix, found.numbers(ix, 1.0)?).map(Vec4::from_array);
+        let found = read(document, &used, Vec4::ONE, colour);
         mesh.colours = corners(&faces, &found).unwrap_or_default();
     }
     (mesh.positions, mesh.faces) = (vertices.positions, faces);
-    Ok(Some(mesh))
+    Ok(Some((mesh, skin.is_some())))
 }
 
 /// The attributes of a primitive.
@@ -126,7 +137,29 @@ impl<'a> Attributes<'a> {
     pub fn find(&self, semantic: Semantic, types: &[Type], n: Option<usize>) -> Checked<Option<Accessor<'a>>> {
         let name = semantic.to_string();
         let Some(index) = self.primitive.attributes.get(&Valid(semantic)) else { return Ok(None) };
-        self.accessor(*index, types, n, format!("{}.attributes.{name}", self.path)).map(Some)
+        let accessor = self.accessor(*index, types, n, format!("{}.attributes.{name}", self.path))?;
+        Ok(Some(accessor.or_decoded(|kind| self.document.draco.attribute((self.primitive, self.path), &name, kind))))
+    }
+
+    /// Returns an attribute of `n` vertices, if the primitive has it and it can be read.
+    fn readable(&self, semantic: Semantic, types: &[Type], n: usize) -> Option<Accessor<'a>> {
+        self.document.or_left_out(self.find(semantic, types, Some(n))).flatten()
+    }
+
+    /// Returns what a mesh cannot do without.
+    fn positions_and_indices(&self) -> Checked<(Accessor<'a>, Option<Accessor<'a>>)> {
+        let positions = self.find(Semantic::Positions, &[Type::Vec3], None)?;
+        let positions = positions.ok_or_else(|| format!("{}.attributes: there is no POSITION", self.path))?;
+        let path = format!("{}.indices", self.path);
+        let indices = self.primitive.indices.map(|index| Accessor::new(self.document, index, &[Type::Scalar], path));
+        let indices = indices.transpose()?;
+        let indices =
+            indices.map(|it| it.or_decoded(|kind| self.document.draco.indices((self.primitive, self.path), kind)));
+        // Some files have the data a second time, for readers that do not decode it.
+        match draco::is_compressed(self.primitive) && !positions.has_elements() {
+            true => Err(format!("{}: its compressed data is not read", self.path)),
+            false => Ok((positions, indices)),
+        }
     }
 
     /// Returns an accessor that has an element for each of `n` vertices.
@@ -146,88 +179,100 @@ impl<'a> Attributes<'a> {
         }
     }
 
-    /// Returns the faces as indices of vertices. `whole`: what the faces of the mesh have. `n_read`: see [`mesh`].
+    /// Returns the faces as indices of vertices, without those whose vertices do not exist. `whole`: what the faces of
+    /// the mesh have. `n_read`: see [`mesh`].
     fn faces(
         &self,
         mode: Mode,
-        n_vertices: usize,
+        (indices, n_vertices): (Option<Accessor>, usize),
         (whole, n_read): (needs::Attributes, &mut u64),
     ) -> Checked<Vec<[u32; 3]>> {
-        let path = format!("{}.indices", self.path);
-        let indices = self.primitive.indices.map(|index| Accessor::new(self.document, index, &[Type::Scalar], path));
-        let indices = indices.transpose()?;
         let n = indices.as_ref().map_or(n_vertices, |indices| indices.n);
         let n_faces = if mode == Mode::Triangles { n / 3 } else { n.saturating_sub(2) };
         let n_points = n_vertices.min(3 * n_faces) as u64;
         require_for_mesh(*n_read, &MeshSize { n_triangles: n_faces as u64, n_points, attributes: whole })?;
         *n_read = n_read.saturating_add(n_faces as u64);
-        let vertex = |at: usize| {
-            let Some(indices) = &indices else { return Ok(at as u32) };
-            let [ix] = indices.integers(at);
-            if (ix as usize) < n_vertices {
-                Ok(ix)
-            } else {
-                Err(format!("{}: element {at} is {ix}, but there are {n_vertices} vertices", indices.path))
-            }
-        };
-        let face = |ix: usize| -> Checked<[u32; 3]> {
-            let [a, b, c] = match mode {
-                Mode::TriangleStrip => [ix, ix + 1 + ix % 2, ix + 2 - ix % 2],
-                Mode::TriangleFan => [ix + 1, ix + 2, 0],
-                _ => [3 * ix, 3 * ix + 1, 3 * ix + 2],
-            };
-            Ok([vertex(a)?, vertex(b)?, vertex(c)?])
+        let vertex = |at: usize| indices.as_ref().map_or(at as u32, |indices| indices.integers::<1>(at)[0]);
+        let face = |ix: usize| match mode {
+            Mode::TriangleStrip => [ix, ix + 1 + ix % 2, ix + 2 - ix % 2].map(vertex),
+            Mode::TriangleFan => [ix + 1, ix + 2, 0].map(vertex),
+            _ => [3 * ix, 3 * ix + 1, 3 * ix + 2].map(vertex),
         };
         // Strips are joined by faces without area.
         let is_stitch = |&[a, b, c]: &[u32; 3]| mode == Mode::TriangleStrip && (a == b || b == c || c == a);
-        (0..n_faces).map(face).filter(|face| !face.as_ref().is_ok_and(is_stitch)).collect()
+        let mut faces: Vec<[u32; 3]> = (0..n_faces).map(face).filter(|face| !is_stitch(face)).collect();
+        let is_in = |ix: &u32| (*ix as usize) < n_vertices;
+        if let (Some(ix), Some(indices)) = (faces.as_flattened().iter().find(|ix| !is_in(ix)), &indices) {
+            self.document.note(LEFT_OUT, format!("{}: {ix}, but there are {n_vertices} vertices", indices.path));
+            faces.retain(|face| face.iter().all(is_in));
+        }
+        Ok(faces)
     }
 
-    /// Reads positions, normals and tangents in their pose. `used` are the indices of the vertices.
+    /// Renumbers the vertices of faces so that none is left out. Returns the former index and the position of each.
+    /// Faces whose positions are not finite are removed.
+    fn places(&self, positions: &Accessor, faces: &mut Vec<[u32; 3]>) -> (Vec<u32>, Vec<Vec3>) {
+        let place = |ix| positions.numbers(ix, 0.0).map(Vec3::from_array);
+        let used = renumber(faces);
+        let places = read(self.document, &used, Vec3::NAN, place);
+        if places.iter().all(|place| place.is_finite()) {
+            return (used, places);
+        }
+        faces.retain(|face| face.iter().all(|ix| places[*ix as usize].is_finite()));
+        faces.as_flattened_mut().iter_mut().for_each(|ix| *ix = used[*ix as usize]);
+        let used = renumber(faces);
+        let places = read(self.document, &used, Vec3::NAN, place);
+        (used, places)
+    }
+
+    /// Reads normals and tangents, and moves them and the positions into their pose. `used` are the indices of the
+    /// vertices, of which the primitive has `n`.
     fn vertices(
         &self,
-        positions: &Accessor,
-        used: &[u32],
+        positions: Vec<Vec3>,
+        (used, n): (&[u32], usize),
         weights: &[f32],
         skin: Option<&Skinning>,
-    ) -> Checked<Vertices> {
-        let normals = self.find(Semantic::Normals, &[Type::Vec3], Some(positions.n))?;
-        let tangents = match &normals {
-            Some(_) => self.find(Semantic::Tangents, &[Type::Vec4], Some(positions.n))?,
-            None => None,
-        };
-        let mut vertices = Vertices {
-            positions: read(used, |ix| Ok(Vec3::from_array(positions.numbers(ix, 0.0)?)))?,
-            normals: Vec::new(),
-            tangents: Vec::new(),
-        };
-        if let Some(normals) = normals {
-            vertices.normals = read(used, |ix| Ok(Vec3::from_array(normals.numbers(ix, 0.0)?).normalize_or_zero()))?;
-        }
-        if let Some(tangents) = tangents {
-            vertices.tangents = read(used, |ix| Ok(unit_tangent(Vec4::from_array(tangents.numbers(ix, 0.0)?))))?;
-        }
-        if let Some(morph) = Morph::new(self, weights, positions.n)? {
-            vertices.change(used, |ix, vertex| morph.apply(ix, vertex))?;
-        }
-        if let Some(skin) = skin {
-            vertices.change(used, |ix, vertex| skin.apply(ix, vertex))?;
-            // The cross product of reflected vectors is the reverse of their reflected cross product.
-            for (tangent, ix) in vertices.tangents.iter_mut().zip(used) {
-                tangent.w = if skin.mirrors(*ix as usize)? { -tangent.w } else { tangent.w };
+    ) -> Vertices {
+        let document = self.document;
+        let mut vertices = Vertices { positions, normals: Vec::new(), tangents: Vec::new() };
+        if let Some(normals) = self.readable(Semantic::Normals, &[Type::Vec3], n) {
+            let normal = |ix| Ok(Vec3::from_array(normals.numbers(ix, 0.0)?).normalize_or_zero());
+            vertices.normals = read(document, used, Vec3::ZERO, normal);
+            if let Some(tangents) = self.readable(Semantic::Tangents, &[Type::Vec4], n) {
+                let tangent = |ix| Ok(unit_tangent(Vec4::from_array(tangents.numbers(ix, 0.0)?)));
+                vertices.tangents = read(document, used, Vec4::ZERO, tangent);
             }
         }
-        Ok(vertices)
+        if let Some(morph) = document.or_left_out(Morph::new(self, weights, n)).flatten() {
+            document.or_left_out(vertices.change(used, |ix, vertex| morph.apply(ix, vertex)));
+        }
+        if let Some(skin) = skin {
+            document.or_left_out(vertices.change(used, |ix, vertex| skin.apply(ix, vertex)));
+            // The cross product of reflected vectors is the reverse of their reflected cross product.
+            for (tangent, ix) in vertices.tangents.iter_mut().zip(used) {
+                tangent.w = if skin.mirrors(*ix as usize).unwrap_or(false) { -tangent.w } else { tangent.w };
+            }
+        }
+        vertices
     }
 }
 
 impl Vertices {
-    /// Changes each vertex by a function that gets its index.
+    /// Changes each vertex by a function that gets its index. Returns the first error; such vertices stay as they are.
     fn change(&mut self, used: &[u32], change: impl Fn(usize, [Vec3; 3]) -> Checked<[Vec3; 3]>) -> Checked<()> {
+        let mut result = Ok(());
         for (at, ix) in used.iter().enumerate() {
             let normal = self.normals.get(at).copied().unwrap_or_default();
             let tangent = self.tangents.get(at).copied().unwrap_or_default();
-            let [position, normal, along] = change(*ix as usize, [self.positions[at], normal, tangent.truncate()])?;
+            let changed = change(*ix as usize, [self.positions[at], normal, tangent.truncate()]);
+            let [position, normal, along] = match changed {
+                Ok(changed) => changed,
+                Err(what) => {
+                    result = result.and(Err(what));
+                    continue;
+                }
+            };
             self.positions[at] = position;
             if let Some(changed) = self.normals.get_mut(at) {
                 *changed = normal.normalize_or_zero();
@@ -236,7 +281,7 @@ impl Vertices {
                 *changed = unit_tangent(along.extend(tangent.w));
             }
         }
-        Ok(())
+        result
     }
 }
 
@@ -248,8 +293,18 @@ fn unit_tangent(tangent: Vec4) -> Vec4 {
     }
 }
 
-fn read<T>(used: &[u32], read: impl Fn(usize) -> Checked<T>) -> Checked<Vec<T>> {
-    used.iter().map(|ix| read(*ix as usize)).collect()
+/// Reads a value for each used vertex. Those that cannot be read are `missing`, which is told once.
+fn read<T: Copy>(document: &Document, used: &[u32], missing: T, read: impl Fn(usize) -> Checked<T>) -> Vec<T> {
+    let mut first = None;
+    let mut value = |ix: &u32| {
+        read(*ix as usize).unwrap_or_else(|what| {
+            first.get_or_insert(what);
+            missing
+        })
+    };
+    let values = used.iter().map(&mut value).collect();
+    first.into_iter().for_each(|what| document.note(LEFT_OUT, what));
+    values
 }
 
 /// Returns the values at the corners of faces, or `None` without values.
@@ -290,7 +345,7 @@ mod tests {
         let part = Part { primitive, targets: &[], path: String::new(), slot: 0, whole: Default::default() };
         let mut n_read = 5;
         for n in [1003, 2001] {
-            let found = mesh(&document, &part, Pose { weights: &[], skin: None, is_turned: false }, &mut n_read)
+            let (found, _) = mesh(&document, &part, Pose { weights: &[], skin: None, is_turned: false }, &mut n_read)
                 .unwrap()
                 .unwrap();
             assert_eq!((found.faces.len(), n_read), (0, n));

@@ -9,12 +9,7 @@ use super::{
     document::{Document, item},
     nodes::Nodes,
 };
-use crate::scene::model::{
-    Light,
-    error::Checked,
-    material::{colour, within},
-    mesh::MAX_COORDINATE,
-};
+use crate::scene::model::{Light, error::Checked, mesh::MAX_COORDINATE};
 
 /// Returns the lights of a scene's nodes.
 ///
@@ -22,7 +17,7 @@ use crate::scene::model::{
 /// illuminances are divided by pi.
 ///
 /// `origin` is the point of the file that is the origin of world space.
-pub(super) fn lights(document: &Document, nodes: &Nodes, origin: DVec3) -> Checked<Vec<Light>> {
+pub(super) fn lights(document: &Document, nodes: &Nodes, origin: DVec3) -> Vec<Light> {
     let list = document.root.extensions.as_ref().and_then(|extensions| extensions.khr_lights_punctual.as_ref());
     let list = list.map(|extension| &extension.lights[..]).unwrap_or_default();
     let mut lights = Vec::new();
@@ -32,21 +27,24 @@ pub(super) fn lights(document: &Document, nodes: &Nodes, origin: DVec3) -> Check
             continue;
         };
         let light_ix = extension.light.value();
-        let json = item(list, "lights", light_ix, &format_args!("nodes[{ix}].extensions.KHR_lights_punctual"))?;
+        let json = item(list, "lights", light_ix, &format_args!("nodes[{ix}].extensions.KHR_lights_punctual"));
+        let Some(json) = document.or_left_out(json) else { continue };
         if json.range.is_some_and(f32::is_finite) {
             let name = json.name.clone().unwrap_or_else(|| format!("lights[{light_ix}]"));
             document.note("ranges of lights, which are ignored, so that they shine further", name);
         }
         let world_from_node = nodes.world_from_node(ix).unwrap_or_default();
         let world_from_node = DMat4::from_translation(-origin) * world_from_node;
-        let light =
-            light(json, world_from_node).map_err(|what| format!("lights[{light_ix}] at nodes[{ix}]: {what}"))?;
-        lights.push(light);
+        let path = format!("lights[{light_ix}]");
+        let light = light(document, (json, &path), world_from_node);
+        lights.extend(document.or_left_out(light.map_err(|what| format!("{path} at nodes[{ix}]: {what}"))));
     }
-    Ok(lights)
+    lights
 }
 
-fn light(json: &punctual::Light, world_from_node: DMat4) -> Checked<Light> {
+/// Returns a light. `path` is its JSON path.
+fn light(document: &Document, (json, path): (&punctual::Light, &str), world_from_node: DMat4) -> Checked<Light> {
+    let within = |name: &str, value: f32, min: f32, max: f32| document.clamped(path, name, value, (min, max));
     let position = world_from_node.w_axis.truncate().as_vec3();
     if position.abs().max_element() > MAX_COORDINATE {
         return Err(format!("it lies at {:?}, beyond {MAX_COORDINATE:e}", position.to_array()));
@@ -55,8 +53,8 @@ fn light(json: &punctual::Light, world_from_node: DMat4) -> Checked<Light> {
         let towards = world_from_node.transform_vector3(DVec3::NEG_Z).try_normalize();
         towards.map(DVec3::as_vec3).ok_or("its node's scale leaves it no direction")
     };
-    let colour = colour("color", Some(json.color), Vec3::ZERO)?;
-    let power = colour * within("intensity", json.intensity, 0.0, f32::MAX)? / PI;
+    let colour = Vec3::from_array(json.color.map(|part| within("color", part, 0.0, f32::MAX)));
+    let power = colour * within("intensity", json.intensity, 0.0, f32::MAX) / PI;
     if !power.is_finite() {
         return Err("its intensity is not finite".to_owned());
     }
@@ -65,8 +63,8 @@ fn light(json: &punctual::Light, world_from_node: DMat4) -> Checked<Light> {
         Valid(punctual::Type::Point) => Ok(Light::Point { position, intensity: power }),
         Valid(punctual::Type::Spot) => {
             let spot = json.spot.as_ref().ok_or("it lacks `spot`")?;
-            let outer = within("outerConeAngle", spot.outer_cone_angle, 0.0, FRAC_PI_2 + 1e-6)?;
-            let inner = within("innerConeAngle", spot.inner_cone_angle, 0.0, outer)?;
+            let outer = within("outerConeAngle", spot.outer_cone_angle, 0.0, FRAC_PI_2 + 1e-6);
+            let inner = within("innerConeAngle", spot.inner_cone_angle, 0.0, outer);
             let (inner_cos, outer_cos) = (inner.cos(), outer.cos().max(0.0));
             Ok(Light::Spot { position, towards: towards()?, intensity: power, inner_cos, outer_cos })
         }

@@ -10,10 +10,7 @@ use super::{
     textures::{TextureUse, Textures},
 };
 use crate::scene::model::{
-    Alpha, Channel, Clearcoat, Lobes, Maps, Material, MaterialChoice, Microfacet, Sheen,
-    error::Checked,
-    material::{colour, within},
-    preset::is_replaced,
+    Alpha, Channel, Clearcoat, Lobes, Maps, Material, MaterialChoice, Microfacet, Sheen, preset::is_replaced,
 };
 
 /// Largest index of refraction. A material of index 0, which stands for a perfect reflector, has it, too.
@@ -38,26 +35,28 @@ impl<'a> Materials<'a> {
 
     /// Returns the index of a primitive's material, and reads it at the first call. `path` is the primitive's JSON
     /// path.
-    pub fn index(&mut self, index: Option<Index<json::Material>>, path: &str) -> Checked<u32> {
+    pub fn index(&mut self, index: Option<Index<json::Material>>, path: &str) -> u32 {
         let key = index.map(|index| index.value());
         if let Some(ix) = self.known.get(&key) {
-            return Ok(*ix);
+            return *ix;
         }
         let material = match key {
             Some(ix) => {
-                let json = item(&self.document.root.materials, "materials", ix, &format_args!("{path}.material"))?;
+                let from = format_args!("{path}.material");
+                let json = self.document.or_left_out(item(&self.document.root.materials, "materials", ix, &from));
+                let Some(json) = json else { return self.index(None, path) };
                 let reader = Reader { document: self.document, path: format!("materials[{ix}]") };
-                reader.material(json, (&mut self.textures, self.replaced))?
+                reader.material(json, (&mut self.textures, self.replaced))
             }
             None => {
                 let reader = Reader { document: self.document, path: "(default of glTF)".to_owned() };
-                reader.material(&json::Material::default(), (&mut self.textures, self.replaced))?
+                reader.material(&json::Material::default(), (&mut self.textures, self.replaced))
             }
         };
         self.materials.push(material);
         let ix = (self.materials.len() - 1) as u32;
         self.known.insert(key, ix);
-        Ok(ix)
+        ix
     }
 }
 
@@ -69,176 +68,166 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn material(
-        &self,
-        json: &json::Material,
-        (textures, replaced): (&mut Textures, &[MaterialChoice]),
-    ) -> Checked<Material> {
+    fn material(&self, json: &json::Material, (textures, replaced): (&mut Textures, &[MaterialChoice])) -> Material {
         let name = json.name.clone().unwrap_or_else(|| self.path.clone());
-        let glossy: Option<SpecularGlossiness> = self.extension(json, glossiness::NAME)?;
+        let glossy: Option<SpecularGlossiness> = self.extension(json, glossiness::NAME);
         let maps = match is_replaced(replaced, &name) {
             true => Maps::default(),
-            false => self.maps(json, glossy.as_ref(), textures)?,
+            false => self.maps(json, glossy.as_ref(), textures),
         };
         let pbr = &json.pbr_metallic_roughness;
         let [r, g, b, opacity] = glossy.as_ref().map_or(pbr.base_color_factor.0, |glossy| glossy.diffuse_factor);
-        let kd = self.colour("baseColorFactor", [r, g, b])?;
+        let kd = self.colour("baseColorFactor", [r, g, b]);
         let extensions = json.extensions.as_ref();
         let ior = extensions.and_then(|it| it.ior.as_ref()).map_or(1.5, |it| it.ior.0);
         let strength = extensions.and_then(|it| it.emissive_strength.as_ref());
         let strength = strength.map_or(1.0, |it| it.emissive_strength.0);
         let is_unlit = extensions.is_some_and(|it| it.unlit.is_some());
-        let ke = self.colour("emissiveFactor", json.emissive_factor.0)?
-            * self.within("emissiveStrength", strength, 0.0, f32::MAX)?;
-        Ok(Material {
+        let ke = self.colour("emissiveFactor", json.emissive_factor.0)
+            * self.within("emissiveStrength", strength, 0.0, f32::MAX);
+        Material {
             name,
             ka: kd,
             kd,
             ks: match &glossy {
-                Some(glossy) => SPECULAR_SCALE * self.colour("specularFactor", glossy.specular_factor)?,
-                None => self.specular(json)?,
+                Some(glossy) => SPECULAR_SCALE * self.colour("specularFactor", glossy.specular_factor),
+                None => self.specular(json),
             },
             // An unlit material shows its base colour alone.
             ke: if is_unlit { Vec3::ZERO } else { ke },
             tf: Vec3::ONE,
             ns: 32.0,
-            ni: if ior == 0.0 { MAX_IOR } else { self.within("ior", ior, 1.0, MAX_IOR)? },
-            d: self.within("baseColorFactor[3]", opacity, 0.0, 1.0)?,
+            ni: if ior == 0.0 { MAX_IOR } else { self.within("ior", ior, 1.0, MAX_IOR) },
+            d: self.within("baseColorFactor[3]", opacity, 0.0, 1.0),
             lobes: Lobes::default(),
             microfacet: Some(match &glossy {
-                Some(glossy) => self.dielectric(glossy)?,
-                None => self.microfacet(json)?,
+                Some(glossy) => self.dielectric(glossy),
+                None => self.microfacet(json),
             }),
             alpha: match json.alpha_mode {
-                Valid(AlphaMode::Opaque) => Alpha::Opaque,
                 Valid(AlphaMode::Blend) => Alpha::Blend,
                 Valid(AlphaMode::Mask) => {
                     let cutoff = json.alpha_cutoff.unwrap_or_default().0;
-                    Alpha::Mask(self.within("alphaCutoff", cutoff, 0.0, f32::MAX)?)
+                    Alpha::Mask(self.within("alphaCutoff", cutoff, 0.0, f32::MAX))
                 }
-                _ => return Err(format!("{}: its alphaMode is none of OPAQUE, MASK and BLEND", self.path)),
+                _ => Alpha::Opaque,
             },
             is_unlit,
             is_double_sided: json.double_sided,
-            clearcoat: self.clearcoat(json)?,
-            sheen: self.sheen(json)?,
+            clearcoat: self.clearcoat(json),
+            sheen: self.sheen(json),
             maps,
-        })
+        }
     }
 
-    fn specular(&self, json: &json::Material) -> Checked<Vec3> {
+    fn specular(&self, json: &json::Material) -> Vec3 {
         let extensions = json.extensions.as_ref();
-        let Some(specular) = extensions.and_then(|it| it.specular.as_ref()) else { return Ok(Vec3::ONE) };
-        let factor = self.within("specularFactor", specular.specular_factor.0, 0.0, 1.0)?;
-        Ok(factor * self.colour("specularColorFactor", specular.specular_color_factor.0)?)
+        let Some(specular) = extensions.and_then(|it| it.specular.as_ref()) else { return Vec3::ONE };
+        let factor = self.within("specularFactor", specular.specular_factor.0, 0.0, 1.0);
+        factor * self.colour("specularColorFactor", specular.specular_color_factor.0)
     }
 
-    fn dielectric(&self, glossy: &SpecularGlossiness) -> Checked<Microfacet> {
-        let glossiness = self.within("glossinessFactor", glossy.glossiness_factor, 0.0, 1.0)?;
+    fn dielectric(&self, glossy: &SpecularGlossiness) -> Microfacet {
+        let glossiness = self.within("glossinessFactor", glossy.glossiness_factor, 0.0, 1.0);
         // The image of the roughness has the factor.
         let roughness = if glossy.specular_glossiness_texture.is_some() { 1.0 } else { 1.0 - glossiness };
-        Ok(Microfacet { metallic: 0.0, roughness, ..Microfacet::default() })
+        Microfacet { metallic: 0.0, roughness, ..Microfacet::default() }
     }
 
-    fn microfacet(&self, json: &json::Material) -> Checked<Microfacet> {
+    fn microfacet(&self, json: &json::Material) -> Microfacet {
         let pbr = &json.pbr_metallic_roughness;
         let mut microfacet = Microfacet {
-            metallic: self.within("metallicFactor", pbr.metallic_factor.0, 0.0, 1.0)?,
-            roughness: self.within("roughnessFactor", pbr.roughness_factor.0, 0.0, 1.0)?,
+            metallic: self.within("metallicFactor", pbr.metallic_factor.0, 0.0, 1.0),
+            roughness: self.within("roughnessFactor", pbr.roughness_factor.0, 0.0, 1.0),
             ..Microfacet::default()
         };
-        let Some(extensions) = &json.extensions else { return Ok(microfacet) };
+        let Some(extensions) = &json.extensions else { return microfacet };
         if let Some(transmission) = &extensions.transmission {
             let factor = transmission.transmission_factor.0;
-            microfacet.transmission = self.within("transmissionFactor", factor, 0.0, 1.0)?;
+            microfacet.transmission = self.within("transmissionFactor", factor, 0.0, 1.0);
         }
         if let Some(volume) = &extensions.volume {
             let distance = volume.attenuation_distance.0;
-            microfacet.is_solid = self.within("thicknessFactor", volume.thickness_factor.0, 0.0, f32::MAX)? > 0.0;
+            microfacet.is_solid = self.within("thicknessFactor", volume.thickness_factor.0, 0.0, f32::MAX) > 0.0;
             microfacet.attenuation_distance =
-                self.within("attenuationDistance", distance, f32::MIN_POSITIVE, f32::INFINITY)?;
-            microfacet.attenuation_colour = self.colour("attenuationColor", volume.attenuation_color.0)?;
+                self.within("attenuationDistance", distance, f32::MIN_POSITIVE, f32::INFINITY);
+            microfacet.attenuation_colour = self.colour("attenuationColor", volume.attenuation_color.0);
         }
-        Ok(microfacet)
+        microfacet
     }
 
-    fn clearcoat(&self, json: &json::Material) -> Checked<Clearcoat> {
-        let raw = self.extension(json, "KHR_materials_clearcoat")?;
-        let Some(Raw { factor, roughness, .. }) = raw else { return Ok(Clearcoat::default()) };
+    fn clearcoat(&self, json: &json::Material) -> Clearcoat {
+        let raw = self.extension(json, "KHR_materials_clearcoat");
+        let Some(Raw { factor, roughness, .. }) = raw else { return Clearcoat::default() };
         if factor > 0.0 {
             self.document.note("layers of clearcoat, which the integrator whitted does not show", &self.path);
         }
-        Ok(Clearcoat {
-            factor: self.within("clearcoatFactor", factor, 0.0, 1.0)?,
-            roughness: self.within("clearcoatRoughnessFactor", roughness, 0.0, 1.0)?,
-        })
+        Clearcoat {
+            factor: self.within("clearcoatFactor", factor, 0.0, 1.0),
+            roughness: self.within("clearcoatRoughnessFactor", roughness, 0.0, 1.0),
+        }
     }
 
-    fn sheen(&self, json: &json::Material) -> Checked<Sheen> {
-        let raw = self.extension(json, "KHR_materials_sheen")?;
-        let Some(Raw { colour, sheen_roughness, .. }) = raw else { return Ok(Sheen::default()) };
+    fn sheen(&self, json: &json::Material) -> Sheen {
+        let raw = self.extension(json, "KHR_materials_sheen");
+        let Some(Raw { colour, sheen_roughness, .. }) = raw else { return Sheen::default() };
         if colour != [0.0; 3] {
             self.document.note("sheen, which the integrator whitted does not show", &self.path);
         }
-        Ok(Sheen {
-            colour: self.colour("sheenColorFactor", colour)?,
-            roughness: self.within("sheenRoughnessFactor", sheen_roughness, 0.0, 1.0)?,
-        })
+        Sheen {
+            colour: self.colour("sheenColorFactor", colour),
+            roughness: self.within("sheenRoughnessFactor", sheen_roughness, 0.0, 1.0),
+        }
     }
 
     /// Returns an extension that the crate `gltf` does not know.
-    fn extension<T: serde::de::DeserializeOwned>(&self, json: &json::Material, name: &str) -> Checked<Option<T>> {
+    fn extension<T: serde::de::DeserializeOwned>(&self, json: &json::Material, name: &str) -> Option<T> {
         let value = json.extensions.as_ref().and_then(|it| it.others.get(name));
         let read = |value: &Value| json::deserialize::from_value(value.clone());
-        value.map(read).transpose().map_err(|error| format!("{}.extensions.{name}: {error}", self.path))
+        let read = value.map(read)?.map_err(|error| format!("{}.extensions.{name}: {error}", self.path));
+        self.document.or_left_out(read)
     }
 
-    fn maps(
-        &self,
-        json: &json::Material,
-        glossy: Option<&SpecularGlossiness>,
-        textures: &mut Textures,
-    ) -> Checked<Maps> {
+    fn maps(&self, json: &json::Material, glossy: Option<&SpecularGlossiness>, textures: &mut Textures) -> Maps {
         let pbr = &json.pbr_metallic_roughness;
         let mut map = |info: &Option<json::texture::Info>, name: &str, channel: Option<Channel>| {
             let path = format!("{}.{name}", self.path);
-            info.as_ref().map_or(Ok(None), |info| textures.texture(&TextureUse::of(info), &path, channel))
+            info.as_ref().and_then(|info| textures.texture(&TextureUse::of(info), &path, channel))
         };
         let mut maps = Maps {
-            base_colour: map(&pbr.base_color_texture, "baseColorTexture", None)?,
-            roughness: map(&pbr.metallic_roughness_texture, "metallicRoughnessTexture", Some(Channel::Green))?,
-            metallic: map(&pbr.metallic_roughness_texture, "metallicRoughnessTexture", Some(Channel::Blue))?,
-            emission: map(&json.emissive_texture, "emissiveTexture", None)?,
+            base_colour: map(&pbr.base_color_texture, "baseColorTexture", None),
+            roughness: map(&pbr.metallic_roughness_texture, "metallicRoughnessTexture", Some(Channel::Green)),
+            metallic: map(&pbr.metallic_roughness_texture, "metallicRoughnessTexture", Some(Channel::Blue)),
+            emission: map(&json.emissive_texture, "emissiveTexture", None),
             ..Maps::default()
         };
         if let Some(glossy) = glossy {
-            maps.base_colour = map(&glossy.diffuse_texture, "diffuseTexture", None)?;
+            maps.base_colour = map(&glossy.diffuse_texture, "diffuseTexture", None);
             (maps.roughness, maps.metallic) = (None, None);
-            maps.specular = map(&glossy.specular_glossiness_texture, "specularGlossinessTexture", None)?;
+            maps.specular = map(&glossy.specular_glossiness_texture, "specularGlossinessTexture", None);
             if let Some(info) = &glossy.specular_glossiness_texture {
                 let (path, factor) = (format!("{}.specularGlossinessTexture", self.path), glossy.glossiness_factor);
-                maps.roughness = textures.roughness(&TextureUse::of(info), &path, factor.clamp(0.0, 1.0))?;
+                maps.roughness = textures.roughness(&TextureUse::of(info), &path, factor.clamp(0.0, 1.0));
             }
         } else if let Some(extensions) = &json.extensions {
             if let Some(specular) = &extensions.specular {
-                maps.specular_factor = map(&specular.specular_texture, "specularTexture", Some(Channel::Alpha))?;
-                maps.specular = map(&specular.specular_color_texture, "specularColorTexture", None)?;
+                maps.specular_factor = map(&specular.specular_texture, "specularTexture", Some(Channel::Alpha));
+                maps.specular = map(&specular.specular_color_texture, "specularColorTexture", None);
             }
             if let Some(transmission) = &extensions.transmission {
                 let texture = &transmission.transmission_texture;
-                maps.transmission = map(texture, "transmissionTexture", Some(Channel::Red))?;
+                maps.transmission = map(texture, "transmissionTexture", Some(Channel::Red));
             }
         }
         if let Some(normal) = &json.normal_texture {
             let path = format!("{}.normalTexture", self.path);
-            maps.normal = textures.texture(&TextureUse::of_normal(normal, &path)?, &path, Some(Channel::Red))?;
-            maps.normal_scale = self.within("normalTexture.scale", normal.scale, f32::MIN, f32::MAX)?;
+            maps.normal = textures.texture(&textures.of_normal(normal, &path), &path, Some(Channel::Red));
+            maps.normal_scale = self.within("normalTexture.scale", normal.scale, f32::MIN, f32::MAX);
         }
         if let Some(occlusion) = &json.occlusion_texture {
             let path = format!("{}.occlusionTexture", self.path);
-            maps.occlusion =
-                textures.texture(&TextureUse::of_occlusion(occlusion, &path)?, &path, Some(Channel::Red))?;
-            maps.occlusion_strength = self.within("occlusionTexture.strength", occlusion.strength.0, 0.0, 1.0)?;
+            maps.occlusion = textures.texture(&textures.of_occlusion(occlusion, &path), &path, Some(Channel::Red));
+            maps.occlusion_strength = self.within("occlusionTexture.strength", occlusion.strength.0, 0.0, 1.0);
         }
         if json
             .extensions
@@ -247,15 +236,16 @@ impl Reader<'_> {
         {
             self.document.note("textures of thickness, which are not needed to trace solids", &self.path);
         }
-        Ok(maps)
+        maps
     }
 
-    fn colour(&self, name: &str, rgb: [f32; 3]) -> Checked<Vec3> {
-        colour(name, Some(rgb), Vec3::ZERO).map_err(|what| format!("{}: {what}", self.path))
+    /// Returns a colour. Parts below 0 or without a value are clamped.
+    fn colour(&self, name: &str, rgb: [f32; 3]) -> Vec3 {
+        Vec3::from_array(rgb.map(|part| self.within(name, part, 0.0, f32::MAX)))
     }
 
-    fn within(&self, name: &str, value: f32, min: f32, max: f32) -> Checked<f32> {
-        within(name, value, min, max).map_err(|what| format!("{}: {what}", self.path))
+    fn within(&self, name: &str, value: f32, min: f32, max: f32) -> f32 {
+        self.document.clamped(&self.path, name, value, (min, max))
     }
 }
 

@@ -12,10 +12,12 @@ mod camera_start;
 mod cameras;
 mod deform;
 mod document;
+mod draco;
 mod geometry;
 mod glb;
 mod glossiness;
 mod instancing;
+mod lenient;
 mod lights;
 mod materials;
 mod meshopt;
@@ -42,10 +44,7 @@ use super::image::MAX_PIXELS;
 use crate::{
     scene::{
         files::outside::Access,
-        meshes::{
-            coincident,
-            needs::{MeshSize, require_for_mesh},
-        },
+        meshes::coincident,
         model::{
             Camera, Instance, Light, LoadOptions, MaterialChoice, Mesh, Scene, SceneError, Transform, Up,
             error::Checked,
@@ -72,8 +71,8 @@ pub(crate) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result
     }
     let bounds = scene.bounds();
     extent::check(path, bounds)?;
-    scene.lights = lights::lights(&document, &nodes, scene.origin).map_err(failed)?;
-    scene.cameras = cameras::cameras(&document, &nodes, (bounds, scene.origin)).map_err(failed)?;
+    scene.lights = lights::lights(&document, &nodes, scene.origin);
+    scene.cameras = cameras::cameras(&document, &nodes, (bounds, scene.origin));
     let first = camera_that_sees(path, &scene, (bounds, options));
     let lacks_camera = first.is_none();
     scene.camera = first.unwrap_or(scene.camera);
@@ -160,6 +159,9 @@ fn read(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<Document, 
     Ok(document)
 }
 
+/// Begins the warning that lists nodes which flatten their meshes.
+const FLATTENED: &str = "meshes that their nodes flatten, which are left out";
+
 /// What makes two instances share a mesh: the mesh's index, the skin's, whether its faces are turned, and the bits of
 /// the weights of morph targets.
 type MeshKey = (usize, Option<usize>, bool, Vec<u32>);
@@ -169,6 +171,8 @@ type MeshKey = (usize, Option<usize>, bool, Vec<u32>);
 struct Known {
     mesh_ix: usize,
     materials: Vec<u32>,
+    /// Whether its vertices are in world space, where a skin moves them.
+    is_skinned: bool,
     /// The point of world space that is the origin of a mesh with a skin.
     origin: DVec3,
 }
@@ -204,26 +208,27 @@ impl<'a> Loader<'a> {
 
     fn load(mut self, path: &Path) -> Checked<Scene> {
         let mut scene = Scene::empty(path);
-        let mut n_placed = self.before.n_triangles;
         let meter = self.document.progress.begin(Work::Reading, self.n_primitives());
         for &ix in &self.nodes.shown {
             let Some(instance) = self.instance(ix, &meter)? else { continue };
             let mesh = &self.meshes[instance.mesh_ix];
-            let places = instancing::places(self.document, ix)?;
-            let n_faces = (mesh.faces.len() as u64).saturating_mul(places.as_ref().map_or(1, |places| places.n as u64));
-            n_placed = n_placed.saturating_add(n_faces);
-            require_for_mesh(n_placed, &MeshSize::default())?;
+            let places = self.document.or_left_out(instancing::places(self.document, ix)).flatten();
             let transforms = match &places {
-                Some(places) => self.instanced(ix, places)?,
+                Some(places) => self.instanced(ix, places),
                 None => vec![instance.transform.clone()],
             };
+            let bounds = mesh.bounds();
             for transform in transforms {
-                mesh.placed(&transform).map_err(|what| format!("nodes[{ix}]: {what}"))?;
-                scene.instances.push(Instance { transform, ..instance.clone() });
+                let placed = mesh.check_place(&transform, bounds).map_err(|what| format!("nodes[{ix}]: {what}"));
+                if self.document.or_left_out(placed).is_some() {
+                    scene.instances.push(Instance { transform, ..instance.clone() });
+                }
             }
         }
         if scene.instances.is_empty() {
-            return Err("has no triangles: points and lines are not shown".to_owned());
+            let why = self.document.first_left_out();
+            let why = why.unwrap_or_else(|| "points and lines are not shown".to_owned());
+            return Err(format!("has no triangles: {why}"));
         }
         scene.meshes = self.meshes;
         scene.materials = self.materials.materials;
@@ -232,11 +237,11 @@ impl<'a> Loader<'a> {
     }
 
     /// Returns the transforms of the instances of a node. Those that flatten the mesh are left out.
-    fn instanced(&self, node_ix: usize, places: &Places) -> Checked<Vec<Transform>> {
+    fn instanced(&self, node_ix: usize, places: &Places) -> Vec<Transform> {
         let world_from_node = self.nodes.world_from_node(node_ix).unwrap_or_default();
-        let transform =
-            |ix: usize| places.node_from_instance(ix).map(|it| Transform::of_affine(world_from_node * it).ok());
-        (0..places.n).filter_map(|ix| transform(ix).transpose()).collect()
+        let place = |ix: usize| self.document.or_left_out(places.node_from_instance(ix));
+        let transform = |ix: usize| Transform::of_affine(world_from_node * place(ix)?).ok();
+        (0..places.n).filter_map(transform).collect()
     }
 
     /// Returns the number of the primitives that are read if each mesh is read once.
@@ -257,17 +262,13 @@ impl<'a> Loader<'a> {
         // The joints of a skin place it. Its node does not, but as with every mesh, the node says which side of the
         // faces is outside: Blender writes vertices that are mirrored already below a node that mirrors.
         let is_turned = node.skin.is_some() && world_from_node.determinant() < 0.0;
-        let transform = match node.skin {
-            Some(_) => Transform::IDENTITY,
-            None => match Transform::of_affine(world_from_node) {
-                Ok(transform) => transform,
-                Err(_) => {
-                    document.note("meshes that their nodes flatten, which are left out", format!("nodes[{node_ix}]"));
-                    return Ok(None);
-                }
-            },
-        };
-        let json = item(&document.root.meshes, "meshes", mesh.value(), &format_args!("nodes[{node_ix}].mesh"))?;
+        let transform = Transform::of_affine(world_from_node).ok();
+        if transform.is_none() && node.skin.is_none() {
+            document.note(FLATTENED, format!("nodes[{node_ix}]"));
+            return Ok(None);
+        }
+        let json = item(&document.root.meshes, "meshes", mesh.value(), &format_args!("nodes[{node_ix}].mesh"));
+        let Some(json) = document.or_left_out(json) else { return Ok(None) };
         let weights = node.weights.as_ref().or(json.weights.as_ref()).map(|weights| &weights[..]).unwrap_or_default();
         let bits = weights.iter().map(|weight| weight.to_bits()).collect();
         let key = (mesh.value(), node.skin.map(|skin| skin.value()), is_turned, bits);
@@ -279,7 +280,13 @@ impl<'a> Loader<'a> {
                 known
             }
         };
-        Ok(known.map(|Known { mesh_ix, materials, origin }| {
+        let is_flattened = |known: &Known| !known.is_skinned && transform.is_none();
+        if known.as_ref().is_some_and(is_flattened) {
+            document.note(FLATTENED, format!("nodes[{node_ix}]"));
+            return Ok(None);
+        }
+        Ok(known.map(|Known { mesh_ix, materials, is_skinned, origin }| {
+            let transform = transform.filter(|_| !is_skinned).unwrap_or(Transform::IDENTITY);
             let transform = if origin == DVec3::ZERO { transform } else { transform.moved(origin) };
             Instance { mesh_ix, transform, materials }
         }))
@@ -295,23 +302,26 @@ impl<'a> Loader<'a> {
         (weights, is_turned): (&[f32], bool),
     ) -> Checked<Option<Known>> {
         let document = self.document;
-        let mut skin = node.skin.map(|skin| self.skin(skin.value(), node_ix)).transpose()?;
-        if weights.iter().any(|weight| !weight.is_finite()) {
-            return Err(format!("nodes[{node_ix}]: a weight of its morph targets is not finite"));
-        }
-        let pose = Pose { weights, skin: skin.as_ref(), is_turned };
-        let (mut whole, mut materials, mut parts) = (Mesh::default(), Vec::new(), Vec::new());
         let primitives = &document.root.meshes[mesh_ix].primitives;
+        let skin = node.skin.map(|skin| match primitives.iter().any(deform::has_joints) {
+            true => self.skin(skin.value(), node_ix),
+            false => Err(format!("nodes[{node_ix}].skin: meshes[{mesh_ix}] has no joints")),
+        });
+        let mut skin = skin.and_then(|skin| document.or_left_out(skin));
+        let is_turned = is_turned && skin.is_some();
+        let pose = Pose { weights, skin: skin.as_ref(), is_turned };
+        let (mut whole, mut materials, mut parts, mut is_skinned) = (Mesh::default(), Vec::new(), Vec::new(), false);
         let attributes = geometry::attributes_of(primitives);
         for (ix, primitive) in primitives.iter().enumerate() {
             let path = format!("meshes[{mesh_ix}].primitives[{ix}]");
             self.note_morphs(primitive, &path);
-            let material = if self.has_materials { self.materials.index(primitive.material, &path)? } else { 0 };
+            let material = if self.has_materials { self.materials.index(primitive.material, &path) } else { 0 };
             let targets = document.morph_targets.of(mesh_ix, ix);
             let part = Part { primitive, targets, path, slot: materials.len() as u32, whole: attributes };
             let mesh = geometry::mesh(document, &part, pose, &mut self.n_read)?;
             meter.add(1);
-            let Some(mesh) = mesh else { continue };
+            let Some((mesh, is_moved)) = mesh else { continue };
+            is_skinned |= is_moved;
             materials.push(material);
             whole.append(mesh);
             parts.push(part);
@@ -320,19 +330,19 @@ impl<'a> Loader<'a> {
             return Ok(None);
         }
         let far = MeshOrigin::Near.second(&whole.positions);
-        let origin = far.filter(|_| skin.is_some()).unwrap_or_default();
+        let origin = far.filter(|_| is_skinned).unwrap_or_default();
         if let (Some(skin), true) = (&mut skin, origin != DVec3::ZERO) {
             skin.origin = origin;
             let (pose, mut n_read) = (Pose { weights, skin: Some(skin), is_turned }, 0);
             whole = Mesh::default();
             for part in &parts {
-                geometry::mesh(document, part, pose, &mut n_read)?.into_iter().for_each(|mesh| whole.append(mesh));
+                geometry::mesh(document, part, pose, &mut n_read)?.into_iter().for_each(|(mesh, _)| whole.append(mesh));
             }
         }
         coincident::separate(&mut whole);
         whole.name = document.root.meshes[mesh_ix].name.clone().unwrap_or_default();
         self.meshes.push(whole);
-        Ok(Some(Known { mesh_ix: self.meshes.len() - 1, materials, origin }))
+        Ok(Some(Known { mesh_ix: self.meshes.len() - 1, materials, is_skinned, origin }))
     }
 
     /// Returns a skin in the pose of its joints.
@@ -342,7 +352,10 @@ impl<'a> Loader<'a> {
             let transform = self.nodes.world_from_node(joint.value());
             transform.ok_or_else(|| format!("skins[{skin_ix}].joints[{ix}]: nodes[{joint}] is not in the scene"))
         };
-        let joints = skin.joints.iter().enumerate().map(joint).collect::<Checked<_>>()?;
+        let joints = skin.joints.iter().enumerate().map(joint).collect::<Checked<Vec<_>>>()?;
+        if joints.is_empty() {
+            return Err(format!("skins[{skin_ix}]: has no joints"));
+        }
         let name = skin.name.clone().unwrap_or_else(|| format!("skins[{skin_ix}]"));
         self.document.note("skins, which are shown in their rest pose", name);
         Skin::new(self.document, skin_ix, joints)

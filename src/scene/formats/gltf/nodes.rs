@@ -7,7 +7,7 @@ use gltf::json::{self, Index, Node};
 
 use super::{
     camera_start::camera_starts,
-    document::{Document, item},
+    document::{Document, LEFT_OUT, item},
 };
 use crate::scene::model::error::Checked;
 
@@ -23,8 +23,10 @@ impl Nodes {
     /// Follows the nodes of a scene: the one that `name` says by its name or index, else the default one, else the
     /// first. A document without scenes shows all nodes. Animated cameras are where their animations begin.
     ///
+    /// A node that does not exist, and the second way to a node, are left out.
+    ///
     /// # Errors
-    /// The scene or a node does not exist, or a node is reached twice: the nodes are not a tree.
+    /// There is no scene `name`.
     pub fn new(document: &Document, name: Option<&str>) -> Checked<Self> {
         let mut all = Cow::Borrowed(&document.root.nodes);
         let starts = camera_starts(document);
@@ -37,10 +39,10 @@ impl Nodes {
             Some(ix) => indices(&document.root.scenes[ix].nodes),
             None => parentless(all),
         };
-        nodes.shown = nodes.walk(all, roots, "scenes")?;
+        nodes.shown = nodes.walk(document, all, (roots, true));
         // Joints of skins may hang on nodes that the scene does not show.
         let others = parentless(all).into_iter().filter(|ix| nodes.world_from_node[*ix].is_none()).collect();
-        nodes.walk(all, others, "nodes")?;
+        nodes.walk(document, all, (others, false));
         Ok(nodes)
     }
 
@@ -49,23 +51,28 @@ impl Nodes {
         self.world_from_node.get(ix).copied().flatten()
     }
 
-    /// Visits nodes and all below them, and returns them in the order of the visits.
-    fn walk(&mut self, all: &[Node], roots: Vec<usize>, from: &str) -> Checked<Vec<usize>> {
+    /// Visits nodes and all below them, and returns them in the order of the visits. Nodes that are not shown may lead
+    /// to shown ones: they are left over from editing.
+    fn walk(&mut self, document: &Document, all: &[Node], (roots, is_shown): (Vec<usize>, bool)) -> Vec<usize> {
         let mut visited = Vec::new();
         let mut pending: Vec<(usize, Option<usize>)> = roots.into_iter().rev().map(|root| (root, None)).collect();
         while let Some((ix, parent)) = pending.pop() {
-            let from = parent.map_or(from.to_owned(), |parent| format!("nodes[{parent}].children"));
-            let node = item(all, "nodes", ix, &from)?;
+            let from = parent.map_or("scenes".to_owned(), |parent| format!("nodes[{parent}].children"));
+            let Some(node) = document.or_left_out(item(all, "nodes", ix, &from)) else { continue };
             if self.world_from_node[ix].is_some() {
-                return Err(format!("{from}: leads to nodes[{ix}] a second time, but nodes must be a tree"));
+                if is_shown {
+                    document.note(LEFT_OUT, format!("{from}: leads to nodes[{ix}] a second time"));
+                }
+                continue;
             }
             let world_from_parent = parent.and_then(|parent| self.world_from_node[parent]).unwrap_or_default();
-            self.world_from_node[ix] = Some(world_from_parent * parent_from_node(node, ix)?);
+            let parent_from_node = document.or_left_out(parent_from_node(node, ix)).unwrap_or_default();
+            self.world_from_node[ix] = Some(world_from_parent * parent_from_node);
             visited.push(ix);
             let children = indices(node.children.as_deref().unwrap_or_default());
             pending.extend(children.into_iter().rev().map(|child| (child, Some(ix))));
         }
-        Ok(visited)
+        visited
     }
 }
 
@@ -84,8 +91,10 @@ fn scene(document: &Document, name: Option<&str>) -> Checked<Option<usize>> {
         });
     }
     match document.root.scene {
-        Some(index) => item(scenes, "scenes", index.value(), &"scene").map(|_| Some(index.value())),
-        None => Ok((!scenes.is_empty()).then_some(0)),
+        Some(index) if document.or_left_out(item(scenes, "scenes", index.value(), &"scene")).is_some() => {
+            Ok(Some(index.value()))
+        }
+        _ => Ok((!scenes.is_empty()).then_some(0)),
     }
 }
 

@@ -11,12 +11,12 @@ use gltf::json::{
 use hashbrown::HashMap;
 
 use super::{
-    document::{Document, ImageSource, item},
+    document::{Document, ImageSource, LEFT_OUT, item},
     glossiness::turn_into_roughness,
     uri::is_data,
 };
 use crate::scene::{
-    formats::image::{Encoded, decode_all},
+    formats::image::{Encoded, decode_all, has_header},
     model::{Channel, Encoding, Image, Material, Texture, Wrap, error::Checked},
 };
 
@@ -32,26 +32,6 @@ impl TextureUse {
         let transform = info.extensions.as_ref().and_then(|extensions| extensions.texture_transform.clone());
         Self { index: info.index, uv_set: info.tex_coord, transform }
     }
-
-    pub fn of_normal(texture: &NormalTexture, path: &str) -> Checked<Self> {
-        let transform = raw_transform(texture.extensions.as_ref().map(|extensions| &extensions.others), path)?;
-        Ok(Self { index: texture.index, uv_set: texture.tex_coord, transform })
-    }
-
-    pub fn of_occlusion(texture: &OcclusionTexture, path: &str) -> Checked<Self> {
-        let transform = raw_transform(texture.extensions.as_ref().map(|extensions| &extensions.others), path)?;
-        Ok(Self { index: texture.index, uv_set: texture.tex_coord, transform })
-    }
-}
-
-/// Returns the transform of a texture whose extensions the crate `gltf` does not read.
-fn raw_transform(
-    extensions: Option<&serde_json::Map<String, json::Value>>,
-    path: &str,
-) -> Checked<Option<TextureTransform>> {
-    let value = extensions.and_then(|extensions| extensions.get("KHR_texture_transform"));
-    let read = value.map(|value| json::deserialize::from_value(value.clone())).transpose();
-    read.map_err(|error| format!("{path}.extensions.KHR_texture_transform: {error}"))
 }
 
 /// The images that textures use, in the order in which they are met first.
@@ -61,6 +41,8 @@ pub(super) struct Textures<'a> {
     /// Index into `encoded` by the place of the image's bytes, which several images can share; `None` if they cannot be
     /// read.
     known: HashMap<ImageSource, Option<u32>>,
+    /// The same by the index of the image in the document.
+    known_images: HashMap<usize, Option<u32>>,
     /// Index into `encoded` of the images of roughness, by the index of the image of glossiness and the bits of the
     /// factor of glossiness.
     rough: HashMap<(u32, u32), u32>,
@@ -68,12 +50,44 @@ pub(super) struct Textures<'a> {
 
 impl<'a> Textures<'a> {
     pub fn new(document: &'a Document) -> Self {
-        Self { document, encoded: Vec::new(), known: HashMap::new(), rough: HashMap::new() }
+        Self {
+            document,
+            encoded: Vec::new(),
+            known: HashMap::new(),
+            known_images: HashMap::new(),
+            rough: HashMap::new(),
+        }
+    }
+
+    pub fn of_normal(&self, texture: &NormalTexture, path: &str) -> TextureUse {
+        let transform = self.raw_transform(texture.extensions.as_ref().map(|extensions| &extensions.others), path);
+        TextureUse { index: texture.index, uv_set: texture.tex_coord, transform }
+    }
+
+    pub fn of_occlusion(&self, texture: &OcclusionTexture, path: &str) -> TextureUse {
+        let transform = self.raw_transform(texture.extensions.as_ref().map(|extensions| &extensions.others), path);
+        TextureUse { index: texture.index, uv_set: texture.tex_coord, transform }
+    }
+
+    /// Returns the transform of a texture whose extensions the crate `gltf` does not read.
+    fn raw_transform(
+        &self,
+        extensions: Option<&serde_json::Map<String, json::Value>>,
+        path: &str,
+    ) -> Option<TextureTransform> {
+        let value = extensions?.get("KHR_texture_transform")?;
+        let read = json::deserialize::from_value(value.clone());
+        self.document.or_left_out(read.map_err(|error| format!("{path}.extensions.KHR_texture_transform: {error}")))
     }
 
     /// Returns a texture: of the linear numbers of a channel, or without a channel of sRGB colours. `path` is the JSON
-    /// path of its use. Returns `None` if its image cannot be read.
-    pub fn texture(&mut self, used: &TextureUse, path: &str, channel: Option<Channel>) -> Checked<Option<Texture>> {
+    /// path of its use. Returns `None` if it cannot be read, which a note tells.
+    pub fn texture(&mut self, used: &TextureUse, path: &str, channel: Option<Channel>) -> Option<Texture> {
+        let read = self.read(used, path, channel);
+        self.document.or_left_out(read).flatten()
+    }
+
+    fn read(&mut self, used: &TextureUse, path: &str, channel: Option<Channel>) -> Checked<Option<Texture>> {
         let root = &self.document.root;
         let json = item(&root.textures, "textures", used.index.value(), &path)?;
         let Some(image_ix) = self.image(json, used.index.value())? else { return Ok(None) };
@@ -83,15 +97,19 @@ impl<'a> Textures<'a> {
         }
         if let Some(index) = json.sampler {
             let from = format!("textures[{}].sampler", used.index);
-            sample(&mut texture, item(&root.samplers, "samplers", index.value(), &from)?)
-                .map_err(|what| format!("samplers[{index}]: {what}"))?;
+            let sampler = item(&root.samplers, "samplers", index.value(), &from);
+            let sampled = sampler
+                .and_then(|sampler| sample(&mut texture, sampler).map_err(|what| format!("samplers[{index}]: {what}")));
+            self.document.or_left_out(sampled);
         }
         texture.uv_set = used.uv_set;
         if let Some(transform) = &used.transform {
             texture.uv_set = transform.tex_coord.unwrap_or(used.uv_set);
             texture.transform = affine(transform);
             if !texture.transform.is_finite() {
-                return Err(format!("{path}.extensions.KHR_texture_transform: a number is not finite"));
+                self.document
+                    .note(LEFT_OUT, format!("{path}.extensions.KHR_texture_transform: a number is not finite"));
+                texture.transform = Affine2::IDENTITY;
             }
         }
         if texture.uv_set > 1 {
@@ -102,44 +120,61 @@ impl<'a> Textures<'a> {
     }
 
     /// Returns a texture of roughness, from one whose opacity is the glossiness.
-    pub fn roughness(&mut self, used: &TextureUse, path: &str, factor: f32) -> Checked<Option<Texture>> {
-        let Some(texture) = self.texture(used, path, Some(Channel::Red))? else { return Ok(None) };
+    pub fn roughness(&mut self, used: &TextureUse, path: &str, factor: f32) -> Option<Texture> {
+        let texture = self.texture(used, path, Some(Channel::Red))?;
         let known = self.rough.entry((texture.image_ix, factor.to_bits())).or_insert_with(|| {
             let Encoded { name, bytes } = &self.encoded[texture.image_ix as usize];
             self.encoded.push(Encoded { name: name.clone(), bytes: bytes.clone() });
             (self.encoded.len() - 1) as u32
         });
-        Ok(Some(Texture { image_ix: *known, ..texture }))
+        Some(Texture { image_ix: *known, ..texture })
     }
 
     /// Returns the index of a texture's image among those that are used.
     fn image(&mut self, texture: &json::Texture, texture_ix: usize) -> Checked<Option<u32>> {
         let path = format!("textures[{texture_ix}]");
-        let Some(image) = source(texture) else {
-            let is_ktx = has_extension(texture, "KHR_texture_basisu");
-            let what = match is_ktx {
-                true => {
-                    "textures in KTX2, which are not read (`gltf-transform ktxdecompress IN OUT` makes PNG of them)"
-                }
-                false => "textures without an image of a known format, which are left out",
-            };
-            self.document.note(what, path);
+        let (further, own) = sources(texture);
+        let Some(last) = own.or(further) else {
+            self.document.note("textures without an image of a known format, which are left out", path);
             return Ok(None);
         };
-        let source = self.document.image_source(image, &format_args!("{path}.source"))?;
-        if let Some(known) = self.known.get(&source) {
-            return Ok(*known);
+        // An image of a further format that cannot be read has another one beside it.
+        if let Some(image) = further.filter(|_| own.is_some()) {
+            let found = self.encoded_image(image, &path).filter(|ix| has_header(&self.encoded[*ix as usize]));
+            if found.is_some() {
+                return Ok(found);
+            }
         }
-        let bytes = self.document.image(image.value(), &source)?;
+        Ok(self.encoded_image(last, &path))
+    }
+
+    /// Returns the index of an image, which the texture at a JSON path names, and reads it at the first call. Returns
+    /// `None` if it cannot be read.
+    fn encoded_image(&mut self, image: Index<json::Image>, path: &str) -> Option<u32> {
+        if let Some(known) = self.known_images.get(&image.value()) {
+            return *known;
+        }
+        let source = self.document.image_source(image, &format_args!("{path}.source"));
+        let image_ix = self.document.or_left_out(source).and_then(|source| self.image_at(image, source));
+        self.known_images.insert(image.value(), image_ix);
+        image_ix
+    }
+
+    /// Returns the index of an image by the place of its bytes.
+    fn image_at(&mut self, image: Index<json::Image>, source: ImageSource) -> Option<u32> {
+        if let Some(known) = self.known.get(&source) {
+            return *known;
+        }
+        let bytes = self.document.or_left_out(self.document.image(image.value(), &source)).flatten();
+        let json = &self.document.root.images[image.value()];
+        let file = json.uri.as_ref().filter(|uri| !is_data(uri));
+        let name = file.or(json.name.as_ref()).cloned().unwrap_or_else(|| format!("images[{image}]"));
         let image_ix = bytes.map(|bytes| {
-            let json = &self.document.root.images[image.value()];
-            let file = json.uri.as_ref().filter(|uri| !is_data(uri));
-            let name = file.or(json.name.as_ref()).cloned().unwrap_or_else(|| format!("images[{image}]"));
             self.encoded.push(Encoded { name, bytes });
             (self.encoded.len() - 1) as u32
         });
         self.known.insert(source, image_ix);
-        Ok(image_ix)
+        image_ix
     }
 
     /// Decodes the images and returns them. Textures of those that cannot be decoded are removed from the materials.
@@ -174,18 +209,14 @@ impl<'a> Textures<'a> {
     }
 }
 
-fn has_extension(texture: &json::Texture, name: &str) -> bool {
-    texture.extensions.as_ref().is_some_and(|extensions| extensions.others.contains_key(name))
-}
-
-/// Returns a texture's image: that of an extension for further formats, else the texture's own.
-fn source(texture: &json::Texture) -> Option<Index<json::Image>> {
+/// Returns a texture's images: that of an extension for further formats, which comes first, and the texture's own.
+fn sources(texture: &json::Texture) -> (Option<Index<json::Image>>, Option<Index<json::Image>>) {
     let others = texture.extensions.as_ref().map(|extensions| &extensions.others);
     let of_extension = |name| others?.get(name)?.get("source")?.as_u64();
-    let further = ["EXT_texture_webp", "MSFT_texture_dds"].into_iter().find_map(of_extension);
+    let further = ["KHR_texture_basisu", "EXT_texture_webp", "MSFT_texture_dds"].into_iter().find_map(of_extension);
     let further = further.and_then(|ix| u32::try_from(ix).ok()).map(Index::new);
     // The crate `gltf` gives a texture without an image this index.
-    further.or((texture.source.value() != u32::MAX as usize).then_some(texture.source))
+    (further, (texture.source.value() != u32::MAX as usize).then_some(texture.source))
 }
 
 fn sample(texture: &mut Texture, sampler: &Sampler) -> Checked<()> {

@@ -6,12 +6,14 @@
 mod dds;
 mod facts;
 mod heights;
+mod ktx2;
 mod pixels;
 #[cfg(test)]
 mod tests;
 
 use std::{
     borrow::Cow,
+    collections::BTreeSet,
     io::Cursor,
     panic::{AssertUnwindSafe, catch_unwind},
 };
@@ -26,7 +28,7 @@ use crate::{
     util::{
         memory,
         progress::{Progress, Work},
-        text::one_line,
+        text::{one_line, short_line},
     },
 };
 
@@ -69,6 +71,7 @@ enum Format {
     /// A format of the crate `image`.
     Common(ImageFormat),
     Dds,
+    Ktx2,
 }
 
 impl Header {
@@ -86,6 +89,11 @@ pub(crate) fn decode_all(images: Vec<Encoded>, n_pixels: u64, progress: &Progres
     let meter = progress.begin(Work::Images, images.len() as u64);
     let headers: Vec<_> = images.par_iter().map(|image| named(&image.name, || header_of(image))).collect();
     let sum = check_sum(headers.iter().flatten(), n_pixels);
+    let cut: BTreeSet<_> = images.iter().filter(|it| is_cut_jpeg(&it.bytes)).map(|it| short_line(&it.name)).collect();
+    if let Some(first) = cut.first() {
+        let more = if cut.len() > 1 { format!(" and {} more", cut.len() - 1) } else { String::new() };
+        tracing::warn!("image `{first}`{more}: has no end: what is missing of its picture is grey");
+    }
     let decode_one = |(image, header): (Encoded, Checked<Header>)| {
         let decoded =
             header.and_then(|header| named(&image.name, || sum.clone().and_then(|()| decode(&image, &header))));
@@ -93,6 +101,11 @@ pub(crate) fn decode_all(images: Vec<Encoded>, n_pixels: u64, progress: &Progres
         decoded
     };
     images.into_par_iter().zip(headers).map(decode_one).collect()
+}
+
+/// Returns whether an image's header can be read.
+pub(crate) fn has_header(image: &Encoded) -> bool {
+    named(&image.name, || header_of(image)).is_ok()
 }
 
 /// Decodes an image of floats, HDR or EXR. Returns its size and its colours, row by row, as they are in the file: they
@@ -137,6 +150,7 @@ fn check_sum<'a>(headers: impl Iterator<Item = &'a Header> + Clone, n_before: u6
 fn header_of(image: &Encoded) -> Checked<Header> {
     let header = match format_of(image)? {
         Format::Dds => dds::header_of(&image.bytes)?,
+        Format::Ktx2 => ktx2::header_of(&image.bytes)?,
         Format::Common(format) => {
             if format == ImageFormat::OpenExr {
                 check_exr(&image.bytes)?;
@@ -163,23 +177,38 @@ fn format_of(Encoded { name, bytes }: &Encoded) -> Checked<Format> {
     if bytes.starts_with(b"DDS ") {
         return Ok(Format::Dds);
     }
+    if bytes.starts_with(ktx2::MARK) {
+        return Ok(Format::Ktx2);
+    }
     match ::image::guess_format(bytes) {
         Ok(format @ (Png | Jpeg | Bmp | WebP | Tiff | Gif | Hdr | OpenExr)) => Ok(Format::Common(format)),
         _ if name.to_ascii_lowercase().ends_with(".tga") => Ok(Format::Common(Tga)),
         _ => Err(foreign(bytes)
-            .unwrap_or("is none of PNG, JPEG, TGA, BMP, WebP, TIFF, GIF, HDR, EXR and DDS")
+            .unwrap_or("is none of PNG, JPEG, TGA, BMP, WebP, TIFF, GIF, HDR, EXR, DDS and KTX2")
             .to_owned()),
     }
+}
+
+/// Returns whether a JPEG file has no mark of its end: mostly it is cut off within its picture, whose rest its decoder
+/// fills with grey. A thumbnail in its header has such a mark, too, so that counts only behind the header.
+fn is_cut_jpeg(bytes: &[u8]) -> bool {
+    let mut rest = match bytes {
+        [0xff, 0xd8, rest @ ..] => rest,
+        _ => return false,
+    };
+    while let [0xff, marker, high, low, ..] = *rest {
+        if marker == 0xda {
+            return !rest.windows(2).rev().any(|pair| pair == [0xff, 0xd9]);
+        }
+        rest = rest.get(2 + usize::from(u16::from_be_bytes([high, low]))..).unwrap_or_default();
+    }
+    false
 }
 
 /// Returns what an image file is whose format is not read, if its first bytes tell.
 fn foreign(bytes: &[u8]) -> Option<&'static str> {
     const FOREIGN: [(usize, &[u8], &str); 5] = [
-        (
-            0,
-            b"\xabKTX",
-            "is KTX, which is not read: `gltf-transform ktxdecompress IN OUT` makes PNG of it in a glTF file",
-        ),
+        (0, b"\xabKTX", "is KTX of an older version than 2, which is not read: save it as PNG"),
         (0, b"8BPS", "is an image of Photoshop, which is not read: save it as PNG"),
         (4, b"ftyp", "is AVIF or HEIF, which is not read: save it as PNG"),
         (0, b"<svg", "is SVG, which has no pixels: save it as PNG"),
@@ -233,6 +262,7 @@ fn decoder_of(format: ImageFormat, bytes: &[u8]) -> Checked<impl ImageDecoder> {
 fn decode(image: &Encoded, header: &Header) -> Checked<Image> {
     let pixels = match header.format {
         Format::Dds => dds::decode(&image.bytes)?,
+        Format::Ktx2 => ktx2::decode(&image.bytes)?,
         Format::Common(format) => {
             let decoder = decoder_of(format, &image.bytes)?;
             let decoded = DynamicImage::from_decoder(decoder).map_err(|error| error.to_string())?;

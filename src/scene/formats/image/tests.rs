@@ -125,7 +125,7 @@ fn strips_of_tiff_files_are_limited() {
 #[test]
 fn other_formats_are_called_by_their_names() {
     for (bytes, what) in [
-        (&b"\xabKTX 20\xbb"[..], "ktxdecompress"),
+        (&b"\xabKTX 11\xbb\r\n\x1a\n"[..], "KTX"),
         (b"8BPS\0", "Photoshop"),
         (b"\0\0\0\x1cftypavif", "AVIF"),
         (b"<svg ", "SVG"),
@@ -149,6 +149,18 @@ fn jpeg_shows_its_colour() {
     let image = decoded("a", encoded(orange, ImageFormat::Jpeg)).unwrap();
     let is_near = |p: &[u8; 4]| p.iter().zip([200, 100, 50, 255]).all(|(a, b)| a.abs_diff(b) <= 3);
     assert!(bytes_of(&image).len() == 256 && bytes_of(&image).iter().all(is_near), "{:?}", image.pixels);
+}
+
+#[test]
+fn a_jpeg_that_is_cut_off_is_noticed() {
+    let photo = RgbImage::from_fn(64, 64, |x, y| ::image::Rgb([(x * y) as u8, x as u8, y as u8]));
+    let whole = encoded(photo, ImageFormat::Jpeg);
+    let with_thumbnail = [&whole[..2], b"\xff\xe1\0\x08\xff\xd8\0\0\xff\xd9", &whole[2..]].concat();
+    for jpeg in [&whole, &with_thumbnail] {
+        assert!(!is_cut_jpeg(jpeg) && !is_cut_jpeg(&[jpeg, &b"more"[..]].concat()));
+        assert!(is_cut_jpeg(&jpeg[..jpeg.len() * 2 / 3]) && is_cut_jpeg(&jpeg[..jpeg.len() - 1]));
+    }
+    assert!(!is_cut_jpeg(&encoded(RgbImage::new(1, 1), ImageFormat::Png)));
 }
 
 #[test]
@@ -276,7 +288,7 @@ fn an_error_is_one_line_and_leaves_the_others() {
     let bad = Encoded { name: "b\nad".to_owned(), bytes: b"qoif\0\0"[..].into() };
     let results = decode_all(vec![bad, good], 0, &Progress::default());
     let error = results[0].as_ref().unwrap_err();
-    assert_eq!(error, "image `b ad`: is none of PNG, JPEG, TGA, BMP, WebP, TIFF, GIF, HDR, EXR and DDS");
+    assert_eq!(error, "image `b ad`: is none of PNG, JPEG, TGA, BMP, WebP, TIFF, GIF, HDR, EXR, DDS and KTX2");
     assert_eq!(bytes_of(results[1].as_ref().unwrap()), pixels(&with_alpha()));
 }
 

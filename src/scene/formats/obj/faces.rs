@@ -265,5 +265,5 @@ fn plain_index(bytes: &[u8], at: &mut usize) -> Option<i64> {
         value = value.wrapping_mul(10).wrapping_add(i64::from(digit));
         *at += 1;
     }
-    (1..=18).contains(&(*at - first)).then_some(if is_negative { -value } else { value })
+    (1..=18).contains(&(*at - first)).then_some(if is_negative { value.wrapping_neg() } else { value })
 }

@@ -26,6 +26,9 @@ pub fn named_files(obj: &Path, text: &str, access: Access) -> Vec<PathBuf> {
             files.extend(library_files(reach, rest).into_iter().flatten().map(|file| file.path));
         }
     }
+    if !files.iter().any(|path| store::is_file(path)) {
+        files.extend(own_library(reach, obj));
+    }
     let images: Vec<PathBuf> = files.iter().flat_map(|mtl| named_images(reach, mtl)).collect();
     files.into_iter().chain(images).collect()
 }
@@ -58,6 +61,12 @@ pub fn library_files(reach: Reach, rest: &str) -> Vec<Checked<NamedFile>> {
         return vec![whole];
     }
     without_comment(rest).split_whitespace().map(find).collect()
+}
+
+/// Returns the MTL file of the OBJ file's own name, which counts where no library is found that the OBJ file names.
+pub fn own_library(reach: Reach, obj: &Path) -> Option<PathBuf> {
+    let name = obj.with_extension("mtl").file_name()?.to_str()?.to_owned();
+    reach.find(reach.root, &name).ok().map(|file| file.path).filter(|path| store::is_file(path))
 }
 
 /// Returns the file that a name in an OBJ or MTL file stands for. Writers often state absolute names of their own

@@ -44,7 +44,8 @@ pub(crate) fn read_obj(
 pub(crate) fn obj_mesh(path: &Path, file: ObjFile, loading: &mut Loading) -> Result<Loaded, SceneError> {
     let &mut Loading { shading, n_loaded, access, ref mut images, .. } = loading;
     require_for_mesh(n_loaded as u64, &file.size).map_err(|what| SceneError::file(path, what))?;
-    let (materials, tiles) = mtl::load_libraries(path, &file.libraries, access, images)?;
+    let uses_materials = file.used_materials.iter().any(|(name, _)| !name.is_empty());
+    let (materials, tiles) = mtl::load_libraries(path, (&file.libraries, uses_materials), access, images)?;
     if let Some((line, statement)) = &file.unknown {
         tracing::warn!("{}:{line}: unknown statement `{}`", path.display(), statement.escape_debug());
     }

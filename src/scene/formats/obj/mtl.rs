@@ -9,7 +9,7 @@ use std::{
 };
 
 use super::{
-    files::{find_file, library_files},
+    files::{find_file, library_files, own_library},
     maps::{MapKind, MapOptions, Term, set_map},
     statement::{split_keyword, statements, words},
     tiles::{TOKEN, Tiles, files_of_tiles},
@@ -64,12 +64,13 @@ struct Map {
     tile: Option<u32>,
 }
 
-/// Reads the materials in the files that the `mtllib` lines of an OBJ file name, relative to its folder. If several
-/// materials have the same name, the last one counts. Warns of files that do not exist, and of names that leave the
-/// folder. Materials whose images are in tiles come with one more material for each tile.
+/// Reads the materials in the files that the `mtllib` lines of an OBJ file name, relative to its folder. If there is
+/// none, and the file uses materials, the one is read that has its own name. If several materials have the same name,
+/// the last one counts. Warns of files that do not exist, and of names that leave the folder. Materials whose images
+/// are in tiles come with one more material for each tile.
 pub fn load_libraries(
     obj: &Path,
-    libraries: &[(usize, String)],
+    (libraries, uses_materials): (&[(usize, String)], bool),
     access: Access,
     images: &mut Images,
 ) -> Result<(Vec<Material>, Tiles), SceneError> {
@@ -94,6 +95,11 @@ pub fn load_libraries(
                 }
             }
         }
+    }
+    let own = if read.is_empty() && uses_materials { own_library(reach, obj) } else { None };
+    if let Some(path) = own {
+        tracing::info!("{}: the materials are those of {}, which it does not name", obj.display(), shown(&path));
+        described.extend(load_library(reach, &path, images)?);
     }
     let (described, tiles) = with_tiles(described);
     Ok((materials(described, images)?, tiles))

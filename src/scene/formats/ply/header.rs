@@ -66,7 +66,7 @@ impl Number {
     }
 }
 
-/// Returns the bytes of the number with which `bytes` begin, the least one first.
+/// Returns the little-endian bytes of the number at the start of `bytes`.
 fn little<const N: usize>(bytes: &[u8], is_big: bool) -> [u8; N] {
     let mut number: [u8; N] = *bytes.first_chunk().expect("the bytes have the number");
     if is_big {

@@ -72,7 +72,8 @@ impl Cuboid {
 
 impl Room {
     pub fn build(&self) -> Checked<Mesh> {
-        faces(self.size, self.sides.as_deref(), [0, 3, 2, 1], LOWER_RIGHT_FIRST)
+        let mesh = faces(self.size, self.sides.as_deref(), [0, 3, 2, 1], LOWER_RIGHT_FIRST)?;
+        Ok(Mesh { name: "room".to_owned(), ..mesh })
     }
 }
 

@@ -35,6 +35,7 @@ pub fn scene_file_of(input: &Path, output: &Path, options: &LoadOptions) -> Resu
     let mesh = text::MeshTable {
         file: places.name_of(input)?,
         scene: options.scene.clone(),
+        shows_back_faces: options.look.shows_back_faces,
         replaced: options.look.materials.clone(),
     };
     Ok(text::scene_file(&scene, &mesh))
@@ -73,6 +74,9 @@ fn moved(input: &Path, places: &Places, (scene, options): (&Scene, &LoadOptions)
     if options.look.light.is_some() || options.look.background.is_some() {
         table.extend(parsed(format!("background = {}\n", text::vector(scene.background))));
     }
+    if options.look.shows_back_faces {
+        table.insert("cull".to_owned(), Value::String("off".to_owned()));
+    }
     if !options.look.materials.is_empty() {
         let words = options.look.materials.iter().map(|choice| Value::String(choice.to_string()));
         let replace = table.entry("replace").or_insert(Value::Array(Vec::new()));
@@ -96,7 +100,12 @@ fn names_of_files(table: &mut Table) -> Vec<&mut String> {
     let mut names = Vec::new();
     for (key, value) in table.iter_mut() {
         match (key.as_str(), value) {
-            ("mesh", Value::Array(meshes)) => names.extend(meshes.iter_mut().filter_map(|mesh| mesh.get_mut("file"))),
+            ("mesh", Value::Array(meshes)) => {
+                let keys = meshes.iter_mut().filter_map(Value::as_table_mut).flatten();
+                names.extend(
+                    keys.filter(|(key, _)| ["file", "instances"].contains(&key.as_str())).map(|(_, name)| name),
+                );
+            }
             ("environment", Value::Table(environment)) => names.extend(environment.get_mut("file")),
             ("materials", Value::Table(materials)) => {
                 let materials = materials.iter_mut().filter_map(|(_, material)| material.as_table_mut()).flatten();
@@ -122,11 +131,11 @@ mod tests {
 
     #[test]
     fn files_of_meshes_materials_and_the_environment_are_named() {
-        let text = "environment = { file = \"sky.hdr\" }\nmesh = [{ file = \"a.obj\" }]\n\
+        let text = "environment = { file = \"sky.hdr\" }\nmesh = [{ file = \"a.obj\", instances = \"c.npy\" }]\n\
                     materials = { m = { map_Kd = \"b.png\" } }\n";
         let mut table: Table = text.parse().unwrap();
         let mut names: Vec<String> = names_of_files(&mut table).into_iter().map(|name| name.clone()).collect();
         names.sort();
-        assert_eq!(names, ["a.obj", "b.png", "sky.hdr"]);
+        assert_eq!(names, ["a.obj", "b.png", "c.npy", "sky.hdr"]);
     }
 }

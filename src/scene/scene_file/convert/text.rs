@@ -28,6 +28,8 @@ pub(super) struct MeshTable {
     pub file: String,
     /// Scene of a glTF file.
     pub scene: Option<String>,
+    /// Whether the camera sees the back faces of its single-sided materials.
+    pub shows_back_faces: bool,
     /// Which materials of the file are replaced.
     pub replaced: Vec<MaterialChoice>,
 }
@@ -38,6 +40,9 @@ pub(super) fn scene_file(scene: &Scene, mesh: &MeshTable) -> String {
     text += &format!("ambient = {}\nbackground = {}\n", ambient(scene), vector(scene.background));
     if let Some(to_viewer) = scene.studio {
         text += &format!("studio = {}\n", vector(to_viewer));
+    }
+    if mesh.shows_back_faces {
+        text += "cull = \"off\"\n";
     }
     if !mesh.replaced.is_empty() {
         let words: Vec<_> = mesh.replaced.iter().map(|choice| quoted(&choice.to_string())).collect();

@@ -1,17 +1,18 @@
-//! Layers of the light of a picture of paths: emission, direct and indirect light.
+//! Layers of a picture that are means of all samples, as the picture is: of its light, emission, direct and indirect
+//! light, and of the surfaces that camera rays hit, albedo and normal.
 
-use super::{BlockSum, Crop, SampleRange, SampleSums};
-use crate::layout::LIGHT_LAYERS;
+use super::{Aov, BlockSum, Crop, SampleRange, SampleSums};
 
 /// The number of layers.
-const N_LAYERS: usize = LIGHT_LAYERS as usize;
+const N_LAYERS: usize = Aov::OF_MEANS.len();
 
-/// The layers of light of a picture, in the order of [`Aov::OF_LIGHT`](super::Aov::OF_LIGHT). Each has the pixels of
-/// the picture's radiance, whose sum they are up to rounding. All are empty if the options do not ask for layers.
+/// The layers of a picture that are means of all samples, in the order of [`Aov::OF_MEANS`]. Each has the pixels of
+/// the picture's radiance, or is empty if the options do not ask for it. The fourth component of a pixel has no
+/// meaning. The layers of light add up to the radiance, up to rounding.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct LightLayers(pub [Vec<[f32; 4]>; N_LAYERS]);
+pub struct MeanLayers(pub [Vec<[f32; 4]>; N_LAYERS]);
 
-impl LightLayers {
+impl MeanLayers {
     /// Whether there are no pixels.
     pub fn is_empty(&self) -> bool {
         self.0.iter().all(Vec::is_empty)
@@ -29,13 +30,13 @@ impl LightLayers {
     }
 }
 
-/// The sums of a range of samples: of the picture, and of its layers of light.
+/// The sums of a range of samples: of the picture, and of its layers that are means.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RangeSums {
     /// The sums of the radiance.
     pub picture: SampleSums,
-    /// The sums of each layer of light. Without layers, they have no blocks.
-    pub light: [SampleSums; N_LAYERS],
+    /// The sums of each layer. Those that the picture lacks have no blocks.
+    pub layers: [SampleSums; N_LAYERS],
 }
 
 impl RangeSums {
@@ -43,16 +44,15 @@ impl RangeSums {
     ///
     /// # Panics
     /// As [`SampleSums::push_mean`].
-    pub(crate) fn push_mean(&mut self, samples: SampleRange, radiance: &[[f32; 4]], light: &LightLayers) {
+    pub(crate) fn push_mean(&mut self, samples: SampleRange, radiance: &[[f32; 4]], layers: &MeanLayers) {
         self.picture.push_mean(samples, radiance);
-        if !light.is_empty() {
-            self.light.iter_mut().zip(&light.0).for_each(|(sums, layer)| sums.push_mean(samples, layer));
-        }
+        let of_layers = self.layers.iter_mut().zip(&layers.0).filter(|(_, layer)| !layer.is_empty());
+        of_layers.for_each(|(sums, layer)| sums.push_mean(samples, layer));
     }
 
-    /// Returns the means of the layers of light.
-    pub fn mean_of_light(&self) -> LightLayers {
-        LightLayers(self.light.each_ref().map(SampleSums::mean))
+    /// Returns the means of the layers.
+    pub fn mean_of_layers(&self) -> MeanLayers {
+        MeanLayers(self.layers.each_ref().map(SampleSums::mean))
     }
 
     /// Returns the blocks of samples of the picture and of its layers, for a file whose mean does not tell them: there
@@ -61,6 +61,6 @@ impl RangeSums {
         fn untold(sums: &SampleSums) -> &[BlockSum] {
             if sums.blocks().len() > 1 { sums.blocks() } else { &[] }
         }
-        (untold(&self.picture), self.light.each_ref().map(untold))
+        (untold(&self.picture), self.layers.each_ref().map(untold))
     }
 }

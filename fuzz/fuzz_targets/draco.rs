@@ -1,0 +1,3 @@
+#![no_main]
+
+kdray_fuzz::target!(Draco);

@@ -1,0 +1,140 @@
+// The search through a world of instances. A ray goes through the hierarchy over the instances depth-first, the nearer
+// child first, with a bit mask as its stack: bit i tells whether the sibling of the node i levels above is still to be
+// visited. So its whole state is two words. In each leaf, transformed to the space of the instance's geometry, the ray
+// goes through the geometry's own structure. Twin of src/reference/instances.rs. A part of search/accel.glsl.
+//
+// Watertight: all triangles of a geometry are tested by one ray, as in a scene of that geometry alone. Rounding makes
+// it another ray than that of the world. The box of each instance has a margin for that (src/accel/top_level.rs), so
+// that an instance is entered whenever the transformed ray can have a hit in it.
+//
+// Needs scene.glsl, search/suspended_rays.glsl, search/steps.glsl and search/traversal_ray.glsl, TESTS_BLENDED and
+// FROM_CAMERA. Provides `TopCell`, `TopRay`, `top_ray`,
+// `top_node_at`, `kind_of_rays`, `find_instance`, `leave_node` and `in_geometry`.
+
+// A node, and the pending siblings above it. NO_TRIANGLE in place of the node: nothing is left.
+struct TopCell {
+    uint node_ix;
+    uint pending;
+};
+
+// A ray of the world as boxes see it, with halved t, as in TraversalRay. It meets a plane at p at p inv_direction +
+// bias. pad: by how much boxes are too small for a ray from afar (world units).
+struct TopRay {
+    vec3 inv_direction;
+    vec3 bias;
+    float t_min;
+    float pad;
+};
+
+// The t of a box that the ray misses, above all others.
+const float MISSES = 3.0e38;
+
+TopRay top_ray(PathRay ray, float t_min) {
+    vec3 tiny = vec3(KD_LEAST_COMPONENT);
+    vec3 inv_direction = 0.5 / mix(ray.direction, tiny, lessThan(abs(ray.direction), tiny));
+    float farthest = longest_component(ray.origin);
+    float pad = farthest > accel.origin_reach ? accel.plane_epsilon * farthest : 0.0;
+    return TopRay(inv_direction, -ray.origin * inv_direction, 0.5 * t_min, pad);
+}
+
+TopNode top_node_at(uint node_ix) {
+    vec4 low = load_instance_rows(accel.top_nodes_begin + TOP_NODE_ROWS * node_ix);
+    vec4 high = load_instance_rows(accel.top_nodes_begin + TOP_NODE_ROWS * node_ix + 1u);
+    return TopNode(low.xyz, floatBitsToUint(low.w), high.xyz, floatBitsToUint(high.w));
+}
+
+// The t at which the ray enters a node's box, or MISSES if it misses the box or enters it behind t_best.
+float entry_of(TopRay ray, TopNode node, float t_best) {
+    precise vec3 t0 = fma(node.box_min - ray.pad, ray.inv_direction, ray.bias);
+    precise vec3 t1 = fma(node.box_max + ray.pad, ray.inv_direction, ray.bias);
+    vec3 near = min(t0, t1);
+    vec3 far = max(t0, t1);
+    float t_enter = max(max(near.x, near.y), max(near.z, ray.t_min));
+    float t_exit = min(min(far.x, far.y), min(far.z, t_best));
+    return t_enter <= t_exit ? t_enter : MISSES;
+}
+
+// Goes up to the nearest pending sibling.
+void leave_node(inout TopCell at) {
+    if (at.pending == 0u) {
+        at.node_ix = NO_TRIANGLE;
+        return;
+    }
+    uint n_levels = uint(findLSB(at.pending));
+    for (uint i = 0u; i < n_levels; ++i) {
+        count_iteration();
+        at.node_ix = top_node_at(at.node_ix).parent;
+    }
+    at.node_ix ^= 1u;
+    at.pending = (at.pending >> n_levels) & ~1u;
+}
+
+// Goes down to the child of a pair that the ray enters first. Returns false if it meets neither.
+bool enter_child(TopRay ray, uint pair, float t_best, inout TopCell at) {
+    float t0 = entry_of(ray, top_node_at(2u * pair), t_best);
+    float t1 = entry_of(ray, top_node_at(2u * pair + 1u), t_best);
+    count_steps(2u);
+    if (min(t0, t1) == MISSES) return false;
+    at.node_ix = 2u * pair + (t1 < t0 ? 1u : 0u);
+    at.pending = (at.pending << 1) | (max(t0, t1) < MISSES ? 1u : 0u);
+    return true;
+}
+
+// The kind of the invocation's rays, as a bit of `Instance.flags`.
+uint kind_of_rays(bool any_hit) {
+    if (FROM_CAMERA) return INSTANCE_FOR_CAMERA;
+    return TESTS_BLENDED && any_hit ? INSTANCE_FOR_SHADOWS : INSTANCE_FOR_OTHERS;
+}
+
+// Goes on to the next instance that may have a hit nearer than t_best, and whose flags have the bit `kind`. Returns
+// false if none is left, or if the invocation's loop iterations are spent. instance_ix: the instance.
+bool find_instance(TopRay ray, float t_best, uint kind, inout TopCell at, out uint instance_ix) {
+    bool found = false;
+    bool looks = at.node_ix != NO_TRIANGLE && has_iterations();
+    instance_ix = 0u;
+    while (looks) {
+        count_iteration();
+        TopNode node = top_node_at(at.node_ix);
+        instance_ix = node.link & ~TOP_LEAF;
+        if ((node.link & TOP_LEAF) == 0u) {
+            if (!enter_child(ray, node.link, t_best, at)) leave_node(at);
+        } else {
+            found = entry_of(ray, node, t_best) < MISSES
+                && (floatBitsToUint(instance_row(instance_ix, 4u).w) & kind) != 0u;
+            if (!found) leave_node(at);
+        }
+        looks = !found && at.node_ix != NO_TRIANGLE && has_iterations();
+        if (!looks) break;
+    }
+    return found;
+}
+
+// v by the rows of the inverse linear map.
+vec3 local_vector(uint instance_ix, vec3 v) {
+    vec3 x = instance_row(instance_ix, 4u).xyz, y = instance_row(instance_ix, 5u).xyz;
+    vec3 z = instance_row(instance_ix, 6u).xyz;
+    precise float local_x = x.x * v.x + x.y * v.y + x.z * v.z;
+    precise float local_y = y.x * v.x + y.y * v.y + y.z * v.z;
+    precise float local_z = z.x * v.x + z.y * v.y + z.z * v.z;
+    return vec3(local_x, local_y, local_z);
+}
+
+// Enters an instance: notes which geometry is searched, and returns the ray in its space. The direction is scaled by a
+// power of two to about unit length, so that t is scaled without rounding. inv_scale: what t of the world is multiplied
+// by. t_max is left as it is.
+PathRay in_geometry(uint instance_ix, PathRay ray, out float inv_scale) {
+    set_instance(instance_ix);
+    uint geometry_ix = floatBitsToUint(instance_row(instance_ix, 1u).w);
+    uint at = accel.geometries_begin + GEOMETRY_ROWS * geometry_ix;
+    vec4 low = load_instance_rows(at), high = load_instance_rows(at + 1u), rest = load_instance_rows(at + 2u);
+    entered = Extent(
+        low.xyz, low.w, high.xyz, high.w, floatBitsToUint(rest.x), floatBitsToUint(rest.y), floatBitsToUint(rest.z)
+    );
+    precise vec3 offset = ray.origin - instance_row(instance_ix, 3u).xyz;
+    ray.origin = local_vector(instance_ix, offset);
+    ray.direction = local_vector(instance_ix, ray.direction);
+    uint exponent = clamp(exponent_of(ray.direction), 1u, 253u);
+    ray.direction *= uintBitsToFloat((254u - exponent) << 23);
+    inv_scale = uintBitsToFloat(exponent << 23);
+    return ray;
+}

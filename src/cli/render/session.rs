@@ -1,0 +1,229 @@
+//! Loads, builds and draws one scene after the other on the same devices.
+
+use std::{cell::OnceCell, path::Path, time::Instant};
+
+use kdray::{
+    engine::{
+        Engine, Loaded, NoiseGoal, Opened, Work,
+        choices::{Choices, ChosenAccel, Methods},
+    },
+    frame::{Goal, Profile, RenderOptions, SampleRange},
+    gpu::DeviceInfo,
+    output::{self, Record, WholeRecord},
+    util::progress,
+    world::World,
+};
+use tracing::info_span;
+
+use super::{
+    deadline::Deadline,
+    draw::{Common, DrawnPictures, FrameJob, draw_and_write, draws_whole_frames},
+    views::NamedPath,
+};
+use crate::cli::{
+    args::RenderArgs,
+    device_args::open_devices,
+    error::CliError,
+    progress::Progress,
+    report::{FrameTimeRange, Report, SCHEMA},
+    spans::Spans,
+    trace::trace_json,
+};
+
+/// What a scheduler is told of the shares of the work: loading, building, and rendering, which takes longest in films.
+const SHARES: [f64; 3] = [0.05, 0.05, 0.9];
+
+/// What all scenes of a command share. Of a scene, it keeps nothing.
+pub struct Session<'a> {
+    pub args: &'a RenderArgs,
+    pub progress: Progress,
+    begun_at: Instant,
+    spans: Spans,
+    engine: OnceCell<Engine>,
+}
+
+/// A scene that can be drawn, and how it is drawn.
+struct Ready {
+    engine: Engine,
+    world: World,
+    options: RenderOptions,
+    accel: ChosenAccel,
+    methods: Methods,
+    /// Number of samples per pixel of the whole picture, and which of them are drawn if they are not all.
+    samples: (u32, Option<SampleRange>),
+    noise_goal: Option<NoiseGoal>,
+    n_triangles: usize,
+    load_ms: f64,
+    build_ms: f64,
+}
+
+impl Ready {
+    /// Returns what all pictures of the scene have in common.
+    fn common<'a>(&'a self, args: &'a RenderArgs, deadline: Deadline) -> Common<'a> {
+        let Self { engine, world, options, accel, samples, noise_goal, .. } = self;
+        let mut record = record(engine, world, options, *accel, *samples);
+        record.whole.noise = args.noise;
+        let (n_samples, some_samples) = *samples;
+        let n_drawn = some_samples.map_or(n_samples, |range| range.len());
+        let goal = args.time.map_or(Goal::Samples(n_drawn), Goal::Time);
+        let (camera, noise_goal) = (world.scene().camera, *noise_goal);
+        Common { args, options, camera, goal, noise_goal, n_drawn, some_samples, deadline, record }
+    }
+}
+
+impl<'a> Session<'a> {
+    pub fn new(args: &'a RenderArgs, n_scenes: usize) -> Self {
+        let (begun_at, spans) = (Instant::now(), Spans::default());
+        let spans_of_trace = args.trace.is_some().then_some(&spans);
+        let progress = Progress::of_kind(args.progress, args.quiet, (&SHARES, n_scenes as u64), spans_of_trace);
+        Self { args, progress, begun_at, spans, engine: OnceCell::new() }
+    }
+
+    /// Returns the engine. The first call opens the devices that the user asks for.
+    pub fn engine(&self) -> Result<&Engine, CliError> {
+        if let Some(engine) = self.engine.get() {
+            return Ok(engine);
+        }
+        let args = self.args;
+        let open = || open_devices(args.device.as_ref(), args.validate, &self.progress);
+        let devices = if args.cpu { Vec::new() } else { info_span!("create device").in_scope(open)? };
+        args.check_devices(devices.len())?;
+        let engine = if args.cpu { Engine::on_cpu() } else { Engine::on_devices(devices) };
+        Ok(self.engine.get_or_init(|| engine.with_request(args.picture.request())))
+    }
+
+    /// Opens the devices again for the next scene if one of them is lost.
+    pub fn replace_lost_devices(&mut self) {
+        if self.engine.get().is_some_and(|engine| engine.devices().any(|device| device.is_lost())) {
+            self.engine.take();
+        }
+    }
+
+    /// Ends the progress. Returns the engine.
+    pub fn end(self) -> Result<Engine, CliError> {
+        self.engine().cloned()
+    }
+
+    /// Loads a scene, builds its structure, draws its views and writes them.
+    pub fn draw(&self, scene: &Path, mut views: Vec<FrameJob>, path: Option<NamedPath>) -> Result<Report, CliError> {
+        let deadline = Deadline::new(self.args.time_limit);
+        let opened = self.open(scene, deadline)?;
+        if let Some(path) = path {
+            let path = path.relative_to(opened.scene.origin);
+            for view in &mut views {
+                view.camera = Some(path.camera_at(view.frame)?);
+            }
+        }
+        let ready = self.build(opened, &views, deadline)?;
+        deadline.check("building")?;
+        let common = ready.common(self.args, deadline);
+        let rendering = format!("rendering {}x{}", common.record.crop.width(), common.record.crop.height());
+        let (engine, stage) = ((&ready.engine, &ready.world), (&self.progress, rendering.as_str()));
+        let (drawn, _) = self.progress.stage(&rendering, || draw_and_write(&common, engine, &views, stage));
+        let DrawnPictures { profiles, n_samples, noise, render_ms } = drawn.map_err(CliError::of_drawing)?;
+
+        let repeated = FrameTimeRange::of(&profiles);
+        let profile = median(profiles);
+        if let Some(path) = &self.args.trace {
+            output::write(path, &trace_json(self.begun_at, &self.spans.sorted(), &profile))?;
+        }
+        let Ready { engine, world, options, accel, methods, noise_goal, n_triangles, load_ms, build_ms, .. } = &ready;
+        Ok(Report {
+            schema: SCHEMA,
+            scene: world.scene().name.clone(),
+            pictures: views.iter().map(|view| view.files.picture.clone()).collect(),
+            extra_files: views.iter().flat_map(|view| view.files.beside()).cloned().collect(),
+            options: options.into(),
+            choices: Choices::of_pictures(*accel, methods.clone()),
+            samples: n_samples,
+            noise: noise_goal.zip(noise).map(|(goal, noise)| noise.report(goal)),
+            devices: engine.devices().count().max(1),
+            whole_frames: draws_whole_frames(engine, &views),
+            triangles: *n_triangles,
+            accel: world.statistics(),
+            grid_build: world.grid_build().cloned(),
+            load_ms: *load_ms,
+            build_ms: *build_ms,
+            render_ms,
+            repeated,
+            frame: profile.into(),
+        })
+    }
+
+    /// Builds the structure of a scene for its views, and chooses the methods.
+    fn build(&self, mut opened: Opened, views: &[FrameJob], deadline: Deadline) -> Result<Ready, CliError> {
+        let (args, progress) = (self.args, &self.progress);
+        args.set_options(&mut opened.options)?;
+        let n_samples = args.samples(&opened.scene);
+        let some_samples = args.some_samples(&opened.scene, &opened.options)?;
+        let noise_goal = args.noise_goal(&opened.scene, &opened.options)?;
+        let engine = self.engine()?;
+        let (n_triangles, load_ms) = (opened.scene.n_triangles(), opened.load_ms);
+        // A part of a picture gets the structure that the whole picture gets.
+        let work = Work::Pictures {
+            cameras: views.iter().filter_map(|view| view.camera).collect(),
+            n_samples,
+            n_at_once: if draws_whole_frames(engine, views) { engine.devices().count() as u32 } else { 1 },
+        };
+        let building = engine.builder().describe(n_triangles);
+        let engine = engine.clone().with_progress(progress.observer(&building, &[progress::Work::Building]));
+        let builder = engine.clone();
+        let build = move || info_span!("build tree").in_scope(|| builder.build(opened, &work));
+        let (built, _) = progress.stage(&building, || deadline.within("building", build));
+        let (Loaded { world, options, accel, notes, build_ms, .. }, methods) = built??;
+        notes.iter().for_each(|note| progress.note(note));
+        let options = methods.apply(&options);
+        let samples = (n_samples, some_samples);
+        Ok(Ready { engine, world, options, accel, methods, samples, noise_goal, n_triangles, load_ms, build_ms })
+    }
+
+    /// Reads a scene.
+    fn open(&self, scene: &Path, deadline: Deadline) -> Result<Opened, CliError> {
+        let loading = format!("loading {}", scene.display());
+        let observer = self.progress.observer(&loading, &[progress::Work::Reading, progress::Work::Images]);
+        let request = self.args.load.pictures(&self.args.picture, &self.args.look, observer);
+        let scene = scene.to_owned();
+        let read = move || info_span!("load scene").in_scope(|| Opened::read(&scene, &request));
+        let (read, _) = self.progress.stage(&loading, || deadline.within("loading", read));
+        Ok(read??)
+    }
+}
+
+/// Returns the record of the pictures, from the scene's own camera.
+fn record(
+    engine: &Engine,
+    world: &World,
+    options: &RenderOptions,
+    accel: ChosenAccel,
+    (n_samples, some_samples): (u32, Option<SampleRange>),
+) -> Record {
+    // Devices of one kind round alike, so they are named once.
+    let of_devices = |of: fn(&DeviceInfo) -> &String| {
+        let mut words: Vec<&str> = Vec::new();
+        for word in engine.devices().map(|device| of(device.info()).as_str()) {
+            if !words.contains(&word) {
+                words.push(word);
+            }
+        }
+        words.join("; ")
+    };
+    Record {
+        scene: world.scene().name.clone(),
+        whole: WholeRecord::new(world.scene(), options, n_samples),
+        crop: options.crop_or_whole(),
+        samples: some_samples.unwrap_or(SampleRange::whole(n_samples)),
+        device: if engine.device().is_some() { of_devices(|it| &it.name) } else { "CPU".to_owned() },
+        driver: of_devices(|it| &it.driver),
+        accel: match accel.tree_kind() {
+            Some(tree) => format!("{}, {}, {}", accel.kind(), tree.value, options.traversal),
+            None => accel.kind().to_string(),
+        },
+        checksum: None,
+    }
+}
+
+/// Returns the frame of median time. Without timestamps, returns the middle one in the order of drawing.
+fn median(mut profiles: Vec<Profile>) -> Profile {
+    profiles.sort_by(|a, b| a.frame_ms.partial_cmp(&b.frame_ms).expect("times are numbers"));
+    profiles.swap_remove(profiles.len() / 2)
+}
