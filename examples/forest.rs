@@ -189,10 +189,11 @@ fn forest() -> Scene {
             mesh_ix: (random.next() * N_TREES as f32) as usize,
             transform: transform.expect("a turn, a size and a place"),
             materials: vec![0, n_others + (random.next() * 12.0) as u32],
+            ..Instance::default()
         }
     };
     let mut instances: Vec<Instance> = (0..N_PLACES).map(&mut place).collect();
-    instances.push(Instance { mesh_ix: meshes.len(), transform: Transform::IDENTITY, materials: vec![1] });
+    instances.push(Instance { mesh_ix: meshes.len(), materials: vec![1], ..Instance::default() });
     meshes.push(ground(half));
     let eye = vec3(-0.4 * half, height(-0.4 * half, half) + 24.0, 1.02 * half);
     Scene {
@@ -214,6 +215,7 @@ fn forest() -> Scene {
             projection: Projection::Perspective { vertical_fov_degrees: 40.0 },
         },
         cameras: Vec::new(),
+        animations: Vec::new(),
         ambient: Vec3::ZERO,
         ground: None,
         background: Vec3::ZERO,

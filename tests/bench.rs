@@ -98,7 +98,8 @@ fn without_a_room_only_primary_hits_have_further_rays() {
 #[test]
 fn a_slow_variant_warms_up_with_fewer_casts_than_a_fast_one() {
     let triangles = torus(100, 100);
-    let scene = FlatScene { triangle_materials: vec![0; triangles.len()], triangles, ..mesh() };
+    let scene =
+        FlatScene { triangle_materials: vec![0; triangles.len()].into(), triangles: triangles.into(), ..mesh() };
     let stage = Stage::in_room(scene, SIZE, &BuildOptions::default());
     let context = device();
     let variants = [Traversal::Mask, Traversal::Brute].map(Search::KdTree);

@@ -149,7 +149,8 @@ fn unusual_scenes_are_drawn() {
     let mut scene = textured::every_kind();
     let textures = &mut scene.textures;
     textures.textures[0].n_mips = 1;
-    textures.textures.push(Texture { flags: TEXTURE_UV_SET | 7 << 8 | 15, ..textures.textures[1] });
+    let second = textures.textures[1];
+    textures.textures.push(Texture { flags: TEXTURE_UV_SET | 7 << 8 | 15, ..second });
     textures.uvs.extend_from_within(..);
     textures.uvs[3] = [Vec2::splat(f32::NAN), Vec2::splat(f32::MAX), Vec2::splat(f32::NEG_INFINITY)];
     let last = textures.textures.len() as u32 - 1;

@@ -40,12 +40,13 @@ fn scene(triangles: &[Triangle]) -> FlatScene {
     FlatScene {
         name: "variants".into(),
         origin: DVec3::ZERO,
-        triangles: triangles.to_vec(),
+        triangles: triangles.to_vec().into(),
         instances: None,
-        triangle_materials: vec![0; triangles.len()],
+        triangle_materials: vec![0; triangles.len()].into(),
+        occurrences: Vec::new().into(),
         materials: vec![scenes::diffuse(Vec3::ONE)],
         material_names: vec![String::new()],
-        textures: kdray::world::Textures::default(),
+        textures: kdray::world::Textures::default().into(),
         lights: vec![lamp, sun],
         camera: Camera {
             eye: vec3(0.0, 0.5, 5.0),

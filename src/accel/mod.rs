@@ -16,7 +16,7 @@ use glam::Vec3;
 use self::{
     grid::{GridLevels, GridOptions, LazyGrid},
     kdtree::{BuildOptions, KdTree},
-    two_level::TwoLevel,
+    two_level::{TreesId, TwoLevel},
 };
 pub use self::{query::Query, search::Search, statistics::Statistics};
 use crate::layout::Triangle;
@@ -122,6 +122,11 @@ impl Accel {
             Self::KdTree(tree) => Some(tree),
             Self::Grid(_) | Self::TwoLevel(_) => None,
         }
+    }
+
+    /// What tells the trees of geometries from all others; none without instances.
+    pub(crate) fn trees_id(&self) -> Option<TreesId> {
+        if let Self::TwoLevel(two) = self { Some(two.trees_id()) } else { None }
     }
 
     /// The kind of the structure, or of that of each geometry.

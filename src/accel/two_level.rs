@@ -1,5 +1,7 @@
 //! The structure of a world of instances: a kd-tree for each geometry, and a hierarchy over the instances.
 
+use std::sync::{Arc, Weak};
+
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -28,13 +30,23 @@ impl StoredRange {
     }
 }
 
+/// Identity of the trees of all geometries. It does not keep them.
+#[derive(Clone, Debug)]
+pub struct TreesId(Weak<Vec<KdTree>>);
+
+impl PartialEq for TreesId {
+    fn eq(&self, other: &Self) -> bool {
+        Weak::ptr_eq(&self.0, &other.0)
+    }
+}
+
 /// The trees of all geometries, and the hierarchy over their instances.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TwoLevel {
     /// A tree for each geometry, in its own space.
-    trees: Vec<KdTree>,
+    trees: Arc<Vec<KdTree>>,
     /// The index at which each tree's nodes begin where all trees are stored one after the other. All are even.
-    node_begins: Vec<usize>,
+    node_begins: Arc<Vec<usize>>,
     top: TopLevel,
 }
 
@@ -51,7 +63,18 @@ impl TwoLevel {
         let trees: Vec<KdTree> = ranges.par_iter().map(build).collect();
         let top = Self::top_of(&trees, instances);
         let node_begins = begins(trees.iter().map(|tree| tree.nodes().len()));
-        Self { trees, node_begins, top }
+        Self { trees: Arc::new(trees), node_begins: Arc::new(node_begins), top }
+    }
+
+    /// Returns the structure of the same geometries in other places. Only the hierarchy is built. `instances`: as many
+    /// as before, each of the same geometry.
+    pub fn moved(&self, instances: &[Instance]) -> Self {
+        Self { top: Self::top_of(&self.trees, instances), ..self.clone() }
+    }
+
+    /// Returns what tells these trees, and those of all structures that share them, from all others.
+    pub fn trees_id(&self) -> TreesId {
+        TreesId(Arc::downgrade(&self.trees))
     }
 
     fn top_of(trees: &[KdTree], instances: &[Instance]) -> TopLevel {
@@ -95,7 +118,7 @@ impl TwoLevel {
     pub fn statistics(&self, options: &BuildOptions) -> Statistics {
         let n_stored = self.n_stored().max(1) as f64;
         let mut all = Statistics { depth: self.depth(), ..Statistics::default() };
-        for tree in &self.trees {
+        for tree in self.trees.iter() {
             let own = tree.statistics(tree.n_triangles(), options);
             all.n_nodes += own.n_nodes;
             all.n_leaves += own.n_leaves;
@@ -143,7 +166,7 @@ impl TwoLevel {
                 reserved: 0,
             }
         };
-        self.trees.iter().zip(&self.node_begins).zip(rows).map(constants).collect()
+        self.trees.iter().zip(self.node_begins.iter()).zip(rows).map(constants).collect()
     }
 }
 

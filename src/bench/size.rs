@@ -18,7 +18,7 @@ use crate::{
     accel::{Accel, Search, Statistics, kdtree::BuildOptions},
     gpu::{Device, GpuError},
     scene::{
-        Camera, Instance, Material, Projection, Scene, Transform,
+        Camera, Instance, Material, Projection, Scene,
         generate::{Generator, MAX_TRIANGLES, TriangleBudget},
     },
     world::FlatScene,
@@ -49,7 +49,7 @@ pub fn knot(n_triangles: u32) -> Scene {
     let mesh = generator.build(&TriangleBudget::default()).expect("numbers within its limits and memory");
     Scene {
         meshes: vec![mesh],
-        instances: vec![Instance { mesh_ix: 0, transform: Transform::IDENTITY, materials: vec![0] }],
+        instances: vec![Instance { materials: vec![0], ..Instance::default() }],
         materials: vec![Material::default()],
         camera: Camera {
             eye: Vec3::Z,

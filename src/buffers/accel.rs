@@ -347,6 +347,32 @@ impl AccelBuffers {
         Ok(())
     }
 
+    /// Uploads the instances and the hierarchy over them, for geometries that are uploaded. Clones of these buffers
+    /// keep their own. Descriptor sets over these buffers have to be made again.
+    ///
+    /// # Errors
+    /// The buffer is beyond the device's limits, or memory runs out. Nothing has changed then.
+    pub(crate) fn set_instances(&mut self, context: &Arc<Context>, geometry: Geometry) -> Result<(), GpuError> {
+        let (Accel::TwoLevel(two), Some(instances)) = (geometry.accel(), geometry.instances()) else { return Ok(()) };
+        let mut next = self.clone();
+        let rows = instance_rows(two, instances, &mut next.uploaded);
+        next.arrays.instance_rows = Content::Elements(&rows).upload(context, "instance_rows", self.access)?;
+        next.upload_constants(context)?;
+        *self = next;
+        Ok(())
+    }
+
+    /// Uploads the emitters of a world that differs from the uploaded one in its instances.
+    ///
+    /// # Errors
+    /// The buffer is beyond the device's limits, or memory runs out. Nothing has changed then.
+    pub(super) fn set_emitters(&mut self, context: &Arc<Context>, world: &World) -> Result<(), GpuError> {
+        match self.has_emitters {
+            true => self.add_words(context, &TextureWords::new(&world.scene().textures, world.emitters())),
+            false => Ok(()),
+        }
+    }
+
     /// Makes rays pass through the triangles with the indices `hidden`. This is for casts only, since the triangles'
     /// materials are overwritten. Descriptor sets and kernels over these buffers have to be made again.
     ///

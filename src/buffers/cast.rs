@@ -53,6 +53,23 @@ impl CastResources {
     ) -> Result<Self, GpuError> {
         let cast_rays = Buffer::new(context, "cast_rays", len, BufferUse::Storage)?;
         let cast_hits = Buffer::new(context, "cast_hits", len, BufferUse::Storage)?;
+        Self::over(bindings, accel, cast_rays, cast_hits)
+    }
+
+    /// Makes the set over the same buffers of rays and hits, and other ones of the structure.
+    ///
+    /// # Errors
+    /// Memory runs out.
+    pub fn with_accel(&self, bindings: &Arc<BindingLayout>, accel: &AccelBuffers) -> Result<Self, GpuError> {
+        Self::over(bindings, accel, self.cast_rays.clone(), self.cast_hits.clone())
+    }
+
+    fn over(
+        bindings: &Arc<BindingLayout>,
+        accel: &AccelBuffers,
+        cast_rays: Buffer<Ray>,
+        cast_hits: Buffer<Hit>,
+    ) -> Result<Self, GpuError> {
         let own =
             [(BIND_CAST_RAYS, Binding::Buffer(cast_rays.any())), (BIND_CAST_HITS, Binding::Buffer(cast_hits.any()))];
         let set = BindingSet::new(bindings, "cast", &[&accel.objects(), &own[..]].concat())?;

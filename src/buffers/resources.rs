@@ -212,6 +212,23 @@ impl Resources {
         })
     }
 
+    /// Makes the resources for a world that differs in its instances. `emitters_differ`: whether it also differs in its
+    /// emitters.
+    ///
+    /// # Errors
+    /// A buffer is beyond the device's limits, or memory runs out.
+    pub fn with_instances(
+        &self,
+        context: &Arc<Context>,
+        world: &World,
+        emitters_differ: bool,
+    ) -> Result<Self, GpuError> {
+        self.changed(|next| {
+            next.accel.set_instances(context, world.geometry())?;
+            if emitters_differ { next.accel.set_emitters(context, world) } else { Ok(()) }
+        })
+    }
+
     /// Makes resources for another number of batches and bounces. The contents of `bounces` and the counters are
     /// undefined.
     ///

@@ -41,6 +41,7 @@ use crate::{
     accel::{
         Query,
         kdtree::{Traversal, TraversalLinks},
+        two_level::TreesId,
         wide_bvh::WideBvh,
     },
     buffers::{AccelBuffers, CastResources, ResumePass, hidden_words},
@@ -49,7 +50,7 @@ use crate::{
     gpu::{Access, BindingLayout, CommandBuffer, Context, Device, GpuError, Limits, Statistic, Timer},
     layout::{PathRay, RAY_GROUP_SIZE},
     passes, reference,
-    world::Geometry,
+    world::{Geometry, Mismatch, World},
 };
 
 /// The result of a cast.
@@ -76,6 +77,8 @@ pub struct GpuCaster {
     context: Arc<Context>,
     /// The triangles and their acceleration structure, which may also be a grid.
     tree: AccelBuffers,
+    /// What tells the trees of geometries from others; none without instances.
+    trees_id: Option<TreesId>,
     bindings: Arc<BindingLayout>,
     traversal: Traversal,
     /// The kernel for [`Query::Closest`], created at its first use.
@@ -102,6 +105,7 @@ impl GpuCaster {
             rays_per_batch: RAYS_PER_BATCH.min(most_rays(context.limits())),
             context: Arc::clone(context),
             tree: buffers,
+            trees_id: geometry.accel().trees_id(),
             bindings,
             traversal,
             closest: None,
@@ -120,6 +124,21 @@ impl GpuCaster {
         self.resources = CastResources::new(&self.context, &self.bindings, &self.tree, 0)?;
         (self.closest, self.any) = (None, None);
         Ok(self)
+    }
+
+    /// Casts rays into a world whose instances have changed ([`World::with_instances_changed`]). Only they are
+    /// uploaded.
+    ///
+    /// # Errors
+    /// The world was not made of this caster's, or memory runs out. Then nothing has changed.
+    pub fn set_world(&mut self, world: &World) -> Result<(), GpuError> {
+        let geometry = world.geometry();
+        check_trees(self.trees_id.as_ref(), geometry)?;
+        let mut tree = self.tree.clone();
+        tree.set_instances(&self.context, geometry)?;
+        self.resources = self.resources.with_accel(&self.bindings, &tree)?;
+        self.tree = tree;
+        Ok(())
     }
 
     /// Limits batches to `n_rays` rays, at least 1 and at most what the device allows.
@@ -222,6 +241,13 @@ pub(crate) fn check_repetitions(n_times: u32) -> Result<(), BadOptions> {
     check("n_times", n_times, n_times <= MOST_REPETITIONS, || format!("at most {MOST_REPETITIONS}"))
 }
 
+/// Checks that a world differs in its instances at most. `trees_id`: that of the world before.
+fn check_trees(trees_id: Option<&TreesId>, geometry: Geometry) -> Result<(), GpuError> {
+    let is_same = trees_id.is_some() && trees_id == geometry.accel().trees_id().as_ref();
+    let wrong = || Mismatch::Scene("the world has other geometries than the caster's".to_owned());
+    if is_same { Ok(()) } else { Err(wrong().into()) }
+}
+
 /// Checks the indices of triangles that are to be hidden.
 fn check_indices(n_triangles: usize, triangles: &[u32]) -> Result<(), BadOptions> {
     let missing = triangles.iter().find(|triangle_ix| **triangle_ix as usize >= n_triangles);
@@ -244,7 +270,7 @@ pub fn count_invalid(rays: &[Ray]) -> u64 {
 
 /// Casts rays on the current rayon pool, as [`GpuCaster`] does on a device.
 pub struct CpuCaster<'a> {
-    geometry: Geometry<'a>,
+    held: Held<'a>,
     traversal: Traversal,
     links: TraversalLinks,
     /// The hierarchy for scattered rays, made after so many of them that it pays.
@@ -254,11 +280,35 @@ pub struct CpuCaster<'a> {
     hidden: Option<Vec<u32>>,
 }
 
+/// The triangles and their structure: the caller's, or those of a world that the caster keeps.
+enum Held<'a> {
+    Borrowed(Geometry<'a>),
+    Kept(World),
+}
+
 impl<'a> CpuCaster<'a> {
     /// Creates a caster, and computes the links (such as ropes) that the traversal reads in addition to the tree.
     pub fn new(geometry: Geometry<'a>, traversal: Traversal) -> Self {
         let links = TraversalLinks::of(geometry.accel(), traversal);
-        Self { geometry, traversal, links, wide: OnceLock::new(), n_scattered: AtomicUsize::new(0), hidden: None }
+        let held = Held::Borrowed(geometry);
+        Self { held, traversal, links, wide: OnceLock::new(), n_scattered: AtomicUsize::new(0), hidden: None }
+    }
+
+    fn geometry(&self) -> Geometry<'_> {
+        match &self.held {
+            Held::Borrowed(geometry) => *geometry,
+            Held::Kept(world) => world.geometry(),
+        }
+    }
+
+    /// Casts rays into a world whose instances have changed, as [`GpuCaster::set_world`] does.
+    ///
+    /// # Errors
+    /// The world was not made of this caster's.
+    pub fn set_world(&mut self, world: &World) -> Result<(), GpuError> {
+        check_trees(self.geometry().accel().trees_id().as_ref(), world.geometry())?;
+        self.held = Held::Kept(world.clone());
+        Ok(())
     }
 
     /// Makes rays pass through the triangles with these indices. A second call replaces the indices of the first.
@@ -266,14 +316,14 @@ impl<'a> CpuCaster<'a> {
     /// # Errors
     /// There is no triangle with one of the indices.
     pub fn hiding(self, triangles: &[u32]) -> Result<Self, BadOptions> {
-        let n_triangles = self.geometry.n_triangles();
+        let n_triangles = self.geometry().n_triangles();
         check_indices(n_triangles, triangles)?;
         Ok(Self { hidden: Some(hidden_words(n_triangles, triangles)), ..self })
     }
 
     /// Casts rays, and returns one hit for each.
     pub fn cast(&self, rays: &[Ray], query: Query) -> Vec<Hit> {
-        let bindings = reference::inputs::KernelInputs::of_geometry(self.geometry);
+        let bindings = reference::inputs::KernelInputs::of_geometry(self.geometry());
         let bindings = match &self.hidden {
             Some(words) => bindings.with_hidden(words),
             None => bindings,
@@ -286,7 +336,7 @@ impl<'a> CpuCaster<'a> {
     /// Returns how the rays are traced: scattered rays through the wide hierarchy, if it exists or making it pays. The
     /// hits are the same either way.
     fn search_for(&self, rays: &[Ray]) -> CpuSearch<'_> {
-        let Self { geometry, traversal, .. } = *self;
+        let (geometry, traversal) = (self.geometry(), self.traversal);
         let packets = CpuSearch::from(traversal);
         let n_triangles = geometry.triangles().len();
         let Some(tree) = geometry.accel().as_kdtree() else { return packets };

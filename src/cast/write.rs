@@ -18,7 +18,7 @@ use super::{Hit, NO_TRIANGLE};
 use crate::{
     accel::Query,
     output::{self, OutputError},
-    world::FlatScene,
+    world::{FlatScene, TriangleOrigin},
 };
 
 /// Number of hits that are read from the spool at a time: 1 MiB.
@@ -26,10 +26,11 @@ const HITS_AT_A_TIME: usize = 1 << 16;
 
 /// Writes a `.npz` file. Until [`HitWriter::finish`], no file is created at its path, and an earlier file stays.
 ///
-/// The arrays for [`Query::Closest`] are `t_hit` (float32 K, infinity on a miss), `primitive_ids` (uint32 K,
-/// 4294967295 on a miss), `primitive_uvs` (float32 K x 2, the weights of the triangle's second and third corner) and
-/// `primitive_normals` (float32 K x 3, unit length, zero on a miss). The normal points to the side from which the
-/// corners are seen in counter-clockwise order. The array for [`Query::Any`] is `occluded` (bool K).
+/// The arrays for [`Query::Closest`] are `t_hit` (float32 K, infinity on a miss), `instance_ids`, `geometry_ids` and
+/// `primitive_ids` (uint32 K, 4294967295 on a miss: the instance, its mesh, and the mesh's face), `primitive_uvs`
+/// (float32 K x 2, the weights of the triangle's second and third corner) and `primitive_normals` (float32 K x 3, unit
+/// length, zero on a miss). The normal points to the side from which the corners are seen in counter-clockwise order.
+/// The array for [`Query::Any`] is `occluded` (bool K).
 pub struct HitWriter {
     path: PathBuf,
     spool: SpooledTempFile,
@@ -67,7 +68,9 @@ impl HitWriter {
             match query {
                 Query::Closest => {
                     hits.write(&mut archive, "t_hit", |hit| [hit.t])?;
-                    hits.write(&mut archive, "primitive_ids", |hit| [hit.triangle_ix])?;
+                    hits.write(&mut archive, "instance_ids", |hit| id_of(scene, hit, |it| it.instance_ix))?;
+                    hits.write(&mut archive, "geometry_ids", |hit| id_of(scene, hit, |it| it.mesh_ix))?;
+                    hits.write(&mut archive, "primitive_ids", |hit| id_of(scene, hit, |it| it.face_ix))?;
                     hits.write(&mut archive, "primitive_uvs", |hit| [hit.u, hit.v])?;
                     hits.write(&mut archive, "primitive_normals", |hit| normal_at(scene, hit))?;
                 }
@@ -77,6 +80,11 @@ impl HitWriter {
             Ok(())
         })
     }
+}
+
+/// Returns an index that names the hit triangle, or that of no triangle on a miss.
+fn id_of(scene: &FlatScene, hit: &Hit, id: impl Fn(TriangleOrigin) -> u32) -> [u32; 1] {
+    [if hit.triangle_ix == NO_TRIANGLE { NO_TRIANGLE } else { id(scene.origin_of(hit.triangle_ix)) }]
 }
 
 /// Returns the unit normal of the hit triangle by its winding. It is zero on a miss and for a triangle without area.

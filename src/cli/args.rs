@@ -98,7 +98,7 @@ pub struct RenderArgs {
     /// is standard input
     #[arg(long, value_name = "FILE")]
     pub list: Option<PathBuf>,
-    /// Picture to write: .png, or .exr for linear radiance; with --path, #### in the name stands for the frame's
+    /// Picture to write: .png, or .exr for linear radiance; of a film, #### in the name stands for the frame's
     /// number; of several scenes, a folder, or a name in which {} stands for the scene's name, as in out/{}.exr
     /// [default: the scene's name with .png, or with .####.png, in the working directory]
     #[arg(short, long, value_name = "FILE|FOLDER")]
@@ -106,8 +106,9 @@ pub struct RenderArgs {
     /// Move the camera along the keyframes of this TOML file, and write one picture per frame
     #[arg(long, value_name = "FILE", conflicts_with = "repeat")]
     pub path: Option<PathBuf>,
-    /// Frames of the path to render, both ends included, for example 0-99, 7, 0-99x4 for every fourth, or all; the path
-    /// is that of --path, or the one in a pack [default with --path: all, from the first keyframe to the last]
+    /// Frames to render, both ends included, for example 0-99, 7, 0-99x4 for every fourth, or all those of the path:
+    /// of the path of --path, or the one in a pack, and of the file's animations, which frame N shows at N / F seconds
+    /// (--fps F) [default with --path: all, from the first keyframe to the last]
     #[arg(long, value_name = "A-BxS|all", conflicts_with = "repeat")]
     pub frames: Option<FrameChoice>,
     /// Leave out pictures whose files exist already, whatever they show, so that a film that was interrupted goes on
@@ -197,8 +198,8 @@ pub struct CastArgs {
     /// Rays to cast, a .npy file of float32: K x 8 (origin, direction, t_min, t_max), or K x 6 for t from 0 to
     /// infinity; directions need not be unit vectors, but a ray whose direction is shorter than 1.2e-38 misses
     pub rays: PathBuf,
-    /// Hits to write, a .npz file of the arrays t_hit, primitive_ids, primitive_uvs and primitive_normals, or with
-    /// --any of a single array, occluded
+    /// Hits to write, a .npz file of the arrays t_hit, instance_ids, geometry_ids, primitive_ids, primitive_uvs and
+    /// primitive_normals, or with --any of a single array, occluded
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
     /// Find only whether each ray hits anything (occlusion), not the closest hit
@@ -323,23 +324,25 @@ pub struct MergeArgs {
 }
 
 impl RenderArgs {
+    /// Whether the command draws the frames of a film.
+    pub fn is_film(&self) -> bool {
+        self.path.is_some() || self.frames.is_some()
+    }
+
     /// Returns the arguments with the path in the scene's pack, if the user wants frames and names no path.
     pub fn with_packed_path(self, scene: &Path) -> Result<Self, CliError> {
         if self.frames.is_none() || self.path.is_some() {
             return Ok(self);
         }
-        match packed_path(scene)? {
-            Some(path) => Ok(Self { path: Some(path), ..self }),
-            None => Err(CliError::Usage("--frames needs --path FILE, or a pack with a path".into())),
-        }
+        Ok(Self { path: packed_path(scene)?, ..self })
     }
 
     /// Refuses arguments that contradict each other.
     pub fn check(&self) -> Result<(), CliError> {
         self.picture.check()?;
-        if self.trace.is_some() && (self.spp.is_some_and(|n| n > 1) || self.path.is_some()) {
+        if self.trace.is_some() && (self.spp.is_some_and(|n| n > 1) || self.is_film()) {
             return Err(CliError::Usage(
-                "--trace cannot be combined with --spp or --path: it shows a single sample".into(),
+                "--trace cannot be combined with --spp, --path or --frames: it shows a single sample".into(),
             ));
         }
         let is_exr = |path: &PathBuf| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("exr"));
@@ -369,8 +372,7 @@ impl RenderArgs {
     /// Whether pictures can end with fewer samples than they should have. Frames of a film cannot, and neither can
     /// pictures that `--skip-existing` would leave out later, measurements, or parts that are to be joined.
     pub fn may_end_early(&self) -> bool {
-        let is_film = self.path.is_some() || self.skip_existing;
-        !is_film && self.samples.is_none() && self.repeat == 1
+        !self.is_film() && !self.skip_existing && self.samples.is_none() && self.repeat == 1
     }
 
     /// Refuses devices that are not of the kind that the user requires.

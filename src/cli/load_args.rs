@@ -1,6 +1,10 @@
 //! Arguments that say what is loaded of a scene's file. All commands that load a scene share them.
 
-use kdray::{engine::LoadRequest, scene::LoadOptions, util::progress::Progress};
+use kdray::{
+    engine::LoadRequest,
+    scene::{AnimationChoice, AnimationInfo, LoadOptions},
+    util::progress::Progress,
+};
 
 use super::{look_args::LookArgs, picture_args::PictureArgs};
 
@@ -13,6 +17,19 @@ pub struct LoadArgs {
     /// Scene of a glTF file to load: its name, or its index, counted from 0 [default: the file's default scene]
     #[arg(long = "scene", value_name = "NAME|INDEX")]
     pub scene_name: Option<String>,
+    /// Show the animations of a glTF file at this time [default: things stand as the file has them at rest]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
+    pub at: Option<f64>,
+    /// Show the animations at frame N, which is at N / F seconds (--fps F)
+    #[arg(long, value_name = "N", conflicts_with = "at")]
+    pub frame: Option<u32>,
+    /// Frames a second of --frame and --frames [default: 24]
+    #[arg(long, value_name = "F", value_parser = rate)]
+    pub fps: Option<f64>,
+    /// Animations to show: all together, none, or one by its name or its index in `kdray inspect`, counted from 0
+    /// [default: all]
+    #[arg(long, value_name = "all|none|NAME|INDEX")]
+    pub animation: Option<String>,
     /// Read files that the scene's files name wherever they lie; otherwise only below the folder of the file that names
     /// them
     #[arg(long)]
@@ -41,6 +58,24 @@ impl LoadArgs {
         LoadOptions { recentre: true, ..self.options() }
     }
 
+    /// Returns the time of a frame, seconds.
+    pub fn seconds_of(&self, frame: u32) -> f64 {
+        f64::from(frame) / self.fps.unwrap_or(24.0)
+    }
+
+    /// Whether some of a scene's animations are shown in a film.
+    pub fn plays(&self, animations: &[AnimationInfo]) -> bool {
+        !animations.is_empty() && self.animation() != AnimationChoice::None
+    }
+
+    fn animation(&self) -> AnimationChoice {
+        match self.animation.as_deref() {
+            None | Some("all") => AnimationChoice::All,
+            Some("none") => AnimationChoice::None,
+            Some(name) => AnimationChoice::Named(name.to_owned()),
+        }
+    }
+
     /// Returns the options of loading.
     pub fn options(&self) -> LoadOptions {
         let &Self { allow_outside, .. } = self;
@@ -48,7 +83,19 @@ impl LoadArgs {
             scene: self.scene_name.clone(),
             camera: self.camera.clone(),
             allow_outside,
+            at: self.at.or(self.frame.map(|frame| self.seconds_of(frame))),
+            animation: self.animation(),
             ..LoadOptions::default()
         }
     }
+}
+
+fn seconds(word: &str) -> Result<f64, String> {
+    let seconds = word.parse().ok().filter(|seconds: &f64| seconds.is_finite());
+    seconds.ok_or_else(|| "expected a number of seconds, such as 1.5".to_owned())
+}
+
+fn rate(word: &str) -> Result<f64, String> {
+    let rate = word.parse().ok().filter(|rate: &f64| rate.is_finite() && *rate > 0.0);
+    rate.ok_or_else(|| "expected a number of frames a second above 0, such as 24 or 29.97".to_owned())
 }

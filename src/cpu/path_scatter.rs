@@ -304,12 +304,12 @@ mod tests {
             let normals = if i % 5 == 4 { [7, 8, 9] } else { [FLAT_NORMAL; 3] };
             Triangle { v0, v1, v2: corner(), n0: normals[0], n1: normals[1], n2: normals[2] }
         };
-        scene.triangles = (0..300).map(triangle).collect();
+        scene.triangles = (0..300).map(triangle).collect::<Vec<_>>().into();
         scene.materials = materials().1;
         scene.material_names = vec![String::new(); scene.materials.len()];
         // Two of three triangles are Lambertian.
         let material_of = |i| if i % 3 < 2 { i % materials().0 } else { i % scene.materials.len() };
-        scene.triangle_materials = (0..300).map(|i| material_of(i) as u32).collect();
+        scene.triangle_materials = (0..300).map(|i| material_of(i) as u32).collect::<Vec<_>>().into();
         World::of_flat(scene, &BuildOptions::default()).expect("a world")
     }
 

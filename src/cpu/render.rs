@@ -149,6 +149,18 @@ impl CpuRenderer {
         }
     }
 
+    /// Draws another world from now on. The next sample is the first of a new picture.
+    pub fn set_world(&mut self, world: &World) {
+        if !world.shares_geometries(&self.world) {
+            let (options, batching, camera) = (self.options.clone(), self.batching, self.camera);
+            *self = Self { camera, ..Self::new(world, &options, batching) };
+            return;
+        }
+        self.frame.set_light_of(&world.frame_constants(&self.options));
+        self.world = world.clone();
+        self.reset_samples();
+    }
+
     /// Draws one more sample of each pixel on the current rayon pool. The first sample is at the pixel's centre. Of
     /// paths, as many samples are drawn as [`FrameRenderer::set_samples_per_frame`] says. The picture is the mean of
     /// all samples.

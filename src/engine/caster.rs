@@ -6,7 +6,7 @@ use crate::{
     accel::{Query, kdtree::Traversal},
     cast::{self, CastResult, CpuCaster, Ray},
     gpu::{Context, GpuError},
-    world::Geometry,
+    world::{Geometry, World},
 };
 
 /// Casts rays, on the device or on the CPU.
@@ -39,6 +39,18 @@ impl<'a> Caster<'a> {
             Backend::Device(caster) => Backend::Device(Box::new(caster.hiding(triangles)?)),
             Backend::Cpu(caster) => Backend::Cpu(Box::new(caster.hiding(triangles)?)),
         }))
+    }
+
+    /// Casts rays into a world whose instances have changed ([`World::with_instances_changed`]). Only they are
+    /// uploaded.
+    ///
+    /// # Errors
+    /// The world was not made of this caster's, or memory runs out. Then nothing has changed.
+    pub fn set_world(&mut self, world: &World) -> Result<(), GpuError> {
+        match &mut self.0 {
+            Backend::Device(caster) => caster.set_world(world),
+            Backend::Cpu(caster) => caster.set_world(world),
+        }
     }
 
     /// Casts all rays `n_times` (at least once) for timing. Every repetition finds the same hits. The times of the

@@ -6,6 +6,7 @@
 //!                                       └─────> Engine::cast ───> hits
 //! ```
 
+mod animated;
 mod caster;
 pub mod choices;
 mod first_view;
@@ -19,6 +20,7 @@ use std::sync::Arc;
 
 use self::choices::{Cache, Methods, Processor, Request, Workload};
 pub use self::{
+    animated::AnimatedWorld,
     caster::Caster,
     group::FilmRenderer,
     load::{Builder, LoadError, LoadRequest, Loaded, Opened, Source, Work},

@@ -64,6 +64,24 @@ impl Renderer {
         }
     }
 
+    /// Draws another world from now on. If the world was made of this renderer's by
+    /// [`World::with_instances_changed`], only the instances are uploaded, and emitters that have changed. The camera
+    /// of the next picture is the one that [`Renderer::draw`] is given.
+    ///
+    /// # Errors
+    /// The world exceeds the limits or the memory of all devices. Then nothing has changed. If it exceeds those of
+    /// some, these draw nothing more, and a warning says so.
+    pub fn set_world(&mut self, world: &World) -> Result<(), GpuError> {
+        match &mut self.backend {
+            Backend::Device(renderer) => renderer.set_world(world),
+            Backend::Group(group) => group.set_world(world),
+            Backend::Cpu(renderer) => {
+                renderer.set_world(world);
+                Ok(())
+            }
+        }
+    }
+
     /// Draws what a camera sees. The watcher is notified of each sample of each band. If it uses [`Watcher::part`], it
     /// is also notified of the progress within a sample. It can end the picture with fewer samples than the goal
     /// ([`Watcher::ends`]).

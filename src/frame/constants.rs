@@ -18,6 +18,12 @@ const NEAR_SHARE: f64 = 1.0 / (1 << 20) as f64;
 const DEPTH_MARGIN: f64 = 1.0 / (1 << 18) as f64;
 
 impl Frame {
+    /// Sets the constants that depend on where the world's surfaces are, to those of another frame.
+    pub fn set_light_of(&mut self, other: &Self) {
+        let &Self { ambient, ambient_tilt, background, .. } = other;
+        *self = Self { ambient, ambient_tilt, background, ..*self };
+    }
+
     /// Sets the constants that depend on the options alone. [`Frame::set_view`] must be called afterwards, since it
     /// reads the picture's size.
     ///

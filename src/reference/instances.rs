@@ -184,9 +184,9 @@ mod tests {
         scene.meshes = vec![Mesh::of_triangles(positions, (0..8).map(face).collect())];
         let material = scene.push_material(crate::scene::Material::default());
         let instance = |transform: &Transform| crate::scene::Instance {
-            mesh_ix: 0,
             transform: transform.clone(),
             materials: vec![material],
+            ..Default::default()
         };
         scene.instances = transforms.iter().map(instance).collect();
         World::of_flat(FlatScene::with_instances(&scene).unwrap(), &BuildOptions::default()).unwrap()

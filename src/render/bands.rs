@@ -59,6 +59,15 @@ impl BandedRenderer {
         self.renderer.set_camera(camera);
     }
 
+    /// Draws another world from now on, as [`GpuRenderer::set_world`] does.
+    ///
+    /// # Errors
+    /// Fails as [`GpuRenderer::set_world`] does.
+    pub fn set_world(&mut self, world: &World) -> Result<(), GpuError> {
+        self.joined = None;
+        self.renderer.set_world(world)
+    }
+
     /// Sets the part of the picture that is drawn next, a rectangle. Buffers are kept as [`GpuRenderer::set_crop`]
     /// keeps them.
     ///

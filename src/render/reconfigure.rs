@@ -1,15 +1,17 @@
 //! Changes between frames: of the camera, the size, the crop and the options. The scene and its acceleration
 //! structure stay on the device; a change of the traversal adds the links that it reads.
 
-use std::sync::Arc;
+use std::{ptr, sync::Arc};
 
 use super::{GpuRenderer, in_use, lanes_to_share, schedule::Schedule};
 use crate::{
     buffers::{Needs, Resources},
-    frame::{Crop, FrameRenderer, RenderOptions},
+    frame::{Crop, FrameRenderer, Integrator, RenderOptions},
     gpu::GpuError,
-    layout::Frame,
+    layout::{Frame, constants},
+    passes::FramePasses,
     scene::Camera,
+    world::World,
 };
 
 impl GpuRenderer {
@@ -62,9 +64,39 @@ impl GpuRenderer {
     /// The driver refuses a shader. Then all kernels are as before.
     #[cfg(feature = "view")]
     pub fn remake_passes(&mut self) -> Result<(), GpuError> {
-        let passes = crate::passes::FramePasses::new(&self.context, &self.resources.bindings, &self.in_use)?;
+        let passes = FramePasses::new(&self.context, &self.resources.bindings, &self.in_use)?;
         self.reset_samples();
         self.passes = passes;
+        Ok(())
+    }
+
+    /// Draws another world from now on. The next sample is the first of a new picture. If the world was made of this
+    /// renderer's by [`World::with_instances_changed`], only the instances are uploaded, and emitters that have
+    /// changed.
+    ///
+    /// # Errors
+    /// The world exceeds the device's limits or memory, or the driver refuses a kernel. Then nothing has changed.
+    pub fn set_world(&mut self, world: &World) -> Result<(), GpuError> {
+        if !world.shares_geometries(&self.world) {
+            let scene = (self.context.clone(), world);
+            let next = Self::with_capacity(scene, &self.options, self.budget.fixed_capacity, None)?;
+            self.become_other(next);
+            return Ok(());
+        }
+        let of_paths = self.in_use.integrator == Integrator::Path;
+        let emitters_differ = of_paths && !ptr::eq(world.emitters(), self.world.emitters());
+        let mut resources = self.resources.with_instances(&self.context, world, emitters_differ)?;
+        let mut constants = *resources.constants();
+        constants.set_light_of(&world.frame_constants(&self.in_use));
+        resources.set_constants(&constants);
+        // Kernels are made for kinds of emitters.
+        let kinds = if of_paths { world.emitters().kinds() } else { 0 };
+        if of_paths && kinds != self.world.emitters().kinds() {
+            resources.bindings = resources.bindings.with_constant(constants::EMITTERS, kinds);
+            self.passes = FramePasses::new(&self.context, &resources.bindings, &self.in_use)?;
+        }
+        self.reset_samples();
+        (self.resources, self.world) = (resources, world.clone());
         Ok(())
     }
 
@@ -100,11 +132,17 @@ impl GpuRenderer {
 
     /// Becomes another renderer of the same world, for another integrator.
     fn replace(&mut self, options: &RenderOptions) -> Result<(), GpuError> {
-        let mut next = self.sharing(options)?;
+        let next = self.sharing(options)?;
+        self.become_other(next);
+        Ok(())
+    }
+
+    /// Becomes another renderer, which keeps the camera and the view.
+    fn become_other(&mut self, mut next: Self) {
+        next.set_camera(&self.camera);
         next.false_color = self.false_color;
         next.needs_primary_rays_only = self.needs_primary_rays_only;
         *self = next;
-        Ok(())
     }
 
     /// Creates the buffers and the batches for options that need other ones, such as another size or number of

@@ -35,9 +35,10 @@ pub use self::{
 pub use self::{
     meshes::generate,
     model::{
-        Alpha, Camera, Channel, ChosenLight, Clearcoat, Conductor, DenoiseChoice, Encoding, Environment, Ground, Image,
-        Instance, Light, LightChoice, LoadOptions, Lobes, Look, MIN_EXTENT, Maps, Material, MaterialChoice,
-        MendedTexels, Mesh, Microfacet, PathDefaults, PictureChoices, Pixels, Preset, Projection, RenderDefaults,
-        Scene, SceneError, Sheen, Sky, SkyChoice, Texture, Transform, Up, Wrap, mesh,
+        Alpha, AnimationChoice, AnimationInfo, Camera, Channel, ChosenLight, Clearcoat, Conductor, DenoiseChoice,
+        Encoding, Environment, Ground, Image, Instance, Light, LightChoice, LoadOptions, Lobes, Look, MIN_EXTENT, Maps,
+        Material, MaterialChoice, MendedTexels, Mesh, Microfacet, PathDefaults, PictureChoices, Pixels, Preset,
+        Projection, RayKinds, RenderDefaults, Scene, SceneError, Sheen, Sky, SkyChoice, Texture, Transform, Up, Wrap,
+        mesh,
     },
 };

@@ -1,5 +1,5 @@
 //! Helpers that know nothing about rays: names of an option's variants, text that is safe to print, the host's
-//! memory, progress.
+//! memory, progress, data that clones share.
 
 #[macro_use]
 mod named_enum;
@@ -8,6 +8,7 @@ pub mod memory;
 #[cfg(feature = "files")]
 pub(crate) mod npy;
 pub mod progress;
+mod shared;
 pub mod text;
 
-pub use self::named_enum::UnknownWord;
+pub use self::{named_enum::UnknownWord, shared::Shared};

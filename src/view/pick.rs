@@ -14,7 +14,7 @@ use crate::{
         primary_hit::camera_ray,
     },
     scene::Camera,
-    world::{FlatScene, World},
+    world::{FlatScene, TriangleOrigin, World},
 };
 
 /// Most rays of one level that are followed. A pixel of glass can have more rays than anyone reads.
@@ -47,8 +47,8 @@ pub struct PickedRay {
 /// Where a ray ended.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PickedHit {
-    /// Index of the triangle in the scene.
-    pub triangle_ix: u32,
+    /// The triangle's instance, mesh and face.
+    pub origin: TriangleOrigin,
     /// The material's name.
     pub material: String,
     /// Distance from the ray's origin, world units.
@@ -92,7 +92,7 @@ fn found(scene: &FlatScene, ray: &PathRay, hit: &Hit) -> Option<PickedHit> {
     (hit.triangle_ix != NO_TRIANGLE).then(|| {
         let material_ix = scene.material_ix_of(hit.triangle_ix as usize);
         PickedHit {
-            triangle_ix: hit.triangle_ix,
+            origin: scene.origin_of(hit.triangle_ix),
             material: scene.material_names[material_ix as usize].clone(),
             distance: hit.t,
             point_world: ray.origin + hit.t * ray.direction,

@@ -68,15 +68,19 @@ fn check_materials(scene: &FlatScene) -> Result<(), Mismatch> {
 /// Checks that instances follow one another, that each has a geometry, and that the slots of its triangles have
 /// materials.
 fn check_instances(instances: &Instances, scene: &FlatScene) -> Result<(), Mismatch> {
-    let Instances { ranges, list, materials } = instances;
+    let Instances { ranges, list, materials, .. } = instances;
+    check_len("n_slots", instances.n_slots.len(), (ranges.len(), "geometries"))?;
     let mut first_row = 0;
-    let mut n_slots = Vec::with_capacity(ranges.len());
     for (ix, range) in ranges.iter().enumerate() {
         let end = first_row + range.n_triangles as usize;
         if range.first_row as usize != first_row || end > scene.triangles.len() {
             return Err(scene_error(format!("instances: geometry {ix} does not follow the one before")));
         }
-        n_slots.push(scene.triangle_materials[first_row..end].par_iter().max().map_or(0, |slot| *slot as usize + 1));
+        let last_slot = scene.triangle_materials[first_row..end].par_iter().max();
+        let (n_slots, stated) = (last_slot.map_or(0, |slot| *slot as usize + 1), instances.n_slots[ix]);
+        if n_slots != stated as usize {
+            return Err(scene_error(format!("n_slots: geometry {ix} has {n_slots} slots, not {stated}")));
+        }
         first_row = end;
     }
     check_len("triangles", scene.triangles.len(), (first_row, "triangles of geometries"))?;
@@ -91,7 +95,9 @@ fn check_instances(instances: &Instances, scene: &FlatScene) -> Result<(), Misma
         if instance.first_triangle as usize != first_triangle {
             return wrong("does not follow the one before");
         }
-        if instance.first_material as usize + n_slots[instance.geometry_ix as usize] > materials.len() {
+        if instance.first_material as usize + instances.n_slots[instance.geometry_ix as usize] as usize
+            > materials.len()
+        {
             return wrong("lacks materials");
         }
         let corners = [instance.axis_x, instance.axis_y, instance.axis_z, instance.translation];
@@ -116,7 +122,7 @@ fn check_instances(instances: &Instances, scene: &FlatScene) -> Result<(), Misma
 
 /// Checks the arrays of textures. All of them are empty, or each material has maps.
 fn check_textures(scene: &FlatScene) -> Result<(), Mismatch> {
-    let Textures { texels, textures, material_maps, uvs, corners, n_triangles } = &scene.textures;
+    let Textures { texels, textures, material_maps, uvs, corners, n_triangles } = &*scene.textures;
     if [texels.len(), textures.len(), material_maps.len(), uvs.len(), corners.len()] == [0; 5] {
         return Ok(());
     }

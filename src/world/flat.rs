@@ -18,12 +18,35 @@ use crate::{
         MATERIAL_UNLIT, Material, Triangle, normal::encode_octahedral,
     },
     scene::{
-        self, Alpha, Camera, Conductor, Environment, Ground, Lobes, Mesh, Microfacet, RenderDefaults, Scene, Sky,
-        Transform, mesh::box_corners,
+        self, Alpha, Camera, Conductor, Environment, Ground, Lobes, Mesh, Microfacet, RayKinds, RenderDefaults, Scene,
+        Sky, Transform, mesh::box_corners,
     },
+    util::Shared,
 };
 
+/// Where the triangles of a scene's instance begin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Occurrence {
+    /// The index of the instance's first triangle in the world.
+    pub first_triangle: u32,
+    /// The index of its mesh in [`Scene::meshes`].
+    pub mesh_ix: u32,
+}
+
+/// What a triangle of the world is in the scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TriangleOrigin {
+    /// The index of its instance in [`Scene::instances`].
+    pub instance_ix: u32,
+    /// The index of the instance's mesh in [`Scene::meshes`].
+    pub mesh_ix: u32,
+    /// The index of the face in the mesh.
+    pub face_ix: u32,
+}
+
 /// Scene as it is traced: everything that a frame shows, with all meshes in world space.
+///
+/// Clones share the large arrays. A clone that changes one gets one of its own ([`Shared`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct FlatScene {
     /// The scene's name.
@@ -32,9 +55,12 @@ pub struct FlatScene {
     pub origin: DVec3,
     /// The triangles that are stored: those of the world, instance after instance, each in the order of its mesh's
     /// faces; or with `instances`, those of the geometries, each in its own space.
-    pub triangles: Vec<Triangle>,
+    pub triangles: Shared<Vec<Triangle>>,
     /// For each stored triangle, the index of its material in `materials`; with `instances`, its slot.
-    pub triangle_materials: Vec<u32>,
+    pub triangle_materials: Shared<Vec<u32>>,
+    /// The world's triangles that come from each instance of the scene, in their order. Without any, all triangles
+    /// count as those of one mesh.
+    pub occurrences: Shared<Vec<Occurrence>>,
     /// The instances of the geometries. `None`: the stored triangles are those of the world.
     pub instances: Option<Instances>,
     /// The materials.
@@ -42,7 +68,7 @@ pub struct FlatScene {
     /// The name of each material.
     pub material_names: Vec<String>,
     /// The textures, with what leads from triangles to them.
-    pub textures: Textures,
+    pub textures: Shared<Textures>,
     /// The lights without an area; there may be none.
     pub lights: Vec<Light>,
     /// Rectangles, disks and spheres that shine. Only the path tracer knows them.
@@ -67,10 +93,14 @@ impl FlatScene {
     /// Places all meshes of a scene in the world, on the current rayon pool.
     ///
     /// # Errors
-    /// An index names nothing, arrays have different lengths, an instance with faces has no material, or a vertex is
-    /// too far from the origin.
+    /// An index names nothing, arrays have different lengths, an instance with faces has no material, some rays pass
+    /// through an instance, or a vertex is too far from the origin.
     pub fn new(scene: &Scene) -> Result<Self, Mismatch> {
         check_instances(scene)?;
+        if let Some(instance) = scene.instances.iter().position(|instance| instance.rays != RayKinds::ALL) {
+            let what = "some rays pass through it, which needs --instances keep, and kd-trees".to_owned();
+            return Err(Mismatch::Instance { instance, what });
+        }
         let mut parts = Parts { triangles: Vec::with_capacity(scene.n_triangles()), ..Parts::default() };
         for (instance_ix, instance) in scene.instances.iter().enumerate() {
             let mesh = &scene.meshes[instance.mesh_ix];
@@ -108,15 +138,23 @@ impl FlatScene {
     fn of_parts(scene: &Scene, parts: Parts, textures: Textures, instances: Option<Instances>) -> Self {
         let sky = scene.sky.as_ref().map(Sky::environment);
         let sun = scene.sky.filter(|sky| sky.has_sun).map(|sky| sky.sun());
+        let mut n_before = 0;
+        let occurrences = scene.instances.iter().map(|instance| {
+            let first_triangle = n_before as u32;
+            n_before += scene.meshes[instance.mesh_ix].faces.len();
+            Occurrence { first_triangle, mesh_ix: instance.mesh_ix as u32 }
+        });
+        let occurrences: Vec<_> = occurrences.collect();
         Self {
             name: scene.name.clone(),
             origin: scene.origin,
-            triangles: parts.triangles,
-            triangle_materials: parts.materials,
+            triangles: parts.triangles.into(),
+            triangle_materials: parts.materials.into(),
+            occurrences: occurrences.into(),
             instances,
             materials: scene.materials.iter().map(Material::from).collect(),
             material_names: scene.materials.iter().map(|material| material.name.clone()).collect(),
-            textures,
+            textures: textures.into(),
             lights: scene.lights.iter().chain(&sun).filter_map(flat_light).collect(),
             area_lights: scene.lights.iter().filter_map(area_light).collect(),
             environment: sky.or_else(|| scene.environment.clone()),
@@ -142,6 +180,16 @@ impl FlatScene {
         }
     }
 
+    /// Returns what a triangle of the world is in the scene.
+    pub fn origin_of(&self, triangle_ix: u32) -> TriangleOrigin {
+        let n_begun = self.occurrences.partition_point(|it| it.first_triangle <= triangle_ix);
+        let Some(instance_ix) = n_begun.checked_sub(1) else {
+            return TriangleOrigin { instance_ix: 0, mesh_ix: 0, face_ix: triangle_ix };
+        };
+        let Occurrence { first_triangle, mesh_ix } = self.occurrences[instance_ix];
+        TriangleOrigin { instance_ix: instance_ix as u32, mesh_ix, face_ix: triangle_ix - first_triangle }
+    }
+
     /// Returns a triangle in world space.
     pub fn triangle(&self, triangle_ix: usize) -> Triangle {
         let Stored { row, instance } = self.stored(triangle_ix);
@@ -165,7 +213,7 @@ impl FlatScene {
         };
         let slots: Vec<Vec<usize>> = instances.ranges.iter().map(of_slots).collect();
         for instance in &instances.list {
-            let materials = &instances.materials[instance.first_material as usize..];
+            let materials = instances.materials_of(instance);
             for (n, material_ix) in slots[instance.geometry_ix as usize].iter().zip(materials) {
                 counts[*material_ix as usize] += n;
             }
@@ -180,18 +228,15 @@ impl FlatScene {
             let all = self.triangle_materials.par_iter().enumerate();
             return all.filter(|(_, ix)| is_wanted[**ix as usize]).map(|(triangle_ix, _)| triangle_ix).collect();
         };
-        let n_slots_of =
-            |range: &StoredRange| range.of(&self.triangle_materials).iter().max().map_or(0, |slot| slot + 1);
-        let n_slots: Vec<u32> = instances.ranges.par_iter().map(n_slots_of).collect();
         let of_instance = |instance: &Instance| {
             let first = instance.first_triangle as usize;
             let slots = instances.ranges[instance.geometry_ix as usize].of(&self.triangle_materials);
-            let materials = &instances.materials[instance.first_material as usize..];
-            let is_wanted = |slot: u32| is_wanted[materials[slot as usize] as usize];
+            let materials = instances.materials_of(instance);
             // Most instances have no such material at all.
-            if !(0..n_slots[instance.geometry_ix as usize]).any(is_wanted) {
+            if !materials.iter().any(|material| is_wanted[*material as usize]) {
                 return Vec::new();
             }
+            let is_wanted = |slot: u32| is_wanted[materials[slot as usize] as usize];
             slots.iter().enumerate().filter(|(_, slot)| is_wanted(**slot)).map(|(ix, _)| first + ix).collect()
         };
         instances.list.par_iter().flat_map_iter(|it| -> Vec<usize> { of_instance(it) }).collect()

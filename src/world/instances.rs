@@ -19,7 +19,7 @@ use crate::{
         NO_TRIANGLE, SUSPENDED, Triangle,
         normal::{decode_octahedral, encode_octahedral},
     },
-    scene::{Mesh, Scene, Transform, mesh::MAX_COORDINATE},
+    scene::{Mesh, RayKinds, Scene, Transform, mesh::MAX_COORDINATE},
 };
 
 /// Whether meshes that occur several times are stored once.
@@ -44,15 +44,16 @@ named_enum!(Instancing {
 const FEW_TRIANGLES: usize = 1 << 22;
 
 impl Instancing {
-    /// Returns whether the meshes of a scene are stored once: by the rule, if the instances have more than
-    /// 2^22 triangles and at least twice as many as the meshes.
+    /// Returns whether the meshes of a scene are stored once: by the rule, if an instance is hidden from some rays, or
+    /// if the instances have more than 2^22 triangles and at least twice as many as the meshes.
     pub fn keeps(self, scene: &Scene) -> bool {
         match self {
             Self::Flatten => false,
             Self::Keep => true,
             Self::Auto => {
                 let n_triangles = scene.n_triangles();
-                n_triangles > FEW_TRIANGLES && n_triangles / 2 >= scene.n_stored()
+                let saves_half = n_triangles > FEW_TRIANGLES && n_triangles / 2 >= scene.n_stored();
+                saves_half || scene.instances.iter().any(|instance| instance.rays != RayKinds::ALL)
             }
         }
     }
@@ -63,10 +64,15 @@ impl Instancing {
 pub struct Instances {
     /// Where the triangles of each geometry are stored.
     pub ranges: Vec<StoredRange>,
+    /// The number of slots of each geometry: 1 more than the greatest of its triangles.
+    pub n_slots: Vec<u32>,
     /// The instances, in the order of their first triangles.
     pub list: Vec<Instance>,
     /// The materials of the instances' slots (`Instance::first_material`).
     pub materials: Vec<u32>,
+    /// The indices of the instances that cannot move, in their order: their triangles are stored where the world has
+    /// them, since their transforms would magnify rounding too much.
+    pub fixed: Vec<usize>,
 }
 
 /// A mesh of a scene that becomes a geometry.
@@ -138,10 +144,7 @@ impl Instance {
             local_y,
             local_z,
             condition: condition as f32,
-            flags: INSTANCE_FOR_CAMERA
-                | INSTANCE_FOR_SHADOWS
-                | INSTANCE_FOR_OTHERS
-                | if rounded.determinant() < 0.0 { INSTANCE_MIRRORED } else { 0 },
+            flags: flags_of(RayKinds::ALL) | if rounded.determinant() < 0.0 { INSTANCE_MIRRORED } else { 0 },
             ..Self::default()
         })
     }
@@ -176,6 +179,14 @@ impl Instance {
         let [(v0, n0), (v1, n1), (v2, n2)] = Stored { row: 0, instance: Some(self) }.corners(corners);
         Triangle { v0, n0, v1, n1, v2, n2 }
     }
+}
+
+/// Returns the flags of an instance that these rays meet.
+pub(super) fn flags_of(rays: RayKinds) -> u32 {
+    let flag = |is_set: bool, flag: u32| if is_set { flag } else { 0 };
+    flag(rays.camera, INSTANCE_FOR_CAMERA)
+        | flag(rays.shadow, INSTANCE_FOR_SHADOWS)
+        | flag(rays.other, INSTANCE_FOR_OTHERS)
 }
 
 /// The most slots of a mesh that is stored once. Each of its lists of materials has an entry for every slot.
@@ -233,6 +244,7 @@ impl Instances {
                     let range = StoredRange { first_row: first_row as u32, n_triangles: n_triangles as u32 };
                     first_row += n_triangles as u64;
                     made.ranges.push(range);
+                    made.n_slots.push(facts.n_slots as u32);
                     let transform = match own_space {
                         Some(_) => Transform::IDENTITY,
                         None => instance.transform.clone(),
@@ -245,10 +257,10 @@ impl Instances {
                     geometry_ix
                 }
             };
-            let at = match own_space {
-                Some(at) => at,
-                None => Instance::of_transform(&Transform::IDENTITY).expect("the identity is a transform"),
-            };
+            let at = own_space.unwrap_or_else(|| {
+                made.fixed.push(instance_ix);
+                Instance::of_transform(&Transform::IDENTITY).expect("the identity is a transform")
+            });
             let first_material = *first_material_of.entry((mesh_ix, &instance.materials)).or_insert_with(|| {
                 let first = made.materials.len() as u32;
                 let of_slot = |slot| instance.materials[slot as usize % instance.materials.len()];
@@ -261,6 +273,7 @@ impl Instances {
                 first_material,
                 first_row: made.ranges[geometry_ix].first_row,
                 n_triangles: n_triangles as u32,
+                flags: at.flags & INSTANCE_MIRRORED | flags_of(instance.rays),
                 ..at
             });
             first_triangle += n_triangles as u64;
@@ -277,6 +290,11 @@ impl Instances {
     /// The number of triangles of all instances.
     pub fn n_triangles(&self) -> usize {
         self.list.last().map_or(0, |last| last.first_triangle as usize + last.n_triangles as usize)
+    }
+
+    /// Returns the materials of an instance's slots.
+    pub fn materials_of(&self, instance: &Instance) -> &[u32] {
+        &self.materials[instance.first_material as usize..][..self.n_slots[instance.geometry_ix as usize] as usize]
     }
 
     /// Returns the instance of a triangle: its index, and itself.

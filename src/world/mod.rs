@@ -18,6 +18,7 @@ mod light_tree;
 mod light_tree_tests;
 mod mips;
 mod mismatch;
+mod moved;
 mod path_materials;
 mod scene_hash;
 #[doc(hidden)]
@@ -33,8 +34,16 @@ use self::ambient_approximation::AmbientApproximation;
 #[cfg(test)]
 pub(crate) use self::texture_arrays::tests::{arrays_of, scene_of};
 pub use self::{
-    alias::AliasEntry, emitters::Emitters, environment_map::EnvironmentMap, flat::FlatScene, geometry::Geometry,
-    instances::Instances, mismatch::Mismatch, path_materials::path_materials, texture_arrays::TextureArrays,
+    alias::AliasEntry,
+    emitters::Emitters,
+    environment_map::EnvironmentMap,
+    flat::{FlatScene, Occurrence, TriangleOrigin},
+    geometry::Geometry,
+    instances::Instances,
+    mismatch::Mismatch,
+    moved::InstanceUpdate,
+    path_materials::path_materials,
+    texture_arrays::TextureArrays,
     textured::Textures,
 };
 use crate::{
@@ -52,8 +61,8 @@ use crate::{
 /// A scene and its acceleration structure.
 ///
 /// Kernels read both without bounds checks. So a world checks every length, index and kind of the scene's arrays. It
-/// builds the structure itself, or checks that the structure fits. Nothing can change either of them afterwards. A
-/// clone is a second handle to the same world.
+/// builds the structure itself, or checks that the structure fits. Nothing can change either of them afterwards: what
+/// moves is another world ([`World::with_instances_changed`]). A clone is a second handle to the same world.
 #[derive(Clone, Debug)]
 pub struct World(Arc<Parts>);
 
@@ -63,7 +72,7 @@ struct Parts {
     accel: Accel,
     accel_options: AccelOptions,
     /// The tables from which lights are sampled. Like the next two fields, they are made when they are first needed.
-    emitters: OnceLock<Emitters>,
+    emitters: OnceLock<Arc<Emitters>>,
     /// The wide hierarchy. There is none if the structure is a grid.
     wide_bvh: OnceLock<Option<WideBvh>>,
     /// The ambient light that stands for light of which only paths know, for each axis that may point up.
@@ -158,7 +167,7 @@ impl World {
 
     /// The tables from which the path tracer samples lights. They are made at the first call.
     pub fn emitters(&self) -> &Emitters {
-        made_once(&self.0.emitters, || Emitters::new(&self.0.scene))
+        &**made_once(&self.0.emitters, || Arc::new(Emitters::new(&self.0.scene)))
     }
 
     /// The wide hierarchy, made from the kd-tree, through which the CPU traces single rays. There is none for a grid.

@@ -14,6 +14,7 @@ impl FlatScene {
             origin: _,
             triangles,
             triangle_materials,
+            occurrences: _,
             instances,
             materials,
             material_names: _,
@@ -28,7 +29,7 @@ impl FlatScene {
             background,
             defaults: _,
         } = self;
-        let Textures { texels, textures, material_maps, uvs, corners, n_triangles: _ } = textures;
+        let Textures { texels, textures, material_maps, uvs, corners, n_triangles: _ } = &**textures;
         let mut hasher = blake3::Hasher::new();
         // Each array's length comes first, so that no two scenes have the same sequence of bytes.
         fn add<T: NoUninit>(hasher: &mut blake3::Hasher, array: &[T]) {
@@ -37,7 +38,7 @@ impl FlatScene {
         }
         add(&mut hasher, triangles);
         add(&mut hasher, triangle_materials);
-        if let Some(Instances { ranges: _, list, materials }) = instances {
+        if let Some(Instances { list, materials, .. }) = instances {
             add(&mut hasher, list);
             add(&mut hasher, materials);
         }

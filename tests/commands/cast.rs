@@ -72,7 +72,14 @@ fn hits_are_as_open3d_names_them() {
     for device in [&["--validate"][..], &["--cpu"], &["--traversal", "stack"]].into_iter().chain(grids) {
         let output = succeed(directory.path(), &[&["cast", "mesh.obj", "rays.npy", "-o", "hits.npz"], device].concat());
         assert!(stdout(&output).contains("7 rays, 4 hits, 1 invalid\n"), "{}", stdout(&output));
-        let expected = ["t_hit.npy", "primitive_ids.npy", "primitive_uvs.npy", "primitive_normals.npy"];
+        let expected = [
+            "t_hit.npy",
+            "instance_ids.npy",
+            "geometry_ids.npy",
+            "primitive_ids.npy",
+            "primitive_uvs.npy",
+            "primitive_normals.npy",
+        ];
         let mut found = arrays(&path("hits.npz"));
         found.sort_by_key(|name| expected.iter().position(|expected| expected == name));
         assert_eq!(found, expected);
@@ -88,6 +95,28 @@ fn hits_are_as_open3d_names_them() {
         assert!(normals.chunks(3).all(|normal| normal[..2] == [0.0, 0.0]));
     }
     assert_eq!(names(directory.path()), ["hits.npz", "mesh.obj", "rays.npy"]);
+}
+
+#[test]
+fn hits_name_instance_mesh_and_face() {
+    let directory = with_mesh();
+    let path = |name: &str| directory.path().join(name);
+    let moved = |x: f32| RAYS[..4].iter().map(|ray| [&[ray[0] + x], &ray[1..]].concat()).collect::<Vec<_>>();
+    let rays: Vec<[f32; 8]> =
+        [moved(20.0), moved(0.0), moved(10.0)].concat().iter().map(|ray| ray[..].try_into().expect("8")).collect();
+    save(&path("rays.npy"), &rays);
+    let placed = |x: u32| format!("[[mesh]]\nfile = 'mesh.obj'\ntransform = {{ translate = [{x}, 0, 0] }}\n");
+    std::fs::write(path("scene.toml"), [0, 10, 20].map(placed).concat()).expect("a scene");
+    for instances in ["flatten", "keep"] {
+        for device in ["--validate", "--cpu"] {
+            let args = ["cast", "scene.toml", "rays.npy", "-o", "hits.npz", "-q", device, "--instances", instances];
+            succeed(directory.path(), &args);
+            let ids = |name: &str| load::<u32>(&path("hits.npz"), name).1;
+            assert_eq!(ids("instance_ids"), [2, 2, MISS, 2, 0, 0, MISS, 0, 1, 1, MISS, 1], "{instances} {device}");
+            assert_eq!(ids("geometry_ids"), [0, 0, MISS, 0, 0, 0, MISS, 0, 0, 0, MISS, 0], "{instances} {device}");
+            assert_eq!(ids("primitive_ids"), [2, 1, MISS, 0, 2, 1, MISS, 0, 2, 1, MISS, 0], "{instances} {device}");
+        }
+    }
 }
 
 #[test]

@@ -4,6 +4,7 @@
 mod support;
 
 mod casts;
+mod moved;
 mod pictures;
 mod refused;
 
@@ -63,7 +64,8 @@ fn transforms(apart: f64) -> Vec<Transform> {
 
 /// A closed mesh, placed by each of the transforms.
 fn scene_of(mesh: &[Triangle], transforms: &[Transform]) -> Scene {
-    let instance = |transform: &Transform| Instance { mesh_ix: 0, transform: transform.clone(), materials: vec![0] };
+    let instance =
+        |transform: &Transform| Instance { transform: transform.clone(), materials: vec![0], ..Instance::default() };
     Scene {
         meshes: vec![mesh_of(mesh)],
         instances: transforms.iter().map(instance).collect(),

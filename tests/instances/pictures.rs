@@ -35,7 +35,7 @@ fn scene() -> Scene {
             materials = vec![scene.materials.len() as u32 - 1];
         }
         let transform = Transform::new(scale, turn, at).expect("a transform");
-        scene.instances.push(Instance { mesh_ix, materials, transform });
+        scene.instances.push(Instance { mesh_ix, materials, transform, ..Instance::default() });
     }
     scene
 }
@@ -98,7 +98,7 @@ fn paths_through_instances_are_those_through_their_copies() {
         let transform =
             Transform::new(DVec3::new(0.2, 0.1, -0.3), DQuat::from_rotation_z(0.4), at).expect("a transform");
         let materials = vec![scene.materials.len() as u32 - 1];
-        scene.instances.push(Instance { mesh_ix: scene.meshes.len() - 1, transform, materials });
+        scene.instances.push(Instance { mesh_ix: scene.meshes.len() - 1, transform, materials, ..Instance::default() });
     }
     scene.lights = vec![Light::Point { position: Vec3::new(2.0, 2.5, 3.0), intensity: Vec3::ONE }];
     let (kept, flat) = (kept(&scene), flattened(&scene));

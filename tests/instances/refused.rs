@@ -30,6 +30,7 @@ const CHANGES: &[Change] = &[
     ("geometry 0 does not follow the one before", |it| {
         it.instances.as_mut().expect("instances").ranges[0].first_row = 1;
     }),
+    ("n_slots: geometry 0 has 1 slots, not 2", |it| it.instances.as_mut().expect("instances").n_slots[0] = 2),
     ("triangles has", |it| it.instances.as_mut().expect("instances").ranges[0].n_triangles -= 1),
     ("has material 3, but there are", |it| it.instances.as_mut().expect("instances").materials[0] = 3),
 ];
@@ -67,7 +68,8 @@ fn a_million_instances_of_nothing_are_nothing() {
     let mut scene = scene_of(&ball(), &[Transform::IDENTITY]);
     scene.meshes.push(kdray::scene::Mesh::default());
     let at = |i: u32| Transform::new(DVec3::ONE, DQuat::IDENTITY, DVec3::splat(f64::from(i))).expect("a transform");
-    let of_nothing = |i| kdray::scene::Instance { mesh_ix: 1, transform: at(i), materials: vec![0] };
+    let of_nothing =
+        |i| kdray::scene::Instance { mesh_ix: 1, transform: at(i), materials: vec![0], ..Default::default() };
     scene.instances.extend((0..1_000_000).map(of_nothing));
     let world = kept(&scene);
     assert_eq!(world.geometry().n_triangles(), ball().len());

@@ -154,7 +154,7 @@ pub const FIRST: Batch = Batch { first_pixel: 0, n_pixels: 0, bounce_ix: 0, dept
 /// Returns `n` rays of every nasty kind at the stage's scene, each with its own pixel and throughput.
 pub fn some_rays(stage: &Stage, n: u32) -> Vec<PathRay> {
     use crate::support::{MeshWithTree, random::Random, rays::nasty_ray};
-    let world = MeshWithTree::new(stage.world.scene().triangles.clone());
+    let world = MeshWithTree::new(stage.world.scene().triangles.to_vec());
     (0..n)
         .map(|i| {
             let mut random = Random(u64::from(i));

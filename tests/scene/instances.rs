@@ -27,7 +27,7 @@ fn named(name: &str) -> Material {
 }
 
 fn instance(transform: Transform, materials: Vec<u32>) -> Instance {
-    Instance { mesh_ix: 0, transform, materials }
+    Instance { mesh_ix: 0, transform, materials, ..Instance::default() }
 }
 
 fn scene(instances: Vec<Instance>) -> Scene {
@@ -41,6 +41,7 @@ fn scene(instances: Vec<Instance>) -> Scene {
         chosen_light: None,
         images: Vec::new(),
         cameras: Vec::new(),
+        animations: Vec::new(),
         camera: Camera {
             eye: Vec3::Z,
             target: Vec3::ZERO,
@@ -68,7 +69,7 @@ fn each_instance_has_its_place_and_its_materials() {
     let flat = FlatScene::new(&scene).expect("a scene that fits together");
     assert_eq!((flat.triangles.len(), scene.n_triangles()), (4, 4));
     // Slots beyond the last material begin again at the first one.
-    assert_eq!(flat.triangle_materials, [2, 0, 1, 1]);
+    assert_eq!(*flat.triangle_materials, [2, 0, 1, 1]);
     assert_eq!(flat.material_names, ["red", "green", "blue"]);
     let [first, second, third, _] = flat.triangles[..] else { panic!("four triangles") };
     assert_eq!([first.v0, first.v1, first.v2], [vec3(5.0, 0.0, 0.0), vec3(6.0, 0.0, 0.0), vec3(6.0, 1.0, 0.0)]);

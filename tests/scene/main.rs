@@ -131,7 +131,7 @@ fn materials_have_documented_defaults() {
     assert_eq!((a.ka, a.kd, a.ks, a.ke, a.tf), (a.kd, Vec3::splat(0.8), Vec3::ZERO, Vec3::ZERO, Vec3::ONE));
     assert_eq!((a.ns, a.ni, a.d, a.flags), (32.0, 1.5, 1.0, 0));
     assert_eq!((b.ka, b.ns, b.ni, b.d, b.flags), (Vec3::new(0.1, 0.2, 0.3), 1.0, 1.0, 0.75, MATERIAL_SPECULAR));
-    assert_eq!(scene.triangle_materials, [0, 0, 1, 1]);
+    assert_eq!(*scene.triangle_materials, [0, 0, 1, 1]);
 }
 
 #[test]

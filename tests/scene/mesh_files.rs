@@ -402,7 +402,7 @@ fn files_that_are_read_together_are_those_that_are_read_alone() {
     assert_eq!(together.triangles.len(), 12 * files.len());
     for (ix, alone) in tables.iter().enumerate() {
         let alone = load_tables(alone).unwrap();
-        assert_eq!(together.triangles[12 * ix..][..12], alone.triangles, "{}", files[ix].0);
+        assert_eq!(together.triangles[12 * ix..][..12], **alone.triangles, "{}", files[ix].0);
     }
     let [bad, missing] = [table(0, "bad.ply"), table(1, "missing.stl")];
     for (first, second, named) in [(&bad, &missing, "bad.ply"), (&missing, &bad, "missing.stl")] {

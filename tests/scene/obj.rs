@@ -221,7 +221,7 @@ fn faces_without_the_normals_that_they_name_have_computed_ones() {
 fn what_no_library_defines_is_the_default() {
     for obj in ["mtllib no.mtl\nusemtl x\n", "usemtl x\n", ""] {
         let scene = load_obj(&format!("{obj}{TRIANGLE}f 1 2 3\n"));
-        assert_eq!((scene.material_names, scene.triangle_materials), (vec!["(default)".to_owned()], vec![0]));
+        assert_eq!((scene.material_names, scene.triangle_materials), (vec!["(default)".to_owned()], vec![0].into()));
     }
     // One line names two libraries, and the faces have several materials.
     let faces = "usemtl b\nf 1 2 3\nusemtl a\nf 1 2 4\nusemtl c\nf 3 2 1\nusemtl b\nf 1 2 3";

@@ -24,12 +24,13 @@ pub fn empty() -> FlatScene {
     FlatScene {
         name: "test".to_owned(),
         origin: DVec3::ZERO,
-        triangles: Vec::new(),
+        triangles: Vec::new().into(),
         instances: None,
-        triangle_materials: Vec::new(),
+        triangle_materials: Vec::new().into(),
+        occurrences: Vec::new().into(),
         materials: Vec::new(),
         material_names: Vec::new(),
-        textures: Textures::default(),
+        textures: Textures::default().into(),
         lights: Vec::new(),
         camera: Camera {
             eye: vec3(0.0, 0.0, 4.0),

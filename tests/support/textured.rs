@@ -29,6 +29,7 @@ pub fn empty() -> Scene {
             projection: Projection::Perspective { vertical_fov_degrees: 45.0 },
         },
         cameras: Vec::new(),
+        animations: Vec::new(),
         ambient: Vec3::ZERO,
         ground: None,
         background: Vec3::ZERO,
@@ -44,7 +45,7 @@ pub fn add(scene: &mut Scene, mesh: Mesh, transform: Transform, material: Materi
     let (mesh_ix, material_ix) = (scene.meshes.len(), scene.materials.len() as u32);
     scene.meshes.push(mesh);
     scene.materials.push(material);
-    scene.instances.push(Instance { mesh_ix, transform, materials: vec![material_ix] });
+    scene.instances.push(Instance { mesh_ix, transform, materials: vec![material_ix], ..Instance::default() });
 }
 
 /// Adds an image of bytes, whose pixels `colour` gives by column and row. Returns its index.

@@ -1,7 +1,7 @@
 //! What a scene consists of, before it is flattened.
 
 use kdray::{
-    scene::{Alpha, Camera, Image, Material, Pixels, Projection, Scene, Sky, TermValue},
+    scene::{Alpha, AnimationInfo, Camera, Image, Material, Pixels, Projection, Scene, Sky, TermValue},
     world::Textures,
 };
 use serde::Serialize;
@@ -13,6 +13,7 @@ pub struct Contents {
     pub meshes: Vec<MeshUse>,
     pub images: Vec<ImageUse>,
     pub cameras: Vec<CameraUse>,
+    pub animations: Vec<AnimationUse>,
     /// The sky. Its sun is one of the lights.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sky: Option<SkyUse>,
@@ -89,6 +90,27 @@ pub struct CameraUse {
     pub orthographic_height: Option<f32>,
 }
 
+/// An animation. Times are in seconds.
+#[derive(Serialize)]
+pub struct AnimationUse {
+    pub name: String,
+    pub begin: f64,
+    pub end: f64,
+    /// Frames a second, if the keys have even distances.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fps: Option<f64>,
+    /// Numbers of nodes that it moves, and of those whose morph targets it weighs.
+    pub moved_nodes: usize,
+    pub morphed_nodes: usize,
+}
+
+impl From<&AnimationInfo> for AnimationUse {
+    fn from(info: &AnimationInfo) -> Self {
+        let &AnimationInfo { begin, end, fps, n_moved, n_morphed, .. } = info;
+        Self { name: info.name.clone(), begin, end, fps, moved_nodes: n_moved, morphed_nodes: n_morphed }
+    }
+}
+
 /// What is known of a material beside its triangles.
 #[derive(Clone, Serialize)]
 pub struct MaterialDetails {
@@ -131,6 +153,7 @@ impl From<&Scene> for Contents {
             meshes: meshes.collect(),
             images: images(scene),
             cameras: cameras.collect(),
+            animations: scene.animations.iter().map(AnimationUse::from).collect(),
             sky: scene.sky.as_ref().map(SkyUse::from),
             camera: CameraUse::new(None, &scene.camera),
         }

@@ -57,7 +57,7 @@ pub fn run(args: &InspectArgs) -> Result<(), CliError> {
         lights: scene.lights.iter().map(LightUse::from).collect(),
         lighting,
         contents,
-        texture_memory: TextureMemory::from(&scene.textures),
+        texture_memory: TextureMemory::from(&*scene.textures),
         path_lights: PathLights::from(world.emitters()),
         path_memory: PathMemory::of_samples(scene.defaults.of_paths.samples),
         accel: statistics,

@@ -4,7 +4,7 @@ use serde_json::{Map, Value};
 
 use super::{
     LightUse, MaterialUse,
-    contents::{CameraUse, Contents, ImageUse, MeshUse, SkyUse, TextureMemory},
+    contents::{AnimationUse, CameraUse, Contents, ImageUse, MeshUse, SkyUse, TextureMemory},
     vector,
 };
 use crate::cli::table::table;
@@ -55,6 +55,10 @@ pub fn contents(contents: &Contents, materials: &[MaterialUse], lights: &[LightU
         }));
     }
     tables.push(cameras(contents));
+    if !contents.animations.is_empty() {
+        let header = ["animation", "name", "from s", "to s", "frames/s", "moves", "morphs"];
+        tables.push(cut_table(header, &contents.animations, animation_row));
+    }
     tables.extend(contents.sky.iter().map(|sky| table(["sky", ""], &sky_rows(sky))));
     tables.push(memory_table(memory));
     tables.join("\n")
@@ -114,6 +118,19 @@ fn short(value: &Value) -> String {
 
 fn listed(map: &Map<String, Value>, item: impl Fn((&String, &Value)) -> String) -> String {
     map.iter().map(item).collect::<Vec<_>>().join(", ")
+}
+
+fn animation_row(ix: usize, animation: &AnimationUse) -> [String; 7] {
+    let &AnimationUse { begin, end, fps, moved_nodes, morphed_nodes, .. } = animation;
+    [
+        ix.to_string(),
+        shortened(&animation.name),
+        format!("{begin:.3}"),
+        format!("{end:.3}"),
+        fps.map_or("?".to_owned(), |fps| fps.to_string()),
+        format!("{moved_nodes} nodes"),
+        format!("{morphed_nodes} nodes"),
+    ]
 }
 
 fn image_row(image: &ImageUse) -> [String; 5] {

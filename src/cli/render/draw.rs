@@ -7,7 +7,7 @@ use std::{
 
 use kdray::{
     cpu,
-    engine::{Engine, NoiseGoal, Renderer},
+    engine::{AnimatedWorld, Engine, LoadError, NoiseGoal, Renderer},
     frame::{Drawn, Goal, Picture, Profile, RangeSums, RenderOptions, SampleRange, SampleSums, Watcher},
     gpu::{DeviceInfo, GpuError},
     output::{Layers, Record, WholeRecord},
@@ -32,12 +32,21 @@ pub struct FrameJob {
     pub files: Files,
 }
 
+/// The film of a file whose animations play.
+pub struct Film {
+    pub animated: AnimatedWorld,
+    /// Whether the camera is that of the file, which may move, too.
+    pub has_own_camera: bool,
+}
+
 /// What all pictures of a command have in common.
 pub struct Common<'a> {
     pub args: &'a RenderArgs,
     pub options: &'a RenderOptions,
     /// The scene's own camera.
     pub camera: Camera,
+    /// The animations that play, if any do.
+    pub film: Option<&'a Film>,
     /// The end of each picture, if all samples are drawn.
     pub goal: Goal,
     /// The noise at which pictures end, if the user wants that.
@@ -70,6 +79,7 @@ pub struct DrawnPictures {
 /// A picture that is not written yet.
 struct DrawnView {
     picture: Picture,
+    camera: Camera,
     drawn: Drawn,
     sums: RangeSums,
     /// The device that has drawn the picture. None if several have drawn it together, or the CPU.
@@ -125,7 +135,8 @@ fn draw_in_turn(
     let mut steps = common.steps(stage, views.len() as u32, renderer.n_bands());
     let (mut written, mut drawing) = (Vec::new(), Duration::ZERO);
     for view in views {
-        let drawn = draw_view(common, &mut renderer, view, &mut Bar(&mut steps))?;
+        let camera = common.show(view, &mut renderer)?;
+        let drawn = draw_view(common, &mut renderer, &camera, &mut Bar(&mut steps))?;
         drawing += begin.elapsed();
         written.push(write_view(common, view, drawn)?);
         begin = Instant::now();
@@ -150,16 +161,28 @@ fn draw_frames_apart(
     let written = film.draw(
         views.len() as u32,
         &mut Bar(&mut steps),
-        |renderer, frame_ix, tell_sample| draw_view(common, renderer, view(frame_ix), &mut || tell_sample()),
+        |renderer, frame_ix, tell_sample| {
+            let camera = common.show(view(frame_ix), renderer).map_err(|error| match error {
+                LoadError::Device(error) => error,
+                other => GpuError::Mismatch(other.to_string()),
+            })?;
+            draw_view(common, renderer, &camera, &mut || tell_sample())
+        },
         |frame_ix, drawn| write_view(common, view(frame_ix), drawn),
     )?;
     Ok((written, opening + film.longest_drawing()))
 }
 
 impl Common<'_> {
-    /// Returns the camera of a view.
-    fn camera_of(&self, view: &FrameJob) -> Camera {
-        view.camera.unwrap_or(self.camera)
+    /// Lets a renderer show the world of a view. Returns the view's camera.
+    fn show(&self, view: &FrameJob, renderer: &mut Renderer) -> Result<Camera, LoadError> {
+        let mut own = self.camera;
+        if let Some(Film { animated, has_own_camera }) = self.film {
+            let (world, camera) = animated.at(self.args.load.seconds_of(view.frame))?;
+            renderer.set_world(&world)?;
+            own = if *has_own_camera { camera } else { own };
+        }
+        Ok(view.camera.unwrap_or(own))
     }
 
     /// Returns the counter of the samples of all bands of all views.
@@ -179,23 +202,23 @@ impl Common<'_> {
     }
 }
 
-/// Draws a view `--repeat` times.
+/// Draws a picture `--repeat` times.
 fn draw_view(
     common: &Common,
     renderer: &mut Renderer,
-    view: &FrameJob,
+    camera: &Camera,
     watcher: &mut dyn Watcher,
 ) -> Result<DrawnView, GpuError> {
-    let (camera, device) = (common.camera_of(view), renderer.device().cloned());
+    let device = renderer.device().cloned();
     let mut relay = Relay::new(common, watcher);
     let (mut drawn, mut sums, mut profiles, mut noise) = (Drawn::default(), RangeSums::default(), Vec::new(), None);
     let mut n_samples = common.n_drawn;
     let picture = if let Some(range) = common.some_samples {
-        (drawn, sums) = renderer.draw_range(&camera, range, &mut relay)?;
+        (drawn, sums) = renderer.draw_range(camera, range, &mut relay)?;
         profiles.push(take(&mut drawn.profile));
         part(common, &sums.picture)
     } else if let Some(goal) = common.noise_goal {
-        let mut noisy = renderer.draw_until(&camera, goal, &mut relay)?;
+        let mut noisy = renderer.draw_until(camera, goal, &mut relay)?;
         profiles.push(take(&mut noisy.drawn.profile));
         noise = Some(NoiseReached::of(&noisy));
         drawn = noisy.drawn;
@@ -204,7 +227,7 @@ fn draw_view(
         noisy.picture
     } else {
         for _ in 0..common.args.repeat {
-            drawn = renderer.draw(&camera, common.goal, &mut relay)?;
+            drawn = renderer.draw(camera, common.goal, &mut relay)?;
             profiles.push(take(&mut drawn.profile));
         }
         n_samples = drawn.n_samples;
@@ -216,12 +239,12 @@ fn draw_view(
     let (is_cut, overdue) = (is_cut && !is_whole, overdue.filter(|_| !is_whole));
     let written = WrittenView { profiles, n_samples, noise };
     let unwritten = unwritten.unwrap_or_default();
-    Ok(DrawnView { picture, drawn, sums, device, written, is_cut, overdue, unwritten })
+    Ok(DrawnView { picture, camera: *camera, drawn, sums, device, written, is_cut, overdue, unwritten })
 }
 
 /// Writes the files of a view.
 fn write_view(common: &Common, view: &FrameJob, of_view: DrawnView) -> Result<WrittenView, CliError> {
-    let DrawnView { picture, drawn, sums, device, written, is_cut, overdue, unwritten } = of_view;
+    let DrawnView { picture, camera, drawn, sums, device, written, is_cut, overdue, unwritten } = of_view;
     if let Some(limit) = overdue {
         if !common.args.may_end_early() {
             return Err(CliError::TimeLimit { limit, present: "drawing" });
@@ -229,7 +252,7 @@ fn write_view(common: &Common, view: &FrameJob, of_view: DrawnView) -> Result<Wr
         let limit = humantime::format_duration(limit);
         tracing::warn!("the picture ends with the samples so far, since --time-limit {limit} is over");
     }
-    let mut record = record_of(common, &common.camera_of(view), written.n_samples);
+    let mut record = record_of(common, &camera, written.n_samples);
     if is_cut {
         record.whole.noise = None;
     }
@@ -242,7 +265,7 @@ fn write_view(common: &Common, view: &FrameJob, of_view: DrawnView) -> Result<Wr
     let (aovs, pixel_aovs) = (&common.args.aov[..], &drawn.pixel_aovs[..]);
     view.files.write(&picture, &Layers { aovs, pixel_aovs, means, sums, mean_sums, record: Some(&record) })?;
     drop(unwritten);
-    if common.args.path.is_some() {
+    if common.args.is_film() {
         // A film ends after this frame, without a report.
         interrupt::end_if_asked();
     }

@@ -85,15 +85,15 @@ impl Files {
     }
 }
 
-/// Returns the roles of the command's files, without the pictures of a path's frames, which are not known yet.
+/// Returns the roles of the command's files, without the pictures of a film's frames, which are not known yet.
 /// Refuses outputs that the command also reads, or that it writes twice.
 pub fn roles(args: &RenderArgs, jobs: &[Job]) -> Result<FileRoles, CliError> {
     let mut roles = FileRoles::default();
     jobs.iter().for_each(|job| roles.read_scene("SCENE", &job.scene, args.load.options()));
     args.list.iter().for_each(|list| roles.read("--list", list));
-    match &args.path {
-        Some(path) => roles.read("--path", path),
-        None => jobs.iter().try_for_each(|job| Files::of(job.output.clone(), &args.aov).note(&mut roles))?,
+    args.path.iter().for_each(|path| roles.read("--path", path));
+    if !args.is_film() {
+        jobs.iter().try_for_each(|job| Files::of(job.output.clone(), &args.aov).note(&mut roles))?;
     }
     args.profile.iter().try_for_each(|path| roles.write("--profile", path))?;
     args.trace.iter().try_for_each(|path| roles.write("--trace", path))?;
@@ -105,7 +105,7 @@ pub fn check_outputs(args: &RenderArgs, job: &Job) -> Result<(), CliError> {
     if args.output.is_some() {
         Format::of(&job.output)?;
         output::check(&job.output)?;
-        if args.path.is_some() {
+        if args.is_film() {
             numbered(&job.output, 0)?;
         }
     }
@@ -115,11 +115,11 @@ pub fn check_outputs(args: &RenderArgs, job: &Job) -> Result<(), CliError> {
 /// Returns the job of the command's only scene.
 pub fn only_job(args: &RenderArgs, scene: PathBuf) -> Job {
     let name = Scene::name_of(&scene);
-    let in_folder = if args.path.is_some() { "{}.####.png" } else { "{}.png" };
+    let in_folder = if args.is_film() { "{}.####.png" } else { "{}.png" };
     let output = match &args.output {
-        None => default_output(&name, args.path.is_some()),
+        None => default_output(&name, args.is_film()),
         Some(output) => match pattern_of(output, in_folder) {
-            Some(pattern) if args.path.is_some() => named(&pattern, &output::stem_of(&name).replace('#', "-")),
+            Some(pattern) if args.is_film() => named(&pattern, &output::stem_of(&name).replace('#', "-")),
             Some(pattern) => named(&pattern, &output::stem_of(&name)),
             None => output.clone(),
         },

@@ -4,7 +4,7 @@ use std::{cell::OnceCell, path::Path, time::Instant};
 
 use kdray::{
     engine::{
-        Engine, Loaded, NoiseGoal, Opened, Work,
+        AnimatedWorld, Engine, LoadRequest, Loaded, NoiseGoal, Opened, Work,
         choices::{Choices, ChosenAccel, Methods},
     },
     frame::{Goal, Profile, RenderOptions, SampleRange},
@@ -17,7 +17,7 @@ use tracing::info_span;
 
 use super::{
     deadline::Deadline,
-    draw::{Common, DrawnPictures, FrameJob, draw_and_write, draws_whole_frames},
+    draw::{Common, DrawnPictures, Film, FrameJob, draw_and_write, draws_whole_frames},
     views::NamedPath,
 };
 use crate::cli::{
@@ -59,7 +59,7 @@ struct Ready {
 
 impl Ready {
     /// Returns what all pictures of the scene have in common.
-    fn common<'a>(&'a self, args: &'a RenderArgs, deadline: Deadline) -> Common<'a> {
+    fn common<'a>(&'a self, args: &'a RenderArgs, film: Option<&'a Film>, deadline: Deadline) -> Common<'a> {
         let Self { engine, world, options, accel, samples, noise_goal, .. } = self;
         let mut record = record(engine, world, options, *accel, *samples);
         record.whole.noise = args.noise;
@@ -67,7 +67,7 @@ impl Ready {
         let n_drawn = some_samples.map_or(n_samples, |range| range.len());
         let goal = args.time.map_or(Goal::Samples(n_drawn), Goal::Time);
         let (camera, noise_goal) = (world.scene().camera, *noise_goal);
-        Common { args, options, camera, goal, noise_goal, n_drawn, some_samples, deadline, record }
+        Common { args, options, camera, film, goal, noise_goal, n_drawn, some_samples, deadline, record }
     }
 }
 
@@ -107,7 +107,14 @@ impl<'a> Session<'a> {
     /// Loads a scene, builds its structure, draws its views and writes them.
     pub fn draw(&self, scene: &Path, mut views: Vec<FrameJob>, path: Option<NamedPath>) -> Result<Report, CliError> {
         let deadline = Deadline::new(self.args.time_limit);
-        let opened = self.open(scene, deadline)?;
+        let first_frame = self.args.is_film().then(|| views[0].frame);
+        let opened = self.open(scene, first_frame, deadline)?;
+        let is_animated = self.args.is_film() && self.args.load.plays(&opened.scene.animations);
+        if self.args.is_film() && !is_animated && path.is_none() {
+            let scene = scene.display();
+            return Err(CliError::Usage(format!("{scene}: nothing moves, so --frames needs --path FILE")));
+        }
+        let (animated_scene, has_own_camera) = (is_animated.then(|| opened.scene.clone()), path.is_none());
         if let Some(path) = path {
             let path = path.relative_to(opened.scene.origin);
             for view in &mut views {
@@ -116,7 +123,11 @@ impl<'a> Session<'a> {
         }
         let ready = self.build(opened, &views, deadline)?;
         deadline.check("building")?;
-        let common = ready.common(self.args, deadline);
+        let film = animated_scene.map(|first| {
+            let options = self.request(first_frame, Default::default()).scene;
+            Film { animated: AnimatedWorld::new(scene, &options, first, &ready.world), has_own_camera }
+        });
+        let common = ready.common(self.args, film.as_ref(), deadline);
         let rendering = format!("rendering {}x{}", common.record.crop.width(), common.record.crop.height());
         let (engine, stage) = ((&ready.engine, &ready.world), (&self.progress, rendering.as_str()));
         let (drawn, _) = self.progress.stage(&rendering, || draw_and_write(&common, engine, &views, stage));
@@ -177,11 +188,19 @@ impl<'a> Session<'a> {
         Ok(Ready { engine, world, options, accel, methods, samples, noise_goal, n_triangles, load_ms, build_ms })
     }
 
+    /// Returns the request for a scene. `frame`: the frame of the film at which animations are shown, if it is one.
+    fn request(&self, frame: Option<u32>, observer: progress::Progress) -> LoadRequest {
+        let load = &self.args.load;
+        let mut request = load.pictures(&self.args.picture, &self.args.look, observer);
+        request.scene.at = frame.map(|frame| load.seconds_of(frame)).or(request.scene.at);
+        request
+    }
+
     /// Reads a scene.
-    fn open(&self, scene: &Path, deadline: Deadline) -> Result<Opened, CliError> {
+    fn open(&self, scene: &Path, frame: Option<u32>, deadline: Deadline) -> Result<Opened, CliError> {
         let loading = format!("loading {}", scene.display());
         let observer = self.progress.observer(&loading, &[progress::Work::Reading, progress::Work::Images]);
-        let request = self.args.load.pictures(&self.args.picture, &self.args.look, observer);
+        let request = self.request(frame, observer);
         let scene = scene.to_owned();
         let read = move || info_span!("load scene").in_scope(|| Opened::read(&scene, &request));
         let (read, _) = self.progress.stage(&loading, || deadline.within("loading", read));

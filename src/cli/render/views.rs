@@ -1,4 +1,4 @@
-//! The views that `kdray render` draws: the scene's own, or one for each frame of a camera path.
+//! The views that `kdray render` draws: the scene's own, or one for each frame of a film.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ use crate::cli::{
     progress::Progress,
 };
 
-/// Returns the scene's own view or, with a path, one view per frame. Leaves out views whose files exist, if the user
+/// Returns the scene's own view or, of a film, one view per frame. Leaves out views whose files exist, if the user
 /// wants that. Refuses views whose files cannot be written or have another role.
 pub fn views(
     args: &RenderArgs,
@@ -25,13 +25,12 @@ pub fn views(
     mut roles: FileRoles,
     progress: &Progress,
 ) -> Result<Vec<FrameJob>, CliError> {
-    let mut views = match path {
-        None => vec![FrameJob { camera: None, frame: 0, files: Files::of(output.to_owned(), &args.aov) }],
-        Some(path) => {
-            let views = views_along(path, args, output)?;
-            views.iter().try_for_each(|view| view.files.note(&mut roles))?;
-            views
-        }
+    let mut views = if args.is_film() {
+        let views = views_of_film(path, args, output)?;
+        views.iter().try_for_each(|view| view.files.note(&mut roles))?;
+        views
+    } else {
+        vec![FrameJob { camera: None, frame: 0, files: Files::of(output.to_owned(), &args.aov) }]
     };
     if args.skip_existing {
         let n_all = views.len();
@@ -46,18 +45,20 @@ pub fn views(
     Ok(views)
 }
 
-/// Returns one view per frame of the path. Their cameras are set when the scene's origin is known, but a path without a
-/// camera at one of these frames is refused here, before the scene is loaded.
-fn views_along(path: &NamedPath, args: &RenderArgs, output: &Path) -> Result<Vec<FrameJob>, CliError> {
-    let Frames { first, last, step } = match args.frames {
-        Some(FrameChoice::Some(frames)) => frames,
-        Some(FrameChoice::All) | None => path.frames(),
+/// Returns one view per frame. Cameras of a path are set when the scene's origin is known, but a path without a camera
+/// at one of these frames is refused here, before the scene is loaded.
+fn views_of_film(path: Option<&NamedPath>, args: &RenderArgs, output: &Path) -> Result<Vec<FrameJob>, CliError> {
+    let Frames { first, last, step } = match (args.frames, path) {
+        (Some(FrameChoice::Some(frames)), _) => frames,
+        (_, Some(path)) => path.frames()?,
+        (_, None) => {
+            let what =
+                "--frames all needs --path FILE; of animations, `kdray inspect` tells the times, for --frames A-B";
+            return Err(CliError::Usage(what.to_owned()));
+        }
     };
-    if first > last {
-        return Err(path.refused("no whole frame number lies between its first and last keyframe".to_owned()));
-    }
     let view = |frame| {
-        path.camera_at(frame)?;
+        path.map_or(Ok(()), |path| path.camera_at(frame).map(drop))?;
         Ok(FrameJob { camera: None, frame, files: Files::of(numbered(output, frame)?, &args.aov) })
     };
     (first..=last).step_by(step as usize).map(view).collect()
@@ -79,9 +80,14 @@ impl<'a> NamedPath<'a> {
         Self { path: self.path.from_origin(origin), ..self }
     }
 
-    /// Returns all whole frames of the path. The first is larger than the last if there are none.
-    fn frames(&self) -> Frames {
-        Frames { first: self.path.begin().ceil() as u32, last: self.path.end().floor() as u32, step: 1 }
+    /// Returns all whole frames of the path.
+    ///
+    /// # Errors
+    /// There are none.
+    fn frames(&self) -> Result<Frames, CliError> {
+        let [first, last] = [self.path.begin().ceil() as u32, self.path.end().floor() as u32];
+        let none = || self.refused("no whole frame number lies between its first and last keyframe".to_owned());
+        (first <= last).then_some(Frames { first, last, step: 1 }).ok_or_else(none)
     }
 
     /// # Errors

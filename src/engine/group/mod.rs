@@ -89,6 +89,26 @@ impl RendererGroup {
         })
     }
 
+    /// Draws another world from now on. A device that fails draws nothing more, and a warning says so.
+    ///
+    /// # Errors
+    /// All devices have failed. Then nothing has changed.
+    pub fn set_world(&mut self, world: &World) -> Result<(), GpuError> {
+        let results: Vec<_> = self.members.iter_mut().map(|member| member.renderer.set_world(world)).collect();
+        if results.iter().all(Result::is_err) {
+            return results.into_iter().collect();
+        }
+        let mut results = results.into_iter();
+        self.members.retain(|member| match results.next().expect("a result for each member") {
+            Ok(()) => true,
+            Err(error) => {
+                tracing::warn!("{} draws nothing more: {error}", member.name);
+                false
+            }
+        });
+        Ok(())
+    }
+
     /// Sets the camera of the next pictures.
     pub fn set_camera(&mut self, camera: &Camera) {
         self.members.iter_mut().for_each(|member| member.renderer.set_camera(camera));

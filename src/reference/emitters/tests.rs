@@ -42,10 +42,10 @@ pub(super) fn emitting_square(scene: &mut FlatScene) {
     let corners = [vec3(-1.0, -1.0, 2.0), vec3(1.0, -1.0, 2.0), vec3(1.0, 1.0, 2.0), vec3(-1.0, 1.0, 2.0)];
     let triangle =
         |[a, b, c]: [usize; 3]| Triangle { v0: corners[a], v1: corners[b], v2: corners[c], ..Triangle::default() };
-    scene.triangles = [[0, 1, 2], [0, 1, 2], [0, 2, 3]].map(triangle).to_vec();
+    scene.triangles = [[0, 1, 2], [0, 1, 2], [0, 2, 3]].map(triangle).to_vec().into();
     // The first triangle is far away and dark.
     scene.triangles[0].v0.z = 9.0;
-    scene.triangle_materials = vec![1, 0, 0];
+    scene.triangle_materials = vec![1, 0, 0].into();
     scene.materials = vec![Material { ke: vec3(3.0, 2.0, 1.0), ..Material::default() }, Material::default()];
     scene.material_names = vec![String::new(); 2];
 }

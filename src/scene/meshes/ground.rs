@@ -57,7 +57,12 @@ impl Scene {
         let albedo = Vec3::splat(Sky::GROUND_ALBEDO);
         let material = Material { name: GROUND.to_owned(), ka: albedo, kd: albedo, ..Material::default() };
         let material = self.push_material(material);
-        self.instances.push(Instance { mesh_ix: self.meshes.len(), transform, materials: vec![material] });
+        self.instances.push(Instance {
+            mesh_ix: self.meshes.len(),
+            transform,
+            materials: vec![material],
+            ..Instance::default()
+        });
         self.meshes.push(mesh);
         Ok(())
     }

@@ -23,8 +23,60 @@ pub struct LoadOptions {
     /// [`Scene::origin`](super::Scene::origin) says by how much. Cameras and lights of the file and of `look` are moved
     /// with it.
     pub recentre: bool,
+    /// The moment at which animations are shown, seconds. Where absent, animated things stand as the file has them at
+    /// rest, unless `animation` names one: that one is shown at 0 s.
+    pub at: Option<f64>,
+    /// Which animations are shown.
+    pub animation: AnimationChoice,
     /// What replaces parts of the scene.
     pub look: Look,
     /// Who is told of the progress: of mesh files that are read, and of images that are decoded.
     pub progress: Progress,
+}
+
+/// Which animations of a file are shown.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum AnimationChoice {
+    /// All of them together. What several drive, the first one does.
+    #[default]
+    All,
+    /// None.
+    None,
+    /// The one of this name, or else of this index, counted from 0.
+    Named(String),
+}
+
+/// A moment of a file's animations.
+pub(crate) struct Moment<'a> {
+    pub seconds: f64,
+    pub animation: &'a AnimationChoice,
+}
+
+impl LoadOptions {
+    /// Returns the moment that is shown, if one is.
+    pub(crate) fn moment(&self) -> Option<Moment<'_>> {
+        let seconds = match (&self.animation, self.at) {
+            (AnimationChoice::None, _) | (AnimationChoice::All, None) => return None,
+            (AnimationChoice::Named(_), at) => at.unwrap_or_default(),
+            (AnimationChoice::All, Some(at)) => at,
+        };
+        Some(Moment { seconds, animation: &self.animation })
+    }
+}
+
+/// What is known of an animation of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AnimationInfo {
+    /// Its name, or `animations[i]`.
+    pub name: String,
+    /// Time of its first key, seconds.
+    pub begin: f64,
+    /// Time of its last key, seconds.
+    pub end: f64,
+    /// Frames per second, if the times of the keys have even distances.
+    pub fps: Option<f64>,
+    /// Number of nodes that it moves.
+    pub n_moved: usize,
+    /// Number of nodes whose morph targets it weighs.
+    pub n_morphed: usize,
 }

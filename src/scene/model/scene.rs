@@ -6,7 +6,8 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{
-    Camera, ChosenLight, Environment, Ground, Image, Light, Material, Mesh, Projection, RenderDefaults, Sky, Transform,
+    AnimationInfo, Camera, ChosenLight, Environment, Ground, Image, Light, Material, Mesh, Projection, RenderDefaults,
+    Sky, Transform,
 };
 
 /// Name of the material of meshes and faces that name none.
@@ -46,6 +47,8 @@ pub struct Scene {
     pub camera: Camera,
     /// The cameras of the scene's file with their names, possibly none.
     pub cameras: Vec<(String, Camera)>,
+    /// The animations of the scene's file, possibly none.
+    pub animations: Vec<AnimationInfo>,
     /// Irradiance that every point receives, linear RGB. The material's `ka` weights it. If there is a `ground`, this
     /// is the irradiance of surfaces that face up.
     pub ambient: Vec3,
@@ -57,8 +60,30 @@ pub struct Scene {
     pub defaults: RenderDefaults,
 }
 
+/// Kinds of rays that meet an instance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RayKinds {
+    /// Rays from the camera.
+    pub camera: bool,
+    /// Rays to lights.
+    pub shadow: bool,
+    /// All others: reflected, refracted and scattered rays, and those of a cast.
+    pub other: bool,
+}
+
+impl RayKinds {
+    /// All rays.
+    pub const ALL: Self = Self { camera: true, shadow: true, other: true };
+}
+
+impl Default for RayKinds {
+    fn default() -> Self {
+        Self::ALL
+    }
+}
+
 /// A mesh that is placed in the world.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Instance {
     /// Index into the scene's meshes.
     pub mesh_ix: usize,
@@ -67,6 +92,8 @@ pub struct Instance {
     /// Indices into the scene's materials, at least one. A face of slot i has the material at index
     /// `i % materials.len()` of this list.
     pub materials: Vec<u32>,
+    /// The rays that meet the instance. Where not all rays do, the scene's instances must be kept.
+    pub rays: RayKinds,
 }
 
 impl Scene {
@@ -135,7 +162,7 @@ impl Scene {
     /// The mesh reaches beyond `mesh::MAX_COORDINATE` in world space. The error is a message for people.
     pub(crate) fn push_mesh(&mut self, mesh: Mesh, transform: Transform, materials: Vec<u32>) -> Result<(), String> {
         mesh.check_place(&transform, mesh.bounds())?;
-        self.instances.push(Instance { mesh_ix: self.meshes.len(), transform, materials });
+        self.instances.push(Instance { mesh_ix: self.meshes.len(), transform, materials, rays: RayKinds::ALL });
         self.meshes.push(mesh);
         Ok(())
     }
@@ -158,6 +185,7 @@ impl Scene {
                 projection: Projection::Perspective { vertical_fov_degrees: 45.0 },
             },
             cameras: Vec::new(),
+            animations: Vec::new(),
             ambient: Vec3::ZERO,
             ground: None,
             background: Vec3::ZERO,

@@ -52,6 +52,13 @@ pub struct Transform {
     mirrors: bool,
 }
 
+impl Default for Transform {
+    /// The identity.
+    fn default() -> Self {
+        Self::IDENTITY
+    }
+}
+
 impl Transform {
     /// The identity, which changes no coordinate.
     pub const IDENTITY: Self =

@@ -256,7 +256,7 @@ impl<'a> Placer<'a> {
         let mesh_ix = scene.meshes.len();
         require_for_places(scene, places.len(), 1)?;
         scene.meshes.push(mesh);
-        push_instances(scene, Instance { mesh_ix, transform: Transform::IDENTITY, materials: slots }, places)
+        push_instances(scene, Instance { mesh_ix, materials: slots, ..Instance::default() }, places)
     }
 
     /// Reads a mesh file and adds its meshes, without instances. Of a glTF file, lights and cameras are left out.
@@ -324,7 +324,7 @@ impl<'a> Placer<'a> {
         let slots = (0..materials.len() as u32).collect();
         // A stated origin moves the mesh, one that was chosen does not.
         let transform = Transform::IDENTITY.moved(own_origin - origin.first());
-        let instances = vec![Instance { mesh_ix: first_mesh, transform, materials: slots }];
+        let instances = vec![Instance { mesh_ix: first_mesh, transform, materials: slots, ..Instance::default() }];
         Ok(Read { instances, materials, material_ixs: [None, None], uses_crease })
     }
 

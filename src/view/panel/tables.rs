@@ -9,6 +9,7 @@ use crate::{
         loaded_scene::LoadedScene,
         pick::{Picked, PickedRay},
     },
+    world::TriangleOrigin,
 };
 
 /// Shows rows of aligned cells.
@@ -93,9 +94,10 @@ fn picked_ray(ray: &PickedRay) -> String {
         None => "leaves the scene".to_owned(),
         Some(hit) => {
             let [x, y, z] = hit.point_world.to_array();
+            let TriangleOrigin { instance_ix, mesh_ix, face_ix } = hit.origin;
             format!(
-                "triangle {} ({})\n  at {x:.3} {y:.3} {z:.3}, {:.3} away",
-                hit.triangle_ix, hit.material, hit.distance
+                "instance {instance_ix}, mesh {mesh_ix}, face {face_ix} ({})\n  at {x:.3} {y:.3} {z:.3}, {:.3} away",
+                hit.material, hit.distance
             )
         }
     };

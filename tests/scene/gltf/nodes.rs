@@ -87,7 +87,7 @@ fn scene_files_place_whole_models() {
                 [[mesh]]\nfile = 'm.glb'\nmaterial = 'own'\nsmooth = false\n";
     let found = load(&[("s.toml", toml.as_bytes()), ("m.glb", &model.glb())]).unwrap();
     assert_eq!(found.material_names, ["own", "red"]);
-    assert_eq!(found.triangle_materials, [1, 1, 0, 0]);
+    assert_eq!(*found.triangle_materials, [1, 1, 0, 0]);
     assert_eq!(found.triangles[1].v1, Vec3::new(7.0, 0.0, 2.0));
     assert_ne!(found.triangles[1].n1, kdray::layout::FLAT_NORMAL);
     assert_eq!(found.triangles[3].n1, kdray::layout::FLAT_NORMAL);

@@ -45,7 +45,31 @@ impl<'a> Accessor<'a> {
         types: &[Type],
         path: impl Into<String>,
     ) -> Checked<Self> {
-        let path = path.into();
+        // Indices are scalars, and no attribute of a vertex is.
+        let is_allowed = |kind| match kind {
+            ComponentType::U32 => types == [Type::Scalar],
+            ComponentType::U8 | ComponentType::U16 => true,
+            ComponentType::I8 | ComponentType::I16 | ComponentType::F32 => types != [Type::Scalar],
+        };
+        Self::checked(document, index, (types, &is_allowed), path.into())
+    }
+
+    /// Checks and returns an accessor of an animation, whose scalars are no indices.
+    pub fn of_numbers(
+        document: &'a Document,
+        index: Index<accessor::Accessor>,
+        type_: Type,
+        path: String,
+    ) -> Checked<Self> {
+        Self::checked(document, index, (&[type_], &|kind| kind != ComponentType::U32), path)
+    }
+
+    fn checked(
+        document: &'a Document,
+        index: Index<accessor::Accessor>,
+        (types, is_allowed): (&[Type], &dyn Fn(ComponentType) -> bool),
+        path: String,
+    ) -> Checked<Self> {
         let json = item(&document.root.accessors, "accessors", index.value(), &path)?;
         let failed = |what: String| format!("{path}: accessors[{index}]: {what}");
         let type_ = match json.type_ {
@@ -55,13 +79,7 @@ impl<'a> Accessor<'a> {
         let Valid(accessor::GenericComponentType(kind)) = json.component_type else {
             return Err(failed("its componentType is unknown".to_owned()));
         };
-        // Indices are scalars, and no attribute of a vertex is.
-        let is_allowed = match kind {
-            ComponentType::U32 => types == [Type::Scalar],
-            ComponentType::U8 | ComponentType::U16 => true,
-            ComponentType::I8 | ComponentType::I16 | ComponentType::F32 => types != [Type::Scalar],
-        };
-        if !is_allowed {
+        if !is_allowed(kind) {
             return Err(failed(format!("its componentType, {kind:?}, is not allowed here")));
         }
         let n = u32::try_from(json.count.0).map_err(|_| failed(format!("count = {} is too large", json.count.0)))?;

@@ -1,14 +1,14 @@
 //! glTF 2.0: `.gltf` and `.glb`.
 //!
 //! A glTF mesh becomes a mesh, each of its primitives one slot of it. A node with a mesh becomes an instance. Skins and
-//! morph targets are shown in the pose that the file gives; their vertices are moved here, so that such a mesh has a
-//! copy for each pose. Animations, points and lines are not shown.
+//! morph targets are shown in the pose that the file gives, or that its animations have at a moment; their vertices are
+//! moved here, so that such a mesh has a copy for each pose. Points and lines are not shown.
 //!
 //! The crate `gltf` parses the JSON. All indices, sizes and offsets are checked here, since its own readers panic on
 //! files that are wrong. Errors name the JSON path.
 
 mod accessor;
-mod camera_start;
+mod animation;
 mod cameras;
 mod deform;
 mod document;
@@ -62,7 +62,7 @@ use crate::{
 pub(crate) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<(Scene, Lacks), SceneError> {
     let failed = |what: String| SceneError::file(path, what);
     let document = read(path, bytes, options)?;
-    let nodes = Nodes::new(&document, options.scene.as_deref()).map_err(failed)?;
+    let nodes = Nodes::new(&document, options).map_err(failed)?;
     let replaced = &options.look.materials[..];
     let mut scene =
         Loader::new(&document, &nodes, LoadedBefore::default(), Some(replaced)).load(path).map_err(failed)?;
@@ -72,6 +72,7 @@ pub(crate) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result
     let bounds = scene.bounds();
     extent::check(path, bounds)?;
     scene.lights = lights::lights(&document, &nodes, scene.origin);
+    scene.animations = animation::infos(&document);
     scene.cameras = cameras::cameras(&document, &nodes, (bounds, scene.origin));
     let first = camera_that_sees(path, &scene, (bounds, options));
     let lacks_camera = first.is_none();
@@ -143,7 +144,7 @@ pub(crate) fn load_meshes(
 ) -> Result<Model, SceneError> {
     let failed = |what: String| SceneError::file(path, what);
     let document = read(path, bytes, options)?;
-    let nodes = Nodes::new(&document, options.scene.as_deref()).map_err(failed)?;
+    let nodes = Nodes::new(&document, options).map_err(failed)?;
     let replaced = has_materials.then_some(&options.look.materials[..]);
     let scene = Loader::new(&document, &nodes, before, replaced).load(path).map_err(failed)?;
     Ok(Model { scene, warnings: document.warnings(path) })
@@ -152,10 +153,6 @@ pub(crate) fn load_meshes(
 fn read(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<Document, SceneError> {
     let mut document = Document::read(path, bytes, Access::of(options)).map_err(|what| SceneError::file(path, what))?;
     document.progress = options.progress.clone();
-    for ix in 0..document.root.animations.len() {
-        let name = document.root.animations[ix].name.clone();
-        document.note("animations, which are not shown", name.unwrap_or_else(|| format!("animations[{ix}]")));
-    }
     Ok(document)
 }
 
@@ -256,7 +253,7 @@ impl<'a> Loader<'a> {
     /// read.
     fn instance(&mut self, node_ix: usize, meter: &Meter) -> Checked<Option<Instance>> {
         let document = self.document;
-        let node = &document.root.nodes[node_ix];
+        let node = self.nodes.node(document, node_ix);
         let Some(mesh) = node.mesh else { return Ok(None) };
         let world_from_node = self.nodes.world_from_node(node_ix).unwrap_or_default();
         // The joints of a skin place it. Its node does not, but as with every mesh, the node says which side of the
@@ -288,7 +285,7 @@ impl<'a> Loader<'a> {
         Ok(known.map(|Known { mesh_ix, materials, is_skinned, origin }| {
             let transform = transform.filter(|_| !is_skinned).unwrap_or(Transform::IDENTITY);
             let transform = if origin == DVec3::ZERO { transform } else { transform.moved(origin) };
-            Instance { mesh_ix, transform, materials }
+            Instance { mesh_ix, transform, materials, ..Instance::default() }
         }))
     }
 
@@ -357,12 +354,14 @@ impl<'a> Loader<'a> {
             return Err(format!("skins[{skin_ix}]: has no joints"));
         }
         let name = skin.name.clone().unwrap_or_else(|| format!("skins[{skin_ix}]"));
-        self.document.note("skins, which are shown in their rest pose", name);
+        if !self.nodes.is_posed {
+            self.document.note("skins, which are shown in their rest pose", name);
+        }
         Skin::new(self.document, skin_ix, joints)
     }
 
     fn note_morphs(&self, primitive: &Primitive, path: &str) {
-        if primitive.targets.as_ref().is_some_and(|targets| !targets.is_empty()) {
+        if !self.nodes.is_posed && primitive.targets.as_ref().is_some_and(|targets| !targets.is_empty()) {
             self.document.note("morph targets, which are shown with their default weights", path);
         }
     }

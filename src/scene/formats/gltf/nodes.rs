@@ -1,15 +1,15 @@
 //! The nodes of a scene, and where they stand in the world.
 
-use std::borrow::Cow;
+use std::collections::HashMap;
 
 use glam::{DMat4, DQuat, DVec3, Mat4, Quat};
 use gltf::json::{self, Index, Node};
 
 use super::{
-    camera_start::camera_starts,
+    animation::animated_nodes,
     document::{Document, LEFT_OUT, item},
 };
-use crate::scene::model::error::Checked;
+use crate::scene::model::{LoadOptions, error::Checked};
 
 /// The nodes of a scene, each with its transform.
 pub(super) struct Nodes {
@@ -17,25 +17,27 @@ pub(super) struct Nodes {
     pub shown: Vec<usize>,
     /// World transforms of the document's nodes, by index. `None` for nodes that belong to nothing.
     world_from_node: Vec<Option<DMat4>>,
+    /// The nodes that animations have changed, by index.
+    animated: HashMap<usize, Node>,
+    /// Whether the user has chosen a moment of the animations.
+    pub is_posed: bool,
 }
 
 impl Nodes {
-    /// Follows the nodes of a scene: the one that `name` says by its name or index, else the default one, else the
-    /// first. A document without scenes shows all nodes. Animated cameras are where their animations begin.
+    /// Follows the nodes of a scene: the one that the options say by its name or index, else the default one, else the
+    /// first. A document without scenes shows all nodes. Animations are shown at the moment that the options state;
+    /// without one, animated cameras are where their animations begin.
     ///
     /// A node that does not exist, and the second way to a node, are left out.
     ///
     /// # Errors
-    /// There is no scene `name`.
-    pub fn new(document: &Document, name: Option<&str>) -> Checked<Self> {
-        let mut all = Cow::Borrowed(&document.root.nodes);
-        let starts = camera_starts(document);
-        if !starts.is_empty() {
-            starts.into_iter().for_each(|(ix, node)| all.to_mut()[ix] = node);
-        }
-        let all = &all[..];
-        let mut nodes = Self { shown: Vec::new(), world_from_node: vec![None; all.len()] };
-        let roots = match scene(document, name)? {
+    /// There is no such scene, or no such animation.
+    pub fn new(document: &Document, options: &LoadOptions) -> Checked<Self> {
+        let all = &document.root.nodes[..];
+        let animated = animated_nodes(document, options)?;
+        let is_posed = options.moment().is_some();
+        let mut nodes = Self { shown: Vec::new(), world_from_node: vec![None; all.len()], animated, is_posed };
+        let roots = match scene(document, options.scene.as_deref())? {
             Some(ix) => indices(&document.root.scenes[ix].nodes),
             None => parentless(all),
         };
@@ -44,6 +46,11 @@ impl Nodes {
         let others = parentless(all).into_iter().filter(|ix| nodes.world_from_node[*ix].is_none()).collect();
         nodes.walk(document, all, (others, false));
         Ok(nodes)
+    }
+
+    /// Returns a node as it is shown.
+    pub fn node<'a>(&'a self, document: &'a Document, ix: usize) -> &'a Node {
+        self.animated.get(&ix).unwrap_or(&document.root.nodes[ix])
     }
 
     /// Returns a node's transform to world space, if a scene or a parentless node leads to it.
@@ -66,7 +73,8 @@ impl Nodes {
                 continue;
             }
             let world_from_parent = parent.and_then(|parent| self.world_from_node[parent]).unwrap_or_default();
-            let parent_from_node = document.or_left_out(parent_from_node(node, ix)).unwrap_or_default();
+            let shown = self.animated.get(&ix).unwrap_or(node);
+            let parent_from_node = document.or_left_out(parent_from_node(shown, ix)).unwrap_or_default();
             self.world_from_node[ix] = Some(world_from_parent * parent_from_node);
             visited.push(ix);
             let children = indices(node.children.as_deref().unwrap_or_default());

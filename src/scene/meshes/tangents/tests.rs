@@ -128,8 +128,12 @@ fn tangents_follow_the_transform_of_the_normal_map() {
     let stretched = Affine2::from_scale(Vec2::new(2.0, 0.5)) * Affine2::from_translation(Vec2::splat(7.0));
     let plain = Material::default();
     let materials = [quarter_turn, mirrored, stretched].map(with_normal_map).into_iter().chain([plain]).collect();
-    let instance =
-        |materials: &[u32]| Instance { mesh_ix: 0, transform: Transform::IDENTITY, materials: materials.to_vec() };
+    let instance = |materials: &[u32]| Instance {
+        mesh_ix: 0,
+        transform: Transform::IDENTITY,
+        materials: materials.to_vec(),
+        ..Instance::default()
+    };
     let instances = vec![instance(&[0]), instance(&[3]), instance(&[1]), instance(&[0]), instance(&[2])];
     let mut scene = Scene { meshes: vec![squares()], materials, instances, ..Scene::empty(Path::new("x")) };
     scene.add_tangents().unwrap();
