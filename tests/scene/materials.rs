@@ -10,8 +10,8 @@ use glam::{Vec2, Vec3, Vec4};
 use kdray::{
     layout::{MATERIAL_CONDUCTOR, MATERIAL_MICROFACET, MATERIAL_SINGLE_SCATTERING},
     scene::{
-        Alpha, Channel, Clearcoat, Conductor, Encoding, Image, Material, Pixels, Scene, SceneError, Sheen, Texture,
-        Wrap,
+        Alpha, Channel, Clearcoat, Conductor, Encoding, Image, LoadOptions, Material, Pixels, Scene, SceneError, Sheen,
+        Texture, Wrap,
     },
     world::FlatScene,
 };
@@ -54,6 +54,11 @@ impl io::Write for Log {
 
 /// Writes files to a folder, some of them below it, and loads the first one. Returns the warnings, too.
 pub fn load_scene(files: &[(&str, &[u8])]) -> (Result<Scene, SceneError>, Vec<String>) {
+    load_scene_with(files, &LoadOptions::default())
+}
+
+/// Does what [`load_scene`] does, with options.
+pub fn load_scene_with(files: &[(&str, &[u8])], options: &LoadOptions) -> (Result<Scene, SceneError>, Vec<String>) {
     let folder = tempfile::tempdir().unwrap();
     for (name, content) in files {
         let path = folder.path().join(name);
@@ -65,7 +70,7 @@ pub fn load_scene(files: &[(&str, &[u8])]) -> (Result<Scene, SceneError>, Vec<St
     let subscriber =
         tracing_subscriber::fmt().with_ansi(false).without_time().with_writer(move || writer.clone()).finish();
     let path = folder.path().join(files[0].0);
-    let scene = tracing::subscriber::with_default(subscriber, || Scene::load(&path));
+    let scene = tracing::subscriber::with_default(subscriber, || Scene::load_with(&path, options));
     let text = String::from_utf8(log.0.lock().unwrap().clone()).unwrap();
     (scene, text.lines().map(str::to_owned).collect())
 }

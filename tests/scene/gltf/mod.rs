@@ -1,5 +1,6 @@
 //! glTF files, written by a small builder.
 
+mod animations;
 mod compressed;
 mod files;
 mod geometry;
