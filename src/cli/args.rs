@@ -106,6 +106,10 @@ pub struct RenderArgs {
     /// Move the camera along the keyframes of this TOML file, and write one picture per frame
     #[arg(long, value_name = "FILE", conflicts_with = "repeat")]
     pub path: Option<PathBuf>,
+    /// Go once round the scene in N frames, as seen from the height of its camera, and write one picture per frame
+    #[arg(long, value_name = "N", conflicts_with_all = ["path", "repeat"])]
+    #[arg(value_parser = value_parser!(u32).range(1..=100_000))]
+    pub turntable: Option<u32>,
     /// Frames to render, both ends included, for example 0-99, 7, 0-99x4 for every fourth, or all those of the path:
     /// of the path of --path, or the one in a pack, and of the file's animations, which frame N shows at N / F seconds
     /// (--fps F) [default with --path: all, from the first keyframe to the last]
@@ -326,12 +330,12 @@ pub struct MergeArgs {
 impl RenderArgs {
     /// Whether the command draws the frames of a film.
     pub fn is_film(&self) -> bool {
-        self.path.is_some() || self.frames.is_some()
+        self.path.is_some() || self.frames.is_some() || self.turntable.is_some()
     }
 
     /// Returns the arguments with the path in the scene's pack, if the user wants frames and names no path.
     pub fn with_packed_path(self, scene: &Path) -> Result<Self, CliError> {
-        if self.frames.is_none() || self.path.is_some() {
+        if self.frames.is_none() || self.path.is_some() || self.turntable.is_some() {
             return Ok(self);
         }
         Ok(Self { path: packed_path(scene)?, ..self })
@@ -342,7 +346,7 @@ impl RenderArgs {
         self.picture.check()?;
         if self.trace.is_some() && (self.spp.is_some_and(|n| n > 1) || self.is_film()) {
             return Err(CliError::Usage(
-                "--trace cannot be combined with --spp, --path or --frames: it shows a single sample".into(),
+                "--trace cannot be combined with --spp or with films: it shows a single sample".into(),
             ));
         }
         let is_exr = |path: &PathBuf| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("exr"));
@@ -357,6 +361,7 @@ impl RenderArgs {
         let refused = [
             (self.path.is_some(), "--path"),
             (self.frames.is_some(), "--frames"),
+            (self.turntable.is_some(), "--turntable"),
             (self.samples.is_some(), "--samples"),
             (self.tile.is_some(), "--tile"),
             (self.repeat > 1, "--repeat"),

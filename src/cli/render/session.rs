@@ -107,14 +107,22 @@ impl<'a> Session<'a> {
     /// Loads a scene, builds its structure, draws its views and writes them.
     pub fn draw(&self, scene: &Path, mut views: Vec<FrameJob>, path: Option<NamedPath>) -> Result<Report, CliError> {
         let deadline = Deadline::new(self.args.time_limit);
-        let first_frame = self.args.is_film().then(|| views[0].frame);
+        // A turn shows a thing at rest, unless the user chooses an animation.
+        let may_play = self.args.turntable.is_none() || self.args.load.animation.is_some();
+        let first_frame = (self.args.is_film() && may_play).then(|| views[0].frame);
         let opened = self.open(scene, first_frame, deadline)?;
-        let is_animated = self.args.is_film() && self.args.load.plays(&opened.scene.animations);
-        if self.args.is_film() && !is_animated && path.is_none() {
+        let is_animated = first_frame.is_some() && self.args.load.plays(&opened.scene.animations);
+        if self.args.is_film() && !is_animated && path.is_none() && self.args.turntable.is_none() {
             let scene = scene.display();
-            return Err(CliError::Usage(format!("{scene}: nothing moves, so --frames needs --path FILE")));
+            let what = format!("{scene}: nothing moves, so --frames needs --path FILE or --turntable N");
+            return Err(CliError::Usage(what));
         }
         let (animated_scene, has_own_camera) = (is_animated.then(|| opened.scene.clone()), path.is_none());
+        if let Some(n_frames) = self.args.turntable {
+            let RenderOptions { width, height, .. } = opened.options;
+            let cameras = opened.scene.turntable(n_frames, width as f32 / height as f32);
+            views.iter_mut().for_each(|view| view.camera = Some(cameras[view.frame as usize]));
+        }
         if let Some(path) = path {
             let path = path.relative_to(opened.scene.origin);
             for view in &mut views {

@@ -49,8 +49,13 @@ pub fn views(
 /// at one of these frames is refused here, before the scene is loaded.
 fn views_of_film(path: Option<&NamedPath>, args: &RenderArgs, output: &Path) -> Result<Vec<FrameJob>, CliError> {
     let Frames { first, last, step } = match (args.frames, path) {
+        (Some(FrameChoice::Some(frames)), None) if args.turntable.is_some_and(|n| frames.last >= n) => {
+            let (last, n) = (frames.last, args.turntable.unwrap_or_default());
+            return Err(CliError::Usage(format!("--frames: a turn of {n} frames has no frame {last}")));
+        }
         (Some(FrameChoice::Some(frames)), _) => frames,
         (_, Some(path)) => path.frames()?,
+        (_, None) if args.turntable.is_some() => Frames { first: 0, last: args.turntable.unwrap_or(1) - 1, step: 1 },
         (_, None) => {
             let what =
                 "--frames all needs --path FILE; of animations, `kdray inspect` tells the times, for --frames A-B";

@@ -9,7 +9,7 @@ use crate::scene::model::{Camera, Instance, Mesh, Projection, Scene};
 /// Vertical field of view unless the user states one, degrees.
 pub(crate) const VERTICAL_FOV_DEGREES: f32 = 40.0;
 /// Factor on the half width and half height of the picture that the scene may fill.
-const FILLED: f64 = 0.95;
+pub(super) const FILLED: f64 = 0.95;
 
 /// Least half diagonal of a box, in steps of single precision at its coordinates. The eye's coordinates are rounded to
 /// such steps, so from nearer a small scene far from the origin could be out of the picture.
@@ -117,7 +117,7 @@ fn usual(bounds: &BoundingBox, frame: &Frame) -> (Direction, View) {
 }
 
 /// Returns how far the triangles of a scene's near part reach from a point in some directions, in lengths of each.
-fn support(scene: &Scene, near: &NearPart, from: DVec3, directions: [DVec3; 4]) -> [f64; 4] {
+pub(super) fn support(scene: &Scene, near: &NearPart, from: DVec3, directions: [DVec3; 4]) -> [f64; 4] {
     const NOTHING: [f64; 4] = [f64::NEG_INFINITY; 4];
     let most = |a: [f64; 4], b: [f64; 4]| std::array::from_fn(|ix| a[ix].max(b[ix]));
     let corners: Vec<Vec<Vec3>> = scene.meshes.par_iter().map(Mesh::corners).collect();
