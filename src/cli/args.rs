@@ -98,7 +98,8 @@ pub struct RenderArgs {
     /// is standard input
     #[arg(long, value_name = "FILE")]
     pub list: Option<PathBuf>,
-    /// Picture to write: .png, or .exr for linear radiance; of a film, #### in the name stands for the frame's
+    /// Picture to write: .png, or .exr for linear radiance; of a film, one file (.png animated, .gif, .y4m, or - for
+    /// YUV4MPEG2 on standard output), or a file for each frame, where #### in the name stands for the frame's
     /// number; of several scenes, a folder, or a name in which {} stands for the scene's name, as in out/{}.exr
     /// [default: the scene's name with .png, or with .####.png, in the working directory]
     #[arg(short, long, value_name = "FILE|FOLDER")]

@@ -60,7 +60,11 @@ impl LoadArgs {
 
     /// Returns the time of a frame, seconds.
     pub fn seconds_of(&self, frame: u32) -> f64 {
-        f64::from(frame) / self.fps.unwrap_or(24.0)
+        f64::from(frame) / self.frames_a_second()
+    }
+
+    pub fn frames_a_second(&self) -> f64 {
+        self.fps.unwrap_or(24.0)
     }
 
     /// Whether some of a scene's animations are shown in a film.

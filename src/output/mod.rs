@@ -24,6 +24,7 @@ pub(crate) use self::layers::sum_prefix;
 use self::{destination::Destination, temporary::Temporary};
 pub use self::{
     destination::regular_file,
+    film::{FilmFile, FilmFormat},
     heat_map::HeatMap,
     layers::{Layers, write_layers, write_with_channels},
     record::{PathRecord, RECORD_ATTRIBUTE, Record, WholeRecord},
@@ -32,6 +33,7 @@ pub use self::{
 use crate::frame::Picture;
 
 mod destination;
+mod film;
 mod heat_map;
 mod layers;
 mod record;

@@ -8,6 +8,7 @@ mod cli;
 mod doctor;
 mod examples;
 mod files;
+mod films;
 mod merge;
 mod messages;
 #[cfg(target_os = "linux")]

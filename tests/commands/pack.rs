@@ -327,7 +327,7 @@ fn what_is_no_pack_is_refused() {
     succeed(path, &["pack", "s.toml", "--allow-outside"]);
     fail(path, &["pack", "s.kdpack", "-o", "t.kdpack"], 3, "is in a pack already");
     fail(path, &["pack", "s.kdpack"], 2, "s.kdpack");
-    fail(path, &["render", "s.kdpack", "--frames", "0-1"], 2, "a pack with a path");
+    fail(path, &["render", "s.kdpack", "--frames", "0-1"], 2, "nothing moves, so --frames needs --path FILE");
     fail(path, &["render", "s.kdpack", "-o", "s.kdpack/a.png"], 5, "s.kdpack");
     fail(path, &["convert", "s.kdpack", "c.toml"], 3, "s.kdpack");
 }

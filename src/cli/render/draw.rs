@@ -1,7 +1,9 @@
 //! Draws the pictures of `kdray render`, and writes each before the next one is drawn on the same device.
 
 use std::{
+    collections::BTreeMap,
     mem::take,
+    sync::{Mutex, PoisonError},
     time::{Duration, Instant},
 };
 
@@ -10,7 +12,7 @@ use kdray::{
     engine::{AnimatedWorld, Engine, LoadError, NoiseGoal, Renderer},
     frame::{Drawn, Goal, Picture, Profile, RangeSums, RenderOptions, SampleRange, SampleSums, Watcher},
     gpu::{DeviceInfo, GpuError},
-    output::{Layers, Record, WholeRecord},
+    output::{FilmFile, Layers, OutputError, Record, WholeRecord},
     scene::Camera,
     world::World,
 };
@@ -29,7 +31,35 @@ pub struct FrameJob {
     pub camera: Option<Camera>,
     /// The number of the frame on the camera's path; 0 without a path.
     pub frame: u32,
+    /// Its place among the frames that are drawn.
+    pub ix: usize,
     pub files: Files,
+}
+
+/// The one file of a film, to which pictures are written in their order, in whatever order they are drawn.
+pub struct OneFile {
+    file: FilmFile,
+    n_written: usize,
+    waiting: BTreeMap<usize, Picture>,
+}
+
+impl OneFile {
+    pub fn new(file: FilmFile) -> Self {
+        Self { file, n_written: 0, waiting: BTreeMap::new() }
+    }
+
+    fn push(&mut self, ix: usize, picture: Picture) -> Result<(), OutputError> {
+        self.waiting.insert(ix, picture);
+        while let Some(picture) = self.waiting.remove(&self.n_written) {
+            self.file.push(&picture)?;
+            self.n_written += 1;
+        }
+        Ok(())
+    }
+
+    pub fn finish(self) -> Result<(), OutputError> {
+        self.file.finish()
+    }
 }
 
 /// The film of a file whose animations play.
@@ -47,6 +77,8 @@ pub struct Common<'a> {
     pub camera: Camera,
     /// The animations that play, if any do.
     pub film: Option<&'a Film>,
+    /// The file of all pictures, if they go to one.
+    pub one_file: Option<&'a Mutex<OneFile>>,
     /// The end of each picture, if all samples are drawn.
     pub goal: Goal,
     /// The noise at which pictures end, if the user wants that.
@@ -263,7 +295,12 @@ fn write_view(common: &Common, view: &FrameJob, of_view: DrawnView) -> Result<Wr
     let (sums, mean_sums) = sums.untold();
     let means = drawn.layers.0.each_ref().map(Vec::as_slice);
     let (aovs, pixel_aovs) = (&common.args.aov[..], &drawn.pixel_aovs[..]);
-    view.files.write(&picture, &Layers { aovs, pixel_aovs, means, sums, mean_sums, record: Some(&record) })?;
+    match common.one_file {
+        Some(file) => file.lock().unwrap_or_else(PoisonError::into_inner).push(view.ix, picture)?,
+        None => {
+            view.files.write(&picture, &Layers { aovs, pixel_aovs, means, sums, mean_sums, record: Some(&record) })?
+        }
+    }
     drop(unwritten);
     if common.args.is_film() {
         // A film ends after this frame, without a report.

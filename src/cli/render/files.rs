@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use kdray::{
     frame::{Aov, Picture},
-    output::{self, Format, HeatMap, Layers, OutputError},
+    output::{self, FilmFormat, Format, HeatMap, Layers, OutputError},
     scene::Scene,
 };
 
@@ -103,10 +103,20 @@ pub fn roles(args: &RenderArgs, jobs: &[Job]) -> Result<FileRoles, CliError> {
 /// Refuses outputs that cannot be written, as far as they are known before the scene is loaded.
 pub fn check_outputs(args: &RenderArgs, job: &Job) -> Result<(), CliError> {
     if args.output.is_some() {
-        Format::of(&job.output)?;
-        output::check(&job.output)?;
-        if args.is_film() {
-            numbered(&job.output, 0)?;
+        if args.is_film() && is_one_film(&job.output) {
+            if !args.aov.is_empty() {
+                let what = "--aov needs a file for each frame: an --output with ####, as in out.####.png";
+                return Err(CliError::Usage(what.to_owned()));
+            }
+            if job.output != Path::new(STDOUT) {
+                output::check(&job.output)?;
+            }
+        } else {
+            Format::of(&job.output)?;
+            output::check(&job.output)?;
+            if args.is_film() {
+                numbered(&job.output, 0)?;
+            }
         }
     }
     Ok([&args.profile, &args.trace].into_iter().flatten().try_for_each(|path| output::check(path))?)
@@ -152,6 +162,15 @@ pub fn jobs_of_several(args: &RenderArgs, scenes: Vec<PathBuf>) -> Result<Vec<Jo
 fn default_output(scene_name: &str, is_numbered: bool) -> PathBuf {
     let stem = output::stem_of(scene_name).replace('#', "-");
     format!("{stem}{}.png", if is_numbered { ".####" } else { "" }).into()
+}
+
+/// Stands for standard output.
+pub const STDOUT: &str = "-";
+
+/// Whether all frames of a film go to one file.
+pub fn is_one_film(output: &Path) -> bool {
+    let has_number = output.file_name().is_some_and(|name| name.to_string_lossy().contains('#'));
+    !has_number && FilmFormat::of(output).is_some()
 }
 
 /// Returns the file of a frame's picture. The frame's number replaces the pattern's only run of `#` and has at least

@@ -20,12 +20,12 @@ mod session;
 mod several;
 mod views;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use kdray::{gpu::Device, output};
 
 use self::{
-    files::{check_outputs, only_job, roles},
+    files::{STDOUT, check_outputs, only_job, roles},
     session::Session,
     views::{NamedPath, views},
 };
@@ -67,7 +67,7 @@ fn run_one(args: RenderArgs, scene: PathBuf) -> Result<(), CliError> {
     if let Some(path) = &args.profile {
         output::write(path, &report.json())?;
     }
-    if !args.quiet {
+    if !args.quiet && job.output != Path::new(STDOUT) {
         print(&args.progress.report(&report.text()))?;
     }
     engine.devices().try_for_each(report_validation)

@@ -1,6 +1,11 @@
 //! Loads, builds and draws one scene after the other on the same devices.
 
-use std::{cell::OnceCell, path::Path, time::Instant};
+use std::{
+    cell::OnceCell,
+    path::Path,
+    sync::{Mutex, PoisonError},
+    time::Instant,
+};
 
 use kdray::{
     engine::{
@@ -9,7 +14,7 @@ use kdray::{
     },
     frame::{Goal, Profile, RenderOptions, SampleRange},
     gpu::DeviceInfo,
-    output::{self, Record, WholeRecord},
+    output::{self, FilmFile, Record, WholeRecord},
     util::progress,
     world::World,
 };
@@ -17,7 +22,8 @@ use tracing::info_span;
 
 use super::{
     deadline::Deadline,
-    draw::{Common, DrawnPictures, Film, FrameJob, draw_and_write, draws_whole_frames},
+    draw::{Common, DrawnPictures, Film, FrameJob, OneFile, draw_and_write, draws_whole_frames},
+    files::is_one_film,
     views::NamedPath,
 };
 use crate::cli::{
@@ -67,7 +73,19 @@ impl Ready {
         let n_drawn = some_samples.map_or(n_samples, |range| range.len());
         let goal = args.time.map_or(Goal::Samples(n_drawn), Goal::Time);
         let (camera, noise_goal) = (world.scene().camera, *noise_goal);
-        Common { args, options, camera, film, goal, noise_goal, n_drawn, some_samples, deadline, record }
+        Common {
+            args,
+            options,
+            camera,
+            film,
+            one_file: None,
+            goal,
+            noise_goal,
+            n_drawn,
+            some_samples,
+            deadline,
+            record,
+        }
     }
 }
 
@@ -135,11 +153,15 @@ impl<'a> Session<'a> {
             let options = self.request(first_frame, Default::default()).scene;
             Film { animated: AnimatedWorld::new(scene, &options, first, &ready.world), has_own_camera }
         });
-        let common = ready.common(self.args, film.as_ref(), deadline);
+        let one_file = self.one_file(&views, &ready)?;
+        let common = Common { one_file: one_file.as_ref(), ..ready.common(self.args, film.as_ref(), deadline) };
         let rendering = format!("rendering {}x{}", common.record.crop.width(), common.record.crop.height());
         let (engine, stage) = ((&ready.engine, &ready.world), (&self.progress, rendering.as_str()));
         let (drawn, _) = self.progress.stage(&rendering, || draw_and_write(&common, engine, &views, stage));
         let DrawnPictures { profiles, n_samples, noise, render_ms } = drawn.map_err(CliError::of_drawing)?;
+        if let Some(file) = one_file {
+            file.into_inner().unwrap_or_else(PoisonError::into_inner).finish()?;
+        }
 
         let repeated = FrameTimeRange::of(&profiles);
         let profile = median(profiles);
@@ -167,6 +189,18 @@ impl<'a> Session<'a> {
             repeated,
             frame: profile.into(),
         })
+    }
+
+    /// Begins the file of a film, if all its frames go to one.
+    fn one_file(&self, views: &[FrameJob], ready: &Ready) -> Result<Option<Mutex<OneFile>>, CliError> {
+        let path = &views[0].files.picture;
+        if !self.args.is_film() || !is_one_film(path) {
+            return Ok(None);
+        }
+        let crop = ready.options.crop_or_whole();
+        let size = (crop.width(), crop.height());
+        let file = FilmFile::new(path, size, self.args.load.frames_a_second(), views.len() as u32)?;
+        Ok(Some(Mutex::new(OneFile::new(file))))
     }
 
     /// Builds the structure of a scene for its views, and chooses the methods.

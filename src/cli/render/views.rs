@@ -7,7 +7,7 @@ use kdray::scene::{Camera, CameraPath};
 
 use super::{
     draw::FrameJob,
-    files::{Files, numbered},
+    files::{Files, STDOUT, is_one_film, numbered},
 };
 use crate::cli::{
     args::{FrameChoice, Frames, RenderArgs},
@@ -27,10 +27,11 @@ pub fn views(
 ) -> Result<Vec<FrameJob>, CliError> {
     let mut views = if args.is_film() {
         let views = views_of_film(path, args, output)?;
-        views.iter().try_for_each(|view| view.files.note(&mut roles))?;
+        let n_files = if is_one_film(output) { 1 } else { views.len() };
+        views[..n_files].iter().try_for_each(|view| view.files.note(&mut roles))?;
         views
     } else {
-        vec![FrameJob { camera: None, frame: 0, files: Files::of(output.to_owned(), &args.aov) }]
+        vec![FrameJob { camera: None, frame: 0, ix: 0, files: Files::of(output.to_owned(), &args.aov) }]
     };
     if args.skip_existing {
         let n_all = views.len();
@@ -41,7 +42,9 @@ pub fn views(
             n => progress.note(&format!("{n} pictures exist already")),
         }
     }
-    views.iter().try_for_each(|view| view.files.check())?;
+    if output != Path::new(STDOUT) {
+        views.iter().try_for_each(|view| view.files.check())?;
+    }
     Ok(views)
 }
 
@@ -62,11 +65,12 @@ fn views_of_film(path: Option<&NamedPath>, args: &RenderArgs, output: &Path) -> 
             return Err(CliError::Usage(what.to_owned()));
         }
     };
-    let view = |frame| {
+    let view = |(ix, frame)| {
         path.map_or(Ok(()), |path| path.camera_at(frame).map(drop))?;
-        Ok(FrameJob { camera: None, frame, files: Files::of(numbered(output, frame)?, &args.aov) })
+        let picture = if is_one_film(output) { output.to_owned() } else { numbered(output, frame)? };
+        Ok(FrameJob { camera: None, frame, ix, files: Files::of(picture, &args.aov) })
     };
-    (first..=last).step_by(step as usize).map(view).collect()
+    (first..=last).step_by(step as usize).enumerate().map(view).collect()
 }
 
 /// A camera path and the file that it was read from.

@@ -12,6 +12,8 @@ use super::{
 
 /// Name of the material of meshes and faces that name none.
 pub(crate) const DEFAULT_MATERIAL: &str = "(default)";
+/// The most triangles of all instances of a file's scene: kernels have so many indices.
+const MOST_TRIANGLES: u64 = 1 << 31;
 /// Name of the material of the ground below a mesh.
 pub(crate) const GROUND: &str = "(ground)";
 
@@ -122,6 +124,20 @@ impl Scene {
     pub fn n_triangles(&self) -> usize {
         let mesh_of = |instance: &Instance| self.meshes.get(instance.mesh_ix);
         self.instances.iter().filter_map(mesh_of).map(|mesh| mesh.faces.len()).sum()
+    }
+
+    /// Checks that all triangles can have an index, before work that grows with their number.
+    ///
+    /// # Errors
+    /// There are more than 2^31. The error is a message for people.
+    pub(crate) fn check_n_triangles(&self) -> Result<(), String> {
+        let mesh_of = |instance: &Instance| self.meshes.get(instance.mesh_ix);
+        let n: u64 = self.instances.iter().filter_map(mesh_of).map(|mesh| mesh.faces.len() as u64).sum();
+        if n > MOST_TRIANGLES {
+            Err(format!("a scene of {n} triangles: there may be {MOST_TRIANGLES}"))
+        } else {
+            Ok(())
+        }
     }
 
     /// Returns the number of triangles of the meshes that have an instance: each counts once, however often it occurs.

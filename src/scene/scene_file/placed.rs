@@ -382,7 +382,7 @@ fn push_instances(scene: &mut Scene, instance: Instance, places: &[Transform]) -
         mesh.check_place(&transform, bounds).map_err(named)?;
         scene.instances.push(Instance { transform, ..instance.clone() });
     }
-    Ok(())
+    scene.check_n_triangles()
 }
 
 impl Reading {

@@ -228,6 +228,7 @@ impl<'a> Loader<'a> {
             return Err(format!("has no triangles: {why}"));
         }
         scene.meshes = self.meshes;
+        scene.check_n_triangles()?;
         scene.materials = self.materials.materials;
         scene.images = self.materials.textures.decode(&mut scene.materials, self.before.n_pixels);
         Ok(scene)

@@ -1,0 +1,144 @@
+//! Tests of films: animations of glTF files, and turns around scenes.
+
+use std::{fs, path::Path};
+
+use base64::{Engine, engine::general_purpose::STANDARD};
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+use crate::support::command::{fail, names, stderr, stdout, succeed};
+
+/// Writes `moving.gltf`: a square that moves to the right by 1 a second for 2 seconds and another one at rest, with a
+/// camera that moves upwards, and a light. With `morphs`, the second square grows.
+fn with_model(morphs: bool) -> TempDir {
+    let corners = [[0.0_f32, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+    let added = corners.map(|[x, y, _]| [x, y, 0.0]);
+    let (mut data, mut views, mut accessors) = (Vec::<u8>::new(), Vec::new(), Vec::new());
+    let mut accessor = |kind: &str, component: u32, n: usize, bytes: &[u8]| {
+        views.push(json!({ "buffer": 0, "byteOffset": data.len(), "byteLength": bytes.len() }));
+        data.extend(bytes);
+        accessors.push(json!({ "bufferView": views.len() - 1, "componentType": component, "count": n, "type": kind }));
+        accessors.len() - 1
+    };
+    let bytes = |numbers: &[f32]| bytemuck::cast_slice::<f32, u8>(numbers).to_vec();
+    let positions = accessor("VEC3", 5126, 4, &bytes(corners.as_flattened()));
+    let target = accessor("VEC3", 5126, 4, &bytes(added.as_flattened()));
+    let indices = accessor("SCALAR", 5125, 6, bytemuck::cast_slice(&[0_u32, 1, 2, 0, 2, 3]));
+    let times = accessor("SCALAR", 5126, 2, &bytes(&[0.0, 2.0]));
+    let places = accessor("VEC3", 5126, 2, &bytes(&[-1.0, 0.0, 0.0, 1.0, 0.0, 0.0]));
+    let of_camera = accessor("VEC3", 5126, 2, &bytes(&[0.0, 0.0, 6.0, 0.0, 0.5, 6.0]));
+    let weights = accessor("SCALAR", 5126, 2, &bytes(&[0.0, 1.0]));
+    let primitive = json!({ "attributes": { "POSITION": positions }, "indices": indices });
+    let mut growing = primitive.clone();
+    growing["targets"] = json!([{ "POSITION": target }]);
+    let sampler = |output: usize| json!({ "input": times, "output": output });
+    let channel =
+        |ix: usize, node: usize, path: &str| json!({ "sampler": ix, "target": { "node": node, "path": path } });
+    let mut channels = vec![channel(0, 0, "translation"), channel(1, 2, "translation")];
+    channels.extend(morphs.then(|| channel(2, 1, "weights")));
+    let uri = format!("data:application/octet-stream;base64,{}", STANDARD.encode(&data));
+    let model = json!({
+        "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0, 1, 2, 3] }],
+        "nodes": [
+            { "mesh": 0 }, { "mesh": if morphs { 1 } else { 0 }, "translation": [0.2, -1.2, 0.5] },
+            { "camera": 0 }, { "extensions": { "KHR_lights_punctual": { "light": 0 } } },
+        ],
+        "meshes": [{ "primitives": [primitive] }, { "primitives": [growing], "weights": [0] }],
+        "cameras": [{ "type": "perspective", "perspective": { "yfov": 0.8, "znear": 0.1 } }],
+        "animations": [{
+            "name": "slide", "channels": channels,
+            "samplers": [sampler(places), sampler(of_camera), sampler(weights)],
+        }],
+        "extensionsUsed": ["KHR_lights_punctual"],
+        "extensions": { "KHR_lights_punctual": { "lights": [{ "type": "directional", "intensity": 3 }] } },
+        "buffers": [{ "byteLength": data.len(), "uri": uri }], "bufferViews": views, "accessors": accessors,
+    });
+    let directory = TempDir::new().unwrap();
+    fs::write(directory.path().join("moving.gltf"), model.to_string()).unwrap();
+    directory
+}
+
+fn pixels(path: &Path) -> Vec<u8> {
+    image::open(path).unwrap().into_rgb8().into_raw()
+}
+
+const SMALL: [&str; 7] = ["-q", "--size", "40x30", "--exposure", "1", "--spp", "1"];
+
+/// A frame is the same alone, in sequence, and as a picture at its time, whether instances move or trees are built.
+#[test]
+fn frames_of_an_animation_are_pictures_at_their_times() {
+    for morphs in [false, true] {
+        let directory = with_model(morphs);
+        let path = directory.path();
+        for device in ["--cpu", "--validate"] {
+            for instances in ["flatten", "keep"] {
+                let common = [&SMALL[..], &[device, "--instances", instances]].concat();
+                let render = |more: &[&str]| succeed(path, &[&["render", "moving.gltf"], &common[..], more].concat());
+                render(&["--frames", "0-4", "--fps", "2", "-o", "f#.png"]);
+                render(&["--frames", "3", "--fps", "2", "-o", "alone#.png"]);
+                render(&["--at", "1.5", "-o", "at.png"]);
+                render(&["--frame", "3", "--fps", "2", "-o", "frame.png"]);
+                let at = pixels(&path.join("at.png"));
+                for same in ["f3.png", "alone3.png", "frame.png"] {
+                    assert!(pixels(&path.join(same)) == at, "{same}, {device} {instances} {morphs}");
+                }
+                let frames = [0, 1, 2, 3, 4].map(|frame| pixels(&path.join(format!("f{frame}.png"))));
+                assert!(frames.windows(2).all(|pair| pair[0] != pair[1]), "something moves in each frame");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_does_not_move_is_no_film() {
+    let directory = with_model(false);
+    let path = directory.path();
+    fs::write(path.join("still.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    fail(path, &["render", "still.obj", "--cpu", "--frames", "0-2"], 2, "still.obj: nothing moves");
+    fail(path, &["render", "moving.gltf", "--cpu", "--frames", "0-2", "--animation", "none"], 2, "nothing moves");
+    let unknown = ["render", "moving.gltf", "--cpu", "--at", "1", "--animation", "fly"];
+    fail(path, &unknown, 1, "there is no animation `fly`, but 0 `slide`");
+    assert_eq!(names(path), ["moving.gltf", "still.obj"]);
+    let output = succeed(path, &[&["render", "moving.gltf", "--cpu"], &SMALL[1..]].concat());
+    assert!(stderr(&output).contains("animations, which --at SECONDS shows: slide"), "{}", stderr(&output));
+}
+
+#[test]
+fn animations_are_listed() {
+    let directory = with_model(true);
+    let text = stdout(&succeed(directory.path(), &["inspect", "moving.gltf"]));
+    assert!(text.contains("0          slide   0.000  2.000         ?  2 nodes  1 nodes"), "{text}");
+    let json: Value =
+        serde_json::from_str(&stdout(&succeed(directory.path(), &["inspect", "moving.gltf", "--json"]))).unwrap();
+    let expected = json!([{ "name": "slide", "begin": 0.0, "end": 2.0, "moved_nodes": 2, "morphed_nodes": 1 }]);
+    assert_eq!(json["animations"], expected);
+}
+
+/// A long box is seen whole from all sides, and fills some of the pictures.
+#[test]
+fn a_turn_cuts_nothing() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    let scene = "[[mesh]]\ngenerator = 'box'\nsize = [6, 1, 0.5]\ntransform = { translate = [40, 3, 2] }\n";
+    fs::write(path.join("box.toml"), scene).unwrap();
+    let (width, height) = (48, 36);
+    for more in [&[][..], &["--eye", "40,30,9"], &["--eye", "40,3,22", "--target", "40,3,2", "--fov", "12"]] {
+        let common = [&SMALL[..1], &["--size", "48x36", "--spp", "1", "--cpu"], more].concat();
+        succeed(path, &[&["render", "box.toml", "--turntable", "6", "-o", "t#.png"], &common[..]].concat());
+        let mut most_wide = 0;
+        for frame in 0..6 {
+            let picture = image::open(path.join(format!("t{frame}.png"))).unwrap().into_rgb8();
+            let background = *picture.get_pixel(0, 0);
+            let is_border = |x: u32, y: u32| x == 0 || y == 0 || x == width - 1 || y == height - 1;
+            let seen: Vec<_> = picture.enumerate_pixels().filter(|(_, _, pixel)| **pixel != background).collect();
+            assert!(seen.len() > 20 && !seen.iter().any(|(x, y, _)| is_border(*x, *y)), "frame {frame}, {more:?}");
+            let columns = seen.iter().map(|(x, ..)| *x);
+            most_wide = most_wide.max(columns.clone().max().unwrap() - columns.min().unwrap());
+        }
+        assert!(most_wide > width * 3 / 4, "{most_wide}, {more:?}");
+        let again =
+            [&["render", "box.toml", "--turntable", "6", "--frames", "4", "-o", "u#.png"], &common[..]].concat();
+        succeed(path, &again);
+        assert!(pixels(&path.join("u4.png")) == pixels(&path.join("t4.png")));
+    }
+}
