@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 use tracing::dispatcher::{Dispatch, with_default};
 
-use super::load::LoadError;
+use super::load::{LoadError, LoadRequest, Opened};
 use crate::{
     scene::{Camera, Instance, LoadOptions, Scene},
     world::{FlatScene, InstanceUpdate, World},
@@ -19,7 +19,7 @@ use crate::{
 /// ([`World::with_instances_changed`]). Otherwise the world is built anew.
 pub struct AnimatedWorld {
     path: PathBuf,
-    options: LoadOptions,
+    request: LoadRequest,
     /// The scene at the first moment.
     scene: Scene,
     /// Its world.
@@ -27,10 +27,10 @@ pub struct AnimatedWorld {
 }
 
 impl AnimatedWorld {
-    /// Joins a file, the scene that was read of it at some moment, and the world of the scene. `options`: those of the
+    /// Joins a file, the scene that was read of it at some moment, and the world of the scene. `request`: that of the
     /// reading.
-    pub fn new(path: &Path, options: &LoadOptions, scene: Scene, world: &World) -> Self {
-        Self { path: path.to_owned(), options: options.clone(), scene, world: world.clone() }
+    pub fn new(path: &Path, request: &LoadRequest, scene: Scene, world: &World) -> Self {
+        Self { path: path.to_owned(), request: request.clone(), scene, world: world.clone() }
     }
 
     /// Returns the world at another moment, seconds, and its camera. A warning tells of things that cannot be shown
@@ -39,10 +39,11 @@ impl AnimatedWorld {
     /// # Errors
     /// The file cannot be read any more, or shows nothing at this moment.
     pub fn at(&self, seconds: f64) -> Result<(World, Camera), LoadError> {
-        let options = LoadOptions { at: Some(seconds), ..self.options.clone() };
+        let scene = LoadOptions { at: Some(seconds), ..self.request.scene.clone() };
+        let request = LoadRequest { scene, ..self.request.clone() };
         // Its warnings are those of the first moment.
-        let read = || Scene::load_with(&self.path, &options);
-        let mut scene = with_default(&Dispatch::none(), read)?;
+        let read = || Opened::read(&self.path, &request);
+        let mut scene = with_default(&Dispatch::none(), read)?.scene;
         if scene.instances.len() < self.scene.instances.len() {
             let n_missing = self.scene.instances.len() - scene.instances.len();
             tracing::warn!("{}: at {seconds} s, {n_missing} meshes cannot be shown", self.path.display());

@@ -6,6 +6,7 @@
 //!                                       └─────> Engine::cast ───> hits
 //! ```
 
+#[cfg(feature = "files")]
 mod animated;
 mod caster;
 pub mod choices;
@@ -18,9 +19,10 @@ mod renderer;
 
 use std::sync::Arc;
 
+#[cfg(feature = "files")]
+pub use self::animated::AnimatedWorld;
 use self::choices::{Cache, Methods, Processor, Request, Workload};
 pub use self::{
-    animated::AnimatedWorld,
     caster::Caster,
     group::FilmRenderer,
     load::{Builder, LoadError, LoadRequest, Loaded, Opened, Source, Work},

@@ -167,7 +167,8 @@ impl World {
 
     /// The tables from which the path tracer samples lights. They are made at the first call.
     pub fn emitters(&self) -> &Emitters {
-        &**made_once(&self.0.emitters, || Arc::new(Emitters::new(&self.0.scene)))
+        let made: &Arc<Emitters> = made_once(&self.0.emitters, || Arc::new(Emitters::new(&self.0.scene)));
+        made
     }
 
     /// The wide hierarchy, made from the kd-tree, through which the CPU traces single rays. There is none for a grid.

@@ -97,7 +97,7 @@ fn what_does_not_move_is_no_film() {
     fail(path, &["render", "still.obj", "--cpu", "--frames", "0-2"], 2, "still.obj: nothing moves");
     fail(path, &["render", "moving.gltf", "--cpu", "--frames", "0-2", "--animation", "none"], 2, "nothing moves");
     let unknown = ["render", "moving.gltf", "--cpu", "--at", "1", "--animation", "fly"];
-    fail(path, &unknown, 1, "there is no animation `fly`, but 0 `slide`");
+    fail(path, &unknown, 3, "there is no animation `fly`, but 0 `slide`");
     assert_eq!(names(path), ["moving.gltf", "still.obj"]);
     let output = succeed(path, &[&["render", "moving.gltf", "--cpu"], &SMALL[1..]].concat());
     assert!(stderr(&output).contains("animations, which --at SECONDS shows: slide"), "{}", stderr(&output));
@@ -140,5 +140,69 @@ fn a_turn_cuts_nothing() {
             [&["render", "box.toml", "--turntable", "6", "--frames", "4", "-o", "u#.png"], &common[..]].concat();
         succeed(path, &again);
         assert!(pixels(&path.join("u4.png")) == pixels(&path.join("t4.png")));
+    }
+}
+
+/// A film in one file has the pictures of the numbered files, in their order.
+#[test]
+fn one_file_has_all_frames() {
+    use std::{fs::File, io::BufReader, process::Command};
+
+    use image::{AnimationDecoder, codecs::gif::GifDecoder};
+
+    let directory = with_model(false);
+    let path = directory.path();
+    let open = |name: &str| BufReader::new(File::open(path.join(name)).unwrap());
+    let film = |more: &[&str]| {
+        let args = [&["render", "moving.gltf", "--cpu", "--frames", "0-3", "--fps", "2"], &SMALL[..], more].concat();
+        succeed(path, &args)
+    };
+    film(&["-o", "f#.png"]);
+    let frames = [0, 1, 2, 3].map(|ix| pixels(&path.join(format!("f{ix}.png"))));
+
+    film(&["-o", "film.png"]);
+    let mut reader = png::Decoder::new(open("film.png")).read_info().unwrap();
+    assert_eq!(reader.info().animation_control.map(|it| (it.num_frames, it.num_plays)), Some((4, 0)));
+    let mut buffer = vec![0; reader.output_buffer_size().unwrap()];
+    for frame in &frames {
+        let info = reader.next_frame(&mut buffer).unwrap();
+        assert!(&buffer[..info.buffer_size()] == frame);
+        let control = reader.info().frame_control.unwrap();
+        assert_eq!((control.delay_num, control.delay_den), (1, 2));
+    }
+
+    film(&["-o", "film.gif"]);
+    let gif = GifDecoder::new(open("film.gif")).unwrap().into_frames().collect_frames().unwrap();
+    assert_eq!(gif.len(), 4);
+    for (gif, frame) in gif.iter().zip(&frames) {
+        assert_eq!(gif.delay().numer_denom_ms(), (500, 1));
+        let rgb = gif.buffer().pixels().flat_map(|pixel| pixel.0[..3].to_vec());
+        let off = rgb.zip(frame).map(|(a, b)| f64::from(a.abs_diff(*b))).sum::<f64>() / frame.len() as f64;
+        assert!(off < 4.0, "{off}");
+    }
+
+    film(&["-o", "film.y4m"]);
+    let y4m = fs::read(path.join("film.y4m")).unwrap();
+    let header = b"YUV4MPEG2 W40 H30 F2:1 Ip A1:1 C444 XCOLORRANGE=LIMITED\n";
+    assert!(y4m.starts_with(header) && y4m.len() == header.len() + 4 * (6 + 3 * 40 * 30));
+    let output = film(&["-o", "-"]);
+    assert!(output.stdout == y4m, "standard output has nothing else");
+    // A program that decodes videos finds the same colours, if there is one.
+    let decoded = Command::new("ffmpeg")
+        .args([
+            "-v",
+            "error",
+            "-i",
+            "film.y4m",
+            "-vf",
+            "scale=in_color_matrix=bt709:flags=accurate_rnd+full_chroma_int",
+        ])
+        .args(["-f", "rawvideo", "-pix_fmt", "rgb24", "-"])
+        .current_dir(path)
+        .output();
+    if let Ok(decoded) = decoded {
+        assert_eq!(decoded.stdout.len(), 4 * frames[0].len());
+        let far = decoded.stdout.iter().zip(frames.iter().flatten()).filter(|(a, b)| a.abs_diff(**b) > 2).count();
+        assert_eq!(far, 0);
     }
 }

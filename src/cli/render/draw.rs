@@ -33,6 +33,8 @@ pub struct FrameJob {
     pub frame: u32,
     /// Its place among the frames that are drawn.
     pub ix: usize,
+    /// Whether the pictures of all frames go to one file.
+    pub shares_file: bool,
     pub files: Files,
 }
 

@@ -23,7 +23,6 @@ use tracing::info_span;
 use super::{
     deadline::Deadline,
     draw::{Common, DrawnPictures, Film, FrameJob, OneFile, draw_and_write, draws_whole_frames},
-    files::is_one_film,
     views::NamedPath,
 };
 use crate::cli::{
@@ -150,8 +149,8 @@ impl<'a> Session<'a> {
         let ready = self.build(opened, &views, deadline)?;
         deadline.check("building")?;
         let film = animated_scene.map(|first| {
-            let options = self.request(first_frame, Default::default()).scene;
-            Film { animated: AnimatedWorld::new(scene, &options, first, &ready.world), has_own_camera }
+            let request = self.request(first_frame, Default::default());
+            Film { animated: AnimatedWorld::new(scene, &request, first, &ready.world), has_own_camera }
         });
         let one_file = self.one_file(&views, &ready)?;
         let common = Common { one_file: one_file.as_ref(), ..ready.common(self.args, film.as_ref(), deadline) };
@@ -194,7 +193,7 @@ impl<'a> Session<'a> {
     /// Begins the file of a film, if all its frames go to one.
     fn one_file(&self, views: &[FrameJob], ready: &Ready) -> Result<Option<Mutex<OneFile>>, CliError> {
         let path = &views[0].files.picture;
-        if !self.args.is_film() || !is_one_film(path) {
+        if !self.args.is_film() || !views[0].shares_file {
             return Ok(None);
         }
         let crop = ready.options.crop_or_whole();

@@ -87,7 +87,7 @@ fn files_of(args: &RenderArgs, job: &Job) -> Files {
 /// Draws a scene, and reports it in a line.
 fn draw(session: &Session, job: &Job) -> Result<(), CliError> {
     let args = session.args;
-    let view = FrameJob { camera: None, frame: 0, ix: 0, files: files_of(args, job) };
+    let view = FrameJob { camera: None, frame: 0, ix: 0, shares_file: false, files: files_of(args, job) };
     let report = session.draw(&job.scene, vec![view], None)?;
     session.engine()?.devices().try_for_each(report_validation)?;
     if args.quiet {

@@ -31,7 +31,13 @@ pub fn views(
         views[..n_files].iter().try_for_each(|view| view.files.note(&mut roles))?;
         views
     } else {
-        vec![FrameJob { camera: None, frame: 0, ix: 0, files: Files::of(output.to_owned(), &args.aov) }]
+        vec![FrameJob {
+            camera: None,
+            frame: 0,
+            ix: 0,
+            shares_file: false,
+            files: Files::of(output.to_owned(), &args.aov),
+        }]
     };
     if args.skip_existing {
         let n_all = views.len();
@@ -65,10 +71,11 @@ fn views_of_film(path: Option<&NamedPath>, args: &RenderArgs, output: &Path) -> 
             return Err(CliError::Usage(what.to_owned()));
         }
     };
+    let shares_file = is_one_film(output);
     let view = |(ix, frame)| {
         path.map_or(Ok(()), |path| path.camera_at(frame).map(drop))?;
-        let picture = if is_one_film(output) { output.to_owned() } else { numbered(output, frame)? };
-        Ok(FrameJob { camera: None, frame, ix, files: Files::of(picture, &args.aov) })
+        let picture = if shares_file { output.to_owned() } else { numbered(output, frame)? };
+        Ok(FrameJob { camera: None, frame, ix, shares_file, files: Files::of(picture, &args.aov) })
     };
     (first..=last).step_by(step as usize).enumerate().map(view).collect()
 }
