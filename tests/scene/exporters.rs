@@ -94,7 +94,9 @@ fn animated_cameras_begin_at_their_first_keys() {
         let points = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
         let places = [9.0, 9.0, 9.0, 5.0, 1.0, 0.0, 8.0, 8.0, 8.0];
         let turn = 0.5_f32.sqrt();
-        let data = [numbers(&points), numbers(&places), numbers(&[0.0, turn, 0.0, turn])].concat();
+        let times = [0.5, 1.0];
+        let turns = [0.0, turn, 0.0, turn];
+        let data = [numbers(&points), numbers(&places), numbers(&turns), numbers(&times)].concat();
         let (first, n) = if interpolation == "CUBICSPLINE" { (36, 3) } else { (48, 2) };
         let gltf = json!({
             "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0, 1] }],
@@ -105,16 +107,19 @@ fn animated_cameras_begin_at_their_first_keys() {
             "buffers": [{ "uri": "data.bin", "byteLength": data.len() }],
             "bufferViews": [{ "buffer": 0, "byteLength": 36 },
                 { "buffer": 0, "byteOffset": first, "byteLength": 12 * n },
-                { "buffer": 0, "byteOffset": 72, "byteLength": 16 }],
+                { "buffer": 0, "byteOffset": 72, "byteLength": 16 },
+                { "buffer": 0, "byteOffset": 88, "byteLength": 8 }],
             "accessors": [
                 {
                     "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
                     "min": [0, 0, 0], "max": [1, 1, 0]
                 },
                 { "bufferView": 1, "componentType": 5126, "count": n, "type": "VEC3" },
-                { "bufferView": 2, "componentType": 5126, "count": 1, "type": "VEC4" }],
+                { "bufferView": 2, "componentType": 5126, "count": 1, "type": "VEC4" },
+                { "bufferView": 3, "componentType": 5126, "count": if n == 2 { 2 } else { 1 }, "type": "SCALAR" },
+                { "bufferView": 3, "componentType": 5126, "count": 1, "type": "SCALAR" }],
             "animations": [{
-                "samplers": [{ "input": 0, "output": 1, "interpolation": interpolation }, { "input": 0, "output": 2 }],
+                "samplers": [{ "input": 3, "output": 1, "interpolation": interpolation }, { "input": 4, "output": 2 }],
                 "channels": [{ "sampler": 0, "target": { "node": 1, "path": "translation" } },
                     { "sampler": 1, "target": { "node": 1, "path": "rotation" } },
                     { "sampler": 7, "target": { "node": 1, "path": "scale" } },

@@ -200,7 +200,7 @@ fn odd_numbers_and_words_are_read_as_they_are_meant() {
                 let channels = json!([{ "sampler": 0, "target": { "path": "pointer" } }]);
                 m["animations"] = json!([{ "channels": channels, "samplers": [{ "input": 0, "output": 0 }] }]);
             },
-            "animations, which are not shown",
+            "animations, which --at SECONDS shows",
         ),
         ("scene", |m| m["scenes"].as_array_mut().unwrap().push(json!({ "name": "empty" })), ""),
         ("parent", |m| m["nodes"].as_array_mut().unwrap().push(json!({ "children": [0] })), ""),
