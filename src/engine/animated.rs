@@ -16,7 +16,7 @@ use crate::{
 ///
 /// What is guessed is guessed at the first moment: camera and lights of a file without any, exposure, and the way of
 /// storing meshes. Where only instances move, no tree is built but the one over them
-/// ([`World::with_instances_changed`]). Otherwise the world is built anew.
+/// ([`World::with_instances_changed`]). Otherwise the whole world is built.
 pub struct AnimatedWorld {
     path: PathBuf,
     request: LoadRequest,
@@ -83,10 +83,17 @@ impl AnimatedWorld {
             && scene.instances.len() == first.instances.len()
             && scene.lights == first.lights
             && scene.materials == first.materials
-            && scene.meshes == first.meshes;
+            && scene.meshes == first.meshes
+            && scene.instances.iter().zip(&first.instances).all(|(now, before)| {
+                let before = Instance { transform: now.transform.clone(), ..before.clone() };
+                *now == before
+            });
         let changed = |(instance_ix, (now, before)): (usize, (&Instance, &Instance))| {
-            let transform = (now.transform != before.transform).then(|| now.transform.clone());
-            (now != before).then(|| InstanceUpdate { instance_ix, transform, ..InstanceUpdate::default() })
+            let update = || {
+                let transform = Some(now.transform.clone());
+                InstanceUpdate { instance_ix, transform, ..InstanceUpdate::default() }
+            };
+            (now.transform != before.transform).then(update)
         };
         is_same.then(|| scene.instances.iter().zip(&first.instances).enumerate().filter_map(changed).collect())
     }

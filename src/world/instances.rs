@@ -25,7 +25,7 @@ use crate::{
 /// Whether meshes that occur several times are stored once.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Instancing {
-    /// As a rule says.
+    /// By the rule of [`Instancing::keeps`].
     #[default]
     Auto,
     /// Each occurrence is stored.

@@ -124,7 +124,11 @@ fn pictures_after_each_update_are_those_of_a_new_world() {
             for ix in 0..n_updates {
                 // In the first update no light moves, and later ones bring other kinds of light.
                 let updates = match ix {
-                    0 => vec![InstanceUpdate { transform: Some(Transform::IDENTITY), ..InstanceUpdate::default() }],
+                    0 => {
+                        scene.instances[0].transform = some_transform(&mut random);
+                        let transform = Some(scene.instances[0].transform.clone());
+                        vec![InstanceUpdate { transform, ..InstanceUpdate::default() }]
+                    }
                     _ => change(&mut scene, &mut random),
                 };
                 world = world.with_instances_changed(&updates).expect("a world");

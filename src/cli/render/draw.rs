@@ -64,13 +64,6 @@ impl OneFile {
     }
 }
 
-/// The film of a file whose animations play.
-pub struct Film {
-    pub animated: AnimatedWorld,
-    /// Whether the camera is that of the file, which may move, too.
-    pub has_own_camera: bool,
-}
-
 /// What all pictures of a command have in common.
 pub struct Common<'a> {
     pub args: &'a RenderArgs,
@@ -78,7 +71,7 @@ pub struct Common<'a> {
     /// The scene's own camera.
     pub camera: Camera,
     /// The animations that play, if any do.
-    pub film: Option<&'a Film>,
+    pub animated: Option<&'a AnimatedWorld>,
     /// The file of all pictures, if they go to one.
     pub one_file: Option<&'a Mutex<OneFile>>,
     /// The end of each picture, if all samples are drawn.
@@ -211,10 +204,10 @@ impl Common<'_> {
     /// Lets a renderer show the world of a view. Returns the view's camera.
     fn show(&self, view: &FrameJob, renderer: &mut Renderer) -> Result<Camera, LoadError> {
         let mut own = self.camera;
-        if let Some(Film { animated, has_own_camera }) = self.film {
+        if let Some(animated) = self.animated {
             let (world, camera) = animated.at(self.args.load.seconds_of(view.frame))?;
             renderer.set_world(&world)?;
-            own = if *has_own_camera { camera } else { own };
+            own = camera;
         }
         Ok(view.camera.unwrap_or(own))
     }

@@ -22,7 +22,7 @@ use tracing::info_span;
 
 use super::{
     deadline::Deadline,
-    draw::{Common, DrawnPictures, Film, FrameJob, OneFile, draw_and_write, draws_whole_frames},
+    draw::{Common, DrawnPictures, FrameJob, OneFile, draw_and_write, draws_whole_frames},
     views::NamedPath,
 };
 use crate::cli::{
@@ -64,7 +64,12 @@ struct Ready {
 
 impl Ready {
     /// Returns what all pictures of the scene have in common.
-    fn common<'a>(&'a self, args: &'a RenderArgs, film: Option<&'a Film>, deadline: Deadline) -> Common<'a> {
+    fn common<'a>(
+        &'a self,
+        args: &'a RenderArgs,
+        animated: Option<&'a AnimatedWorld>,
+        deadline: Deadline,
+    ) -> Common<'a> {
         let Self { engine, world, options, accel, samples, noise_goal, .. } = self;
         let mut record = record(engine, world, options, *accel, *samples);
         record.whole.noise = args.noise;
@@ -76,7 +81,7 @@ impl Ready {
             args,
             options,
             camera,
-            film,
+            animated,
             one_file: None,
             goal,
             noise_goal,
@@ -134,7 +139,7 @@ impl<'a> Session<'a> {
             let what = format!("{scene}: nothing moves, so --frames needs --path FILE or --turntable N");
             return Err(CliError::Usage(what));
         }
-        let (animated_scene, has_own_camera) = (is_animated.then(|| opened.scene.clone()), path.is_none());
+        let first_scene = is_animated.then(|| opened.scene.clone());
         if let Some(n_frames) = self.args.turntable {
             let RenderOptions { width, height, .. } = opened.options;
             let cameras = opened.scene.turntable(n_frames, width as f32 / height as f32);
@@ -148,12 +153,12 @@ impl<'a> Session<'a> {
         }
         let ready = self.build(opened, &views, deadline)?;
         deadline.check("building")?;
-        let film = animated_scene.map(|first| {
+        let animated = first_scene.map(|first| {
             let request = self.request(first_frame, Default::default());
-            Film { animated: AnimatedWorld::new(scene, &request, first, &ready.world), has_own_camera }
+            AnimatedWorld::new(scene, &request, first, &ready.world)
         });
         let one_file = self.one_file(&views, &ready)?;
-        let common = Common { one_file: one_file.as_ref(), ..ready.common(self.args, film.as_ref(), deadline) };
+        let common = Common { one_file: one_file.as_ref(), ..ready.common(self.args, animated.as_ref(), deadline) };
         let rendering = format!("rendering {}x{}", common.record.crop.width(), common.record.crop.height());
         let (engine, stage) = ((&ready.engine, &ready.world), (&self.progress, rendering.as_str()));
         let (drawn, _) = self.progress.stage(&rendering, || draw_and_write(&common, engine, &views, stage));
