@@ -13,7 +13,7 @@ use crate::{
 /// The pipelines of the pass.
 pub struct PathTrace {
     kernel: ComputePipeline,
-    /// The kernel of camera rays, if they pass through back faces.
+    /// The kernel of camera rays, if they pass through back faces or instances.
     from_camera: Option<ComputePipeline>,
 }
 
@@ -32,7 +32,8 @@ impl PathTrace {
             let constants = constants.clone().set(constants::FROM_CAMERA, camera);
             kernel(context, bindings, "path_trace", shader, &constants)
         };
-        let from_camera = is_set(bindings, [constants::CULLS_BACK_FACES]).then(|| from(true)).transpose()?;
+        let from_camera =
+            is_set(bindings, [constants::CULLS_BACK_FACES, constants::INSTANCED]).then(|| from(true)).transpose()?;
         Ok(Self { kernel: from(false)?, from_camera })
     }
 

@@ -10,7 +10,7 @@ use super::{
     emitters::luminance,
     texture::{sample_texture, uv_set_of},
 };
-use crate::layout::{MATERIAL_UNLIT, Material, NO_TEXTURE, Triangle};
+use crate::layout::{INSTANCE_FOR_OTHERS, MATERIAL_UNLIT, Material, NO_TEXTURE, Triangle};
 
 /// The number of parts of each edge of a triangle over whose cells the mean of its emission is taken.
 const EMISSION_CELLS: usize = 8;
@@ -20,7 +20,8 @@ pub(super) fn is_emissive(material: &Material) -> bool {
     material.ke != Vec3::ZERO && material.flags & MATERIAL_UNLIT == 0
 }
 
-/// Returns the index and the power of each triangle that emits light.
+/// Returns the index and the power of each triangle that emits light. Scattered rays do not find a lamp that is hidden
+/// from them, so it lights nothing: samples of it would stand for the half of the estimate that those rays miss.
 pub(super) fn emissive_triangles(scene: &FlatScene) -> Vec<(usize, f64)> {
     let emissive: Vec<bool> = scene.materials.iter().map(is_emissive).collect();
     if !emissive.contains(&true) {
@@ -29,7 +30,8 @@ pub(super) fn emissive_triangles(scene: &FlatScene) -> Vec<(usize, f64)> {
     let of_triangle = |ix: usize| {
         let material_ix = scene.material_ix_of(ix) as usize;
         let area = area_of(&scene.triangle(ix));
-        let emission = mean_emission(scene, ix, material_ix);
+        let is_met = scene.instances.as_ref().is_none_or(|it| it.of_triangle(ix).1.flags & INSTANCE_FOR_OTHERS != 0);
+        let emission = if is_met { mean_emission(scene, ix, material_ix) } else { Vec3::ZERO };
         (ix, 2.0 * PI * area * luminance(emission))
     };
     scene.triangles_with(&emissive).into_par_iter().map(of_triangle).collect()

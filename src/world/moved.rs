@@ -63,8 +63,8 @@ impl World {
                 let materials = instances.materials_of(&instances.list[update.instance_ix]);
                 materials.iter().any(|material| is_emissive[*material as usize])
             };
-            let changes_light =
-                is_emissive.contains(&true) && (update.transform.is_some() || update.materials.is_some());
+            let changes_light = is_emissive.contains(&true)
+                && (update.transform.is_some() || update.materials.is_some() || update.rays.is_some());
             keeps_emitters &= !(changes_light && emits(&instances));
             if let Some(materials) = &update.materials {
                 check_materials(materials, scene.materials.len()).map_err(wrong)?;

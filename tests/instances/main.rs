@@ -4,6 +4,7 @@
 mod support;
 
 mod casts;
+mod masks;
 mod moved;
 mod pictures;
 mod refused;

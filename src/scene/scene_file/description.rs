@@ -8,7 +8,7 @@ use toml::{Spanned, Table};
 use crate::scene::{
     formats::material_spec::MaterialSpec,
     meshes::generate::Generator,
-    model::{error::Checked, material::within, transform::TransformSpec},
+    model::{RayKinds, error::Checked, material::within, transform::TransformSpec},
 };
 
 /// A scene file. Vectors are arrays of three numbers; colours are linear RGB.
@@ -207,6 +207,8 @@ pub(crate) struct CommonSpec {
     pub transform: TransformSpec,
     /// A NumPy file of transforms, each of which places the mesh once; relative to the scene file's folder.
     pub instances: Option<String>,
+    /// The kinds of rays that meet the mesh; all of them where absent.
+    pub rays: Option<Vec<RayKind>>,
     /// Name of the material of the whole mesh. Where it is absent, a mesh from a file keeps its own materials.
     pub material: Option<String>,
     /// Names of materials, one for each slot of the mesh (a room's walls, a checkered plane's fields). If there are
@@ -220,6 +222,26 @@ pub(crate) struct CommonSpec {
     /// false where absent.
     #[serde(rename = "override")]
     pub overrides: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum RayKind {
+    Camera,
+    Shadow,
+    Other,
+}
+
+impl CommonSpec {
+    /// Returns the rays that meet the mesh.
+    pub fn rays(&self) -> Checked<RayKinds> {
+        let Some(kinds) = &self.rays else { return Ok(RayKinds::ALL) };
+        if kinds.is_empty() {
+            return Err("`rays` is empty: no ray would meet the mesh".to_owned());
+        }
+        let has = |kind| kinds.contains(&kind);
+        Ok(RayKinds { camera: has(RayKind::Camera), shadow: has(RayKind::Shadow), other: has(RayKind::Other) })
+    }
 }
 
 #[derive(Debug, Deserialize)]
@@ -238,7 +260,8 @@ struct FileSpec {
 /// Largest coordinate of an origin. Farther away, double precision is coarse, too.
 const MAX_ORIGIN: f64 = 1e12;
 
-const COMMON_KEYS: [&str; 7] = ["transform", "instances", "material", "materials", "smooth", "uv_scale", "override"];
+const COMMON_KEYS: [&str; 8] =
+    ["transform", "instances", "rays", "material", "materials", "smooth", "uv_scale", "override"];
 
 impl MeshSpec {
     /// Splits a mesh's table into the keys that all meshes have and those of its own kind. An unknown key is an

@@ -238,7 +238,7 @@ impl<'a> Placer<'a> {
         common: &CommonSpec,
         (places, named): (&[Transform], Vec<u32>),
     ) -> Checked<()> {
-        let scene = &mut self.scene;
+        let (rays, scene) = (common.rays()?, &mut self.scene);
         let budget = TriangleBudget { n_generated: self.n_generated, n_triangles: scene.n_stored() as u64 };
         let mut mesh = generator.build(&budget)?;
         if mesh.faces.is_empty() {
@@ -256,7 +256,7 @@ impl<'a> Placer<'a> {
         let mesh_ix = scene.meshes.len();
         require_for_places(scene, places.len(), 1)?;
         scene.meshes.push(mesh);
-        push_instances(scene, Instance { mesh_ix, materials: slots, ..Instance::default() }, places)
+        push_instances(scene, Instance { mesh_ix, materials: slots, rays, ..Instance::default() }, places)
     }
 
     /// Reads a mesh file and adds its meshes, without instances. Of a glTF file, lights and cameras are left out.
@@ -336,7 +336,7 @@ impl<'a> Placer<'a> {
         (places, named): (&[Transform], Vec<u32>),
     ) -> Checked<()> {
         let read = self.read.get_mut(reading).expect("the file is read");
-        let scene = &mut self.scene;
+        let (rays, scene) = (common.rays()?, &mut self.scene);
         if named.is_empty() && read.material_ixs[usize::from(common.overrides)].is_none() {
             let n_materials = scene.materials.len();
             let has_colours = |instance: &Instance| !scene.meshes[instance.mesh_ix].colours.is_empty();
@@ -358,7 +358,7 @@ impl<'a> Placer<'a> {
                 Some(own) => instance.materials.iter().map(|ix| own[*ix as usize]).collect(),
                 None => named.clone(),
             };
-            push_instances(scene, Instance { materials, ..instance.clone() }, places)?;
+            push_instances(scene, Instance { materials, rays, ..instance.clone() }, places)?;
         }
         Ok(())
     }
