@@ -32,7 +32,7 @@ impl StoredRange {
 
 /// Identity of the trees of all geometries. It does not keep them.
 #[derive(Clone, Debug)]
-pub struct TreesId(Weak<Vec<KdTree>>);
+pub struct TreesId(Weak<Vec<Arc<KdTree>>>);
 
 impl PartialEq for TreesId {
     fn eq(&self, other: &Self) -> bool {
@@ -44,7 +44,7 @@ impl PartialEq for TreesId {
 #[derive(Clone, Debug, PartialEq)]
 pub struct TwoLevel {
     /// A tree for each geometry, in its own space.
-    trees: Arc<Vec<KdTree>>,
+    trees: Arc<Vec<Arc<KdTree>>>,
     /// The index at which each tree's nodes begin where all trees are stored one after the other. All are even.
     node_begins: Arc<Vec<usize>>,
     top: TopLevel,
@@ -59,11 +59,31 @@ impl TwoLevel {
         options: &BuildOptions,
         progress: &Progress,
     ) -> Self {
-        let build = |range: &StoredRange| KdTree::build_observed(range.of(stored), options, progress);
-        let trees: Vec<KdTree> = ranges.par_iter().map(build).collect();
+        let build = |range: &StoredRange| Arc::new(KdTree::build_observed(range.of(stored), options, progress));
+        let trees: Vec<_> = ranges.par_iter().map(build).collect();
+        Self::of_trees(trees, instances)
+    }
+
+    fn of_trees(trees: Vec<Arc<KdTree>>, instances: &[Instance]) -> Self {
         let top = Self::top_of(&trees, instances);
         let node_begins = begins(trees.iter().map(|tree| tree.nodes().len()));
         Self { trees: Arc::new(trees), node_begins: Arc::new(node_begins), top }
+    }
+
+    /// Returns the structure of geometries some of which have other vertices. Only their trees are built, and the
+    /// hierarchy. `deformed`: their indices. The other arguments are those of [`TwoLevel::build`].
+    pub fn deformed(
+        &self,
+        deformed: &[usize],
+        (stored, ranges): (&[Triangle], &[StoredRange]),
+        instances: &[Instance],
+        options: &BuildOptions,
+    ) -> Self {
+        let build = |ix: &usize| Arc::new(KdTree::build(ranges[*ix].of(stored), options));
+        let built: Vec<_> = deformed.par_iter().map(build).collect();
+        let mut trees = Vec::clone(&self.trees);
+        deformed.iter().zip(built).for_each(|(ix, tree)| trees[*ix] = tree);
+        Self::of_trees(trees, instances)
     }
 
     /// Returns the structure of the same geometries in other places. Only the hierarchy is built. `instances`: as many
@@ -77,13 +97,13 @@ impl TwoLevel {
         TreesId(Arc::downgrade(&self.trees))
     }
 
-    fn top_of(trees: &[KdTree], instances: &[Instance]) -> TopLevel {
+    fn top_of(trees: &[Arc<KdTree>], instances: &[Instance]) -> TopLevel {
         let boxes: Vec<_> = trees.iter().map(|tree| [tree.box_min(), tree.box_max()]).collect();
         TopLevel::new(instances, &boxes)
     }
 
     /// The tree of each geometry.
-    pub fn trees(&self) -> &[KdTree] {
+    pub fn trees(&self) -> &[Arc<KdTree>] {
         &self.trees
     }
 
@@ -94,7 +114,7 @@ impl TwoLevel {
 
     /// The number of stored triangles.
     pub fn n_stored(&self) -> usize {
-        self.trees.iter().map(KdTree::n_triangles).sum()
+        self.trees.iter().map(|tree| tree.n_triangles()).sum()
     }
 
     /// The least and the greatest corner of a box that holds all instances, world units.
@@ -110,7 +130,7 @@ impl TwoLevel {
 
     /// The greatest number of levels of a tree below its root.
     pub fn depth(&self) -> u32 {
-        self.trees.iter().map(KdTree::depth).max().unwrap_or_default()
+        self.trees.iter().map(|tree| tree.depth()).max().unwrap_or_default()
     }
 
     /// Computes the statistics of all trees together. The cost is the mean over the trees, weighted by their triangles.
@@ -152,8 +172,8 @@ impl TwoLevel {
 
     /// Returns what a search through each geometry needs beside the arrays.
     pub fn geometry_constants(&self) -> Vec<GeometryConstants> {
-        let rows = begins(self.trees.iter().map(KdTree::n_triangles));
-        let constants = |((tree, first_node), first_row): ((&KdTree, &usize), usize)| {
+        let rows = begins(self.trees.iter().map(|tree| tree.n_triangles()));
+        let constants = |((tree, first_node), first_row): ((&Arc<KdTree>, &usize), usize)| {
             let of_tree = tree.constants();
             GeometryConstants {
                 box_min: of_tree.box_min,

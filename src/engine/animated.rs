@@ -1,5 +1,5 @@
-//! The worlds of a file whose animations play: one for each moment, of which each shares with the first what has not
-//! changed.
+//! The worlds of a file whose animations play: one for each moment, of which each shares with the one before what has
+//! not changed.
 
 use std::path::{Path, PathBuf};
 
@@ -8,29 +8,38 @@ use tracing::dispatcher::{Dispatch, with_default};
 
 use super::load::{LoadError, LoadRequest, Opened};
 use crate::{
-    scene::{Camera, Instance, LoadOptions, Scene},
+    scene::{Camera, Instance, Light, LoadOptions, Poser, Scene},
     world::{FlatScene, InstanceUpdate, World},
 };
 
 /// A file whose animations play.
 ///
 /// What is guessed is guessed at the first moment: camera and lights of a file without any, exposure, and the way of
-/// storing meshes. Where only instances move, no tree is built but the one over them
-/// ([`World::with_instances_changed`]). Otherwise the whole world is built.
+/// storing meshes. A glTF file is read once; of other files that name glTF files, all is read at each moment.
+///
+/// A world that keeps instances shares with the next one all but what moves. Where only instances move, no tree is
+/// built but the one over them ([`World::with_instances_changed`]); where meshes are deformed, theirs. A flattened
+/// world is built as a whole.
 pub struct AnimatedWorld {
     path: PathBuf,
     request: LoadRequest,
-    /// The scene at the first moment.
+    /// Poses the scene; none if its file must be read again at each moment.
+    poser: Option<Poser>,
+    /// The scene at the last moment that the poser has shown, or else at the first one.
     scene: Scene,
     /// Its world.
     world: World,
+    /// The meshes of the scene, in ascending order, that differ from the world's: the last moment had no world.
+    deformed: Vec<usize>,
 }
 
 impl AnimatedWorld {
     /// Joins a file, the scene that was read of it at some moment, and the world of the scene. `request`: that of the
     /// reading.
     pub fn new(path: &Path, request: &LoadRequest, scene: Scene, world: &World) -> Self {
-        Self { path: path.to_owned(), request: request.clone(), scene, world: world.clone() }
+        let poser = with_default(&Dispatch::none(), || Poser::new(path, &request.scene, &scene));
+        let (path, request, world) = (path.to_owned(), request.clone(), world.clone());
+        Self { path, request, poser, scene, world, deformed: Vec::new() }
     }
 
     /// Returns the world at another moment, seconds, and its camera. A warning tells of things that cannot be shown
@@ -38,10 +47,54 @@ impl AnimatedWorld {
     ///
     /// # Errors
     /// The file cannot be read any more, or shows nothing at this moment.
-    pub fn at(&self, seconds: f64) -> Result<(World, Camera), LoadError> {
+    pub fn at(&mut self, seconds: f64) -> Result<(World, Camera), LoadError> {
+        let before = (self.scene.instances.clone(), self.scene.lights.clone());
+        // Its warnings are those of the first moment.
+        let pose = |poser: &mut Poser| with_default(&Dispatch::none(), || poser.pose(seconds, &mut self.scene));
+        let Some(deformed) = self.poser.as_mut().map(pose).transpose()?.flatten() else {
+            return self.read_again(seconds);
+        };
+        self.deformed.extend(deformed);
+        self.deformed.sort_unstable();
+        self.deformed.dedup();
+        match self.posed(&self.scene, &before) {
+            Ok(world) => {
+                self.world = world.clone();
+                self.deformed.clear();
+                Ok((world, self.scene.camera))
+            }
+            Err(error) => {
+                (self.scene.instances, self.scene.lights) = before;
+                Err(error)
+            }
+        }
+    }
+
+    /// Returns the world of a scene that has been posed. `before`: the instances and lights of this one's world.
+    fn posed(&self, scene: &Scene, before: &(Vec<Instance>, Vec<Light>)) -> Result<World, LoadError> {
+        let (instances, lights) = before;
+        if self.deformed.is_empty() && scene.lights == *lights && self.world.scene().instances.is_some() {
+            let changed = |(instance_ix, (now, before)): (usize, (&Instance, &Instance))| {
+                let update = || {
+                    let transform = Some(now.transform.clone());
+                    InstanceUpdate { instance_ix, transform, ..InstanceUpdate::default() }
+                };
+                (now.transform != before.transform).then(update)
+            };
+            let updates: Vec<_> = scene.instances.iter().zip(instances).enumerate().filter_map(changed).collect();
+            // An update may be refused, such as a transform that magnifies rounding, by which a new world places
+            // triangles.
+            if let Ok(world) = self.world.with_instances_changed(&updates) {
+                return Ok(world);
+            }
+        }
+        self.world.posed(scene, &self.deformed)?.map_or_else(|| self.built(scene), Ok)
+    }
+
+    /// Reads the file again at a moment. What is shown at the next moment does not depend on it.
+    fn read_again(&self, seconds: f64) -> Result<(World, Camera), LoadError> {
         let scene = LoadOptions { at: Some(seconds), ..self.request.scene.clone() };
         let request = LoadRequest { scene, ..self.request.clone() };
-        // Its warnings are those of the first moment.
         let read = || Opened::read(&self.path, &request);
         let mut scene = with_default(&Dispatch::none(), read)?.scene;
         if scene.instances.len() < self.scene.instances.len() {
@@ -49,9 +102,16 @@ impl AnimatedWorld {
             tracing::warn!("{}: at {seconds} s, {n_missing} meshes cannot be shown", self.path.display());
         }
         self.keep_guesses(&mut scene);
-        // An update may be refused, such as a transform that magnifies rounding, by which a new world places triangles.
-        let moved = self.updates(&scene).and_then(|updates| self.world.with_instances_changed(&updates).ok());
-        let world = moved.map_or_else(|| self.built(&scene), Ok)?;
+        let is_same = self.deformed.is_empty()
+            && scene.materials == self.scene.materials
+            && scene.meshes == self.scene.meshes
+            && scene.instances.len() == self.scene.instances.len()
+            && scene.instances.iter().zip(&self.scene.instances).all(|(now, before)| {
+                let before = Instance { transform: now.transform.clone(), ..before.clone() };
+                *now == before
+            });
+        let before = || (self.scene.instances.clone(), self.scene.lights.clone());
+        let world = if is_same { self.posed(&scene, &before())? } else { self.built(&scene)? };
         Ok((world, scene.camera))
     }
 
@@ -74,28 +134,6 @@ impl AnimatedWorld {
         (scene.background, scene.sky) = (first.background, first.sky);
         scene.environment.clone_from(&first.environment);
         scene.defaults = first.defaults;
-    }
-
-    /// Returns what has moved, if the world keeps instances and nothing else has changed but camera and lights.
-    fn updates(&self, scene: &Scene) -> Option<Vec<InstanceUpdate>> {
-        let first = &self.scene;
-        let is_same = self.world.scene().instances.is_some()
-            && scene.instances.len() == first.instances.len()
-            && scene.lights == first.lights
-            && scene.materials == first.materials
-            && scene.meshes == first.meshes
-            && scene.instances.iter().zip(&first.instances).all(|(now, before)| {
-                let before = Instance { transform: now.transform.clone(), ..before.clone() };
-                *now == before
-            });
-        let changed = |(instance_ix, (now, before)): (usize, (&Instance, &Instance))| {
-            let update = || {
-                let transform = Some(now.transform.clone());
-                InstanceUpdate { instance_ix, transform, ..InstanceUpdate::default() }
-            };
-            (now.transform != before.transform).then(update)
-        };
-        is_same.then(|| scene.instances.iter().zip(&first.instances).enumerate().filter_map(changed).collect())
     }
 
     fn built(&self, scene: &Scene) -> Result<World, LoadError> {

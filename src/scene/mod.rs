@@ -21,7 +21,7 @@ mod of_mesh;
 mod scene_file;
 
 #[cfg(feature = "files")]
-pub(crate) use self::files::pack;
+pub(crate) use self::{files::pack, formats::gltf::Poser};
 #[cfg(feature = "files")]
 pub use self::{
     files::pack::{ENDING as PACK_ENDING, pack_hash, packed_path},

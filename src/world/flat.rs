@@ -137,7 +137,6 @@ impl FlatScene {
 
     fn of_parts(scene: &Scene, parts: Parts, textures: Textures, instances: Option<Instances>) -> Self {
         let sky = scene.sky.as_ref().map(Sky::environment);
-        let sun = scene.sky.filter(|sky| sky.has_sun).map(|sky| sky.sun());
         let mut n_before = 0;
         let occurrences = scene.instances.iter().map(|instance| {
             let first_triangle = n_before as u32;
@@ -155,8 +154,8 @@ impl FlatScene {
             materials: scene.materials.iter().map(Material::from).collect(),
             material_names: scene.materials.iter().map(|material| material.name.clone()).collect(),
             textures: textures.into(),
-            lights: scene.lights.iter().chain(&sun).filter_map(flat_light).collect(),
-            area_lights: scene.lights.iter().filter_map(area_light).collect(),
+            lights: flat_lights(scene),
+            area_lights: area_lights(scene),
             environment: sky.or_else(|| scene.environment.clone()),
             studio: scene.studio,
             camera: scene.camera,
@@ -281,14 +280,14 @@ impl FlatScene {
 
 /// The triangles that are stored, and the word of each that leads to its material.
 #[derive(Default)]
-struct Parts {
-    triangles: Vec<Triangle>,
-    materials: Vec<u32>,
+pub(super) struct Parts {
+    pub triangles: Vec<Triangle>,
+    pub materials: Vec<u32>,
 }
 
 impl Parts {
     /// Appends the triangles of a mesh. `instance_ix`: the instance that an error names.
-    fn push(&mut self, mesh: &Mesh, transform: &Transform, instance_ix: usize) -> Result<(), Mismatch> {
+    pub fn push(&mut self, mesh: &Mesh, transform: &Transform, instance_ix: usize) -> Result<(), Mismatch> {
         push_triangles(mesh, transform, &mut self.triangles)
             .map_err(|what| Mismatch::Instance { instance: instance_ix, what })
     }
@@ -406,6 +405,17 @@ fn flags_of(lobes: Lobes) -> u32 {
         | flag(lobes.reflection, MATERIAL_REFLECT)
         | flag(lobes.refraction, MATERIAL_REFRACT)
         | flag(lobes.fresnel, MATERIAL_FRESNEL)
+}
+
+/// Returns the lights of a scene that have no area, and its sun.
+pub(super) fn flat_lights(scene: &Scene) -> Vec<Light> {
+    let sun = scene.sky.filter(|sky| sky.has_sun).map(|sky| sky.sun());
+    scene.lights.iter().chain(&sun).filter_map(flat_light).collect()
+}
+
+/// Returns the lights of a scene that have an area.
+pub(super) fn area_lights(scene: &Scene) -> Vec<AreaLight> {
+    scene.lights.iter().filter_map(area_light).collect()
 }
 
 /// Returns a light as kernels read it, or `None` if it has an area.

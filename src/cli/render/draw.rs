@@ -71,7 +71,7 @@ pub struct Common<'a> {
     /// The scene's own camera.
     pub camera: Camera,
     /// The animations that play, if any do.
-    pub animated: Option<&'a AnimatedWorld>,
+    pub animated: Option<&'a Mutex<AnimatedWorld>>,
     /// The file of all pictures, if they go to one.
     pub one_file: Option<&'a Mutex<OneFile>>,
     /// The end of each picture, if all samples are drawn.
@@ -205,7 +205,8 @@ impl Common<'_> {
     fn show(&self, view: &FrameJob, renderer: &mut Renderer) -> Result<Camera, LoadError> {
         let mut own = self.camera;
         if let Some(animated) = self.animated {
-            let (world, camera) = animated.at(self.args.load.seconds_of(view.frame))?;
+            let seconds = self.args.load.seconds_of(view.frame);
+            let (world, camera) = animated.lock().unwrap_or_else(PoisonError::into_inner).at(seconds)?;
             renderer.set_world(&world)?;
             own = camera;
         }

@@ -67,7 +67,7 @@ impl Ready {
     fn common<'a>(
         &'a self,
         args: &'a RenderArgs,
-        animated: Option<&'a AnimatedWorld>,
+        animated: Option<&'a Mutex<AnimatedWorld>>,
         deadline: Deadline,
     ) -> Common<'a> {
         let Self { engine, world, options, accel, samples, noise_goal, .. } = self;
@@ -155,7 +155,7 @@ impl<'a> Session<'a> {
         deadline.check("building")?;
         let animated = first_scene.map(|first| {
             let request = self.request(first_frame, Default::default());
-            AnimatedWorld::new(scene, &request, first, &ready.world)
+            Mutex::new(AnimatedWorld::new(scene, &request, first, &ready.world))
         });
         let one_file = self.one_file(&views, &ready)?;
         let common = Common { one_file: one_file.as_ref(), ..ready.common(self.args, animated.as_ref(), deadline) };

@@ -1,7 +1,7 @@
 //! Accessors: typed elements of buffers. Each element is read when it is asked for, and the indices of a sparse
 //! accessor once, since a hostile file can name a large accessor many times.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use gltf::json::{
     Index,
@@ -25,7 +25,7 @@ pub(super) struct Accessor<'a> {
     /// Elements, unless all are 0.
     elements: Option<Elements<'a>>,
     /// Elements that replace others, by their ascending indices.
-    replaced: Rc<[u32]>,
+    replaced: Arc<[u32]>,
     replacements: Option<Elements<'a>>,
 }
 
@@ -94,7 +94,7 @@ impl<'a> Accessor<'a> {
             None => None,
         };
         let is_normalized = json.normalized;
-        let (replaced, replacements) = (Rc::default(), None);
+        let (replaced, replacements) = (Arc::default(), None);
         let mut accessor = Self { n, n_components, path, kind, is_normalized, elements, replaced, replacements };
         if let Some(sparse) = &json.sparse {
             accessor
@@ -130,7 +130,7 @@ impl<'a> Accessor<'a> {
         self.replaced = document.replaced(ix, || {
             let view = document.view(sparse.indices.buffer_view, &"indices")?;
             let indices = Elements::new(view, sparse.indices.byte_offset.0, n, kind.size())?;
-            let replaced: Rc<[u32]> = (0..n).map(|ix| unsigned(kind, indices.of(ix, kind.size()))).collect();
+            let replaced: Arc<[u32]> = (0..n).map(|ix| unsigned(kind, indices.of(ix, kind.size()))).collect();
             let is_ascending = replaced.windows(2).all(|pair| pair[0] < pair[1]);
             match !is_ascending || replaced.last().is_some_and(|last| *last as usize >= self.n) {
                 true => Err(format!("its indices do not ascend, or are not below {}", self.n)),

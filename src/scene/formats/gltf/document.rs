@@ -6,7 +6,7 @@ use std::{
     fmt::Display,
     ops::Range,
     path::{Path, PathBuf},
-    rc::Rc,
+    sync::Arc,
 };
 
 use gltf::json::{self, Index, Root, image};
@@ -78,9 +78,9 @@ pub(super) struct Document {
     access: Access,
     buffers: Vec<Buffer>,
     /// Contents of the files that buffers name.
-    files: RefCell<HashMap<PathBuf, Rc<Vec<u8>>>>,
+    files: RefCell<HashMap<PathBuf, Arc<Vec<u8>>>>,
     /// Indices of the elements that sparse accessors replace, by the accessor's index.
-    replaced: RefCell<HashMap<usize, Checked<Rc<[u32]>>>>,
+    replaced: RefCell<HashMap<usize, Checked<Arc<[u32]>>>>,
     /// Contents of the compressed buffer views, by the view's index.
     decoded: HashMap<usize, Vec<u8>>,
     /// What Draco's data holds.
@@ -105,7 +105,7 @@ struct Notes {
 /// A part of a file or of the data in a URI. Several buffers can share a file.
 #[derive(Default)]
 struct Buffer {
-    content: Rc<Vec<u8>>,
+    content: Arc<Vec<u8>>,
     part: Range<usize>,
 }
 
@@ -139,7 +139,7 @@ impl Document {
             Self { root, morph_targets, path, access, buffers, files, replaced, decoded, draco, notes, progress };
         left_out.into_iter().for_each(|what| document.note(LEFT_OUT, what));
         document.check_extensions()?;
-        let chunk = chunk.map(|part| Buffer { content: Rc::new(bytes), part });
+        let chunk = chunk.map(|part| Buffer { content: Arc::new(bytes), part });
         let shown = document.shown_buffers();
         for ix in 0..document.root.buffers.len() {
             let buffer =
@@ -221,9 +221,9 @@ impl Document {
     }
 
     /// Returns what a buffer's URI stands for. A file that several buffers name is read once.
-    fn fetch(&self, uri: &str) -> Checked<Rc<Vec<u8>>> {
+    fn fetch(&self, uri: &str) -> Checked<Arc<Vec<u8>>> {
         let name = match Uri::new(uri)? {
-            Uri::Data(bytes) => return Ok(Rc::new(bytes)),
+            Uri::Data(bytes) => return Ok(Arc::new(bytes)),
             Uri::File(name) => name,
         };
         let path = self.named(&name)?;
@@ -231,7 +231,7 @@ impl Document {
             return Ok(content.clone());
         }
         require_for_bytes(&path)?;
-        let content = Rc::new(read_bytes(&path).map_err(|error| error.to_string())?);
+        let content = Arc::new(read_bytes(&path).map_err(|error| error.to_string())?);
         self.files.borrow_mut().insert(path, content.clone());
         Ok(content)
     }
@@ -248,7 +248,7 @@ impl Document {
 
     /// Returns the indices of the elements that the sparse accessor at an index replaces. `read` reads them at the
     /// first call.
-    pub fn replaced(&self, accessor_ix: usize, read: impl FnOnce() -> Checked<Rc<[u32]>>) -> Checked<Rc<[u32]>> {
+    pub fn replaced(&self, accessor_ix: usize, read: impl FnOnce() -> Checked<Arc<[u32]>>) -> Checked<Arc<[u32]>> {
         if let Some(known) = self.replaced.borrow().get(&accessor_ix) {
             return known.clone();
         }
@@ -408,7 +408,7 @@ mod tests {
         let path = folder.path().join("m.gltf");
         let document = Document::read(&path, json.into_bytes(), Access::default()).unwrap();
         let [a, b] = &document.buffers[..] else { panic!("two buffers") };
-        assert!(Rc::ptr_eq(&a.content, &b.content));
+        assert!(Arc::ptr_eq(&a.content, &b.content));
         assert_eq!((a.bytes(), b.bytes()), (&[7; 4][..], &[7; 12][..]));
     }
 
@@ -418,7 +418,7 @@ mod tests {
         let document = Document::read(Path::new("m.gltf"), json.to_vec(), Access::default()).unwrap();
         let first = document.replaced(3, || Ok([1, 5].into())).unwrap();
         let again = document.replaced(3, || Err("it is known".to_owned())).unwrap();
-        assert!(Rc::ptr_eq(&first, &again));
+        assert!(Arc::ptr_eq(&first, &again));
         assert!(document.replaced(4, || Err("it is not known".to_owned())).is_err());
     }
 }

@@ -22,6 +22,7 @@ mod lights;
 mod materials;
 mod meshopt;
 mod nodes;
+mod poser;
 mod textures;
 mod uri;
 
@@ -31,7 +32,6 @@ use glam::{DVec3, Vec3};
 use gltf::json::{Node, mesh::Primitive};
 use hashbrown::{HashMap, HashSet};
 
-pub(crate) use self::document::named_files;
 use self::{
     deform::Skin,
     document::{Document, item},
@@ -40,6 +40,7 @@ use self::{
     materials::Materials,
     nodes::Nodes,
 };
+pub(crate) use self::{document::named_files, poser::Poser};
 use super::image::MAX_PIXELS;
 use crate::{
     scene::{
@@ -205,6 +206,17 @@ impl<'a> Loader<'a> {
 
     fn load(mut self, path: &Path) -> Checked<Scene> {
         let mut scene = Scene::empty(path);
+        scene.instances = self.instances()?;
+        scene.meshes = self.meshes;
+        scene.check_n_triangles()?;
+        scene.materials = self.materials.materials;
+        scene.images = self.materials.textures.decode(&mut scene.materials, self.before.n_pixels);
+        Ok(scene)
+    }
+
+    /// Adds the meshes of all nodes that are shown. Returns the instances.
+    fn instances(&mut self) -> Checked<Vec<Instance>> {
+        let mut instances = Vec::new();
         let meter = self.document.progress.begin(Work::Reading, self.n_primitives());
         for &ix in &self.nodes.shown {
             let Some(instance) = self.instance(ix, &meter)? else { continue };
@@ -218,20 +230,16 @@ impl<'a> Loader<'a> {
             for transform in transforms {
                 let placed = mesh.check_place(&transform, bounds).map_err(|what| format!("nodes[{ix}]: {what}"));
                 if self.document.or_left_out(placed).is_some() {
-                    scene.instances.push(Instance { transform, ..instance.clone() });
+                    instances.push(Instance { transform, ..instance.clone() });
                 }
             }
         }
-        if scene.instances.is_empty() {
+        if instances.is_empty() {
             let why = self.document.first_left_out();
             let why = why.unwrap_or_else(|| "points and lines are not shown".to_owned());
             return Err(format!("has no triangles: {why}"));
         }
-        scene.meshes = self.meshes;
-        scene.check_n_triangles()?;
-        scene.materials = self.materials.materials;
-        scene.images = self.materials.textures.decode(&mut scene.materials, self.before.n_pixels);
-        Ok(scene)
+        Ok(instances)
     }
 
     /// Returns the transforms of the instances of a node. Those that flatten the mesh are left out.

@@ -1,0 +1,75 @@
+//! Worlds of a scene whose meshes are deformed, and whose instances, lights and camera are elsewhere. What stays as it
+//! is is shared with the world before: textures, and the kd-trees of meshes that keep their shapes.
+
+use super::{
+    FlatScene, Instances, Mismatch, World,
+    check::check,
+    corners::corner_surfaces,
+    flat::{Parts, area_lights, flat_lights},
+    instances::Kept,
+};
+use crate::{
+    accel::{Accel, AccelOptions},
+    scene::{Scene, Transform},
+};
+
+impl World {
+    /// Returns the world of a scene, built anew only where it has changed. The scene is this world's but for its camera
+    /// and lights, the places of its instances, and the vertices, normals and tangents of the meshes `deformed`, in
+    /// ascending order. `None` if that cannot be done: the world is flattened, an instance is stored in the world, or
+    /// will be, or more has changed.
+    ///
+    /// # Errors
+    /// The scene's parts do not fit together, or a vertex is too far from the origin.
+    pub(crate) fn posed(&self, scene: &Scene, deformed: &[usize]) -> Result<Option<Self>, Mismatch> {
+        let (Accel::TwoLevel(two), AccelOptions::KdTree(options)) = (self.accel(), self.accel_options()) else {
+            return Ok(None);
+        };
+        let Some((flat, changed)) = self.scene().posed(scene, deformed)? else { return Ok(None) };
+        check(&flat)?;
+        let instances = flat.instances.as_ref().expect("a world of instances");
+        let two = two.deformed(&changed, (&flat.triangles, &instances.ranges), &instances.list, options);
+        let accel = Accel::TwoLevel(Box::new(two));
+        Ok(Some(Self::of_parts(flat, accel, self.accel_options().clone())))
+    }
+}
+
+impl FlatScene {
+    /// Does what [`World::posed`] does. Returns the scene, and the indices of the geometries that have changed.
+    fn posed(&self, scene: &Scene, deformed: &[usize]) -> Result<Option<(Self, Vec<usize>)>, Mismatch> {
+        let Some(before) = &self.instances else { return Ok(None) };
+        let (instances, kept) = Instances::of_scene(scene)?;
+        let is_placed = |it: &Kept| it.transform != Transform::IDENTITY;
+        if instances.ranges != before.ranges || instances.n_slots != before.n_slots || kept.iter().any(is_placed) {
+            return Ok(None);
+        }
+        let mut posed = Self {
+            lights: flat_lights(scene),
+            area_lights: area_lights(scene),
+            camera: scene.camera,
+            instances: None,
+            ..self.clone()
+        };
+        let is_deformed = |(_, it): &(usize, &Kept)| deformed.binary_search(&it.mesh_ix).is_ok();
+        let mut changed = Vec::new();
+        for (geometry_ix, kept) in kept.iter().enumerate().filter(is_deformed) {
+            let (mesh, range) = (&scene.meshes[kept.mesh_ix], &instances.ranges[geometry_ix]);
+            let wrong = |what: String| Mismatch::Instance { instance: kept.instance_ix, what };
+            mesh.check().map_err(|what| wrong(format!("its mesh {what}")))?;
+            if range.of(&self.triangle_materials) != mesh.slots {
+                return Ok(None);
+            }
+            let mut parts = Parts::default();
+            parts.push(mesh, &kept.transform, kept.instance_ix)?;
+            let rows = range.first_row as usize..(range.first_row + range.n_triangles) as usize;
+            posed.triangles[rows.clone()].copy_from_slice(&parts.triangles);
+            if !self.textures.corners.is_empty() {
+                let corners = corner_surfaces(&[(mesh, &kept.transform)]);
+                posed.textures.corners[rows].copy_from_slice(&corners);
+            }
+            changed.push(geometry_ix);
+        }
+        posed.instances = Some(instances);
+        Ok(Some((posed, changed)))
+    }
+}
