@@ -1,7 +1,12 @@
 //! Animations of glTF files at a time, against closed forms.
 
 use glam::{Quat, Vec3};
-use kdray::scene::{AnimationChoice, LoadOptions, Scene};
+use kdray::{
+    accel::kdtree::BuildOptions,
+    engine::{AnimatedWorld, LoadRequest, Opened},
+    scene::{AnimationChoice, LoadOptions, PictureChoices, Scene},
+    world::{FlatScene, World},
+};
 use serde_json::{Value, json};
 
 use super::{F32, I16, Model, U8, triangle};
@@ -253,4 +258,82 @@ fn channels_that_are_wrong_are_left_out() {
     animate(&mut model, (0, "rotation"), "LINEAR", &[0.0, 1.0], ("VEC4", F32, &[0.0_f32; 8]));
     let told = told_at(&model, 0.5, AnimationChoice::All).1;
     assert!(told.contains("a rotation is [0.0, 0.0, 0.0, 0.0]"), "{told}");
+}
+
+/// A skin that bends, a mesh that grows, one that moves, one that vanishes for a moment, a camera and a light that
+/// move. The worlds of the file are those of its scenes, in whatever order the moments come; what does not change is
+/// shared.
+#[test]
+fn the_worlds_of_a_file_are_those_of_its_scenes() {
+    let mut model = triangle();
+    let primitive = model.json["meshes"][0]["primitives"][0].clone();
+    let mut target = primitive.clone();
+    let added = model.accessor("VEC3", F32, &[[0.0_f32, 0.0, 1.0]; 3].concat());
+    target["targets"] = json!([{ "POSITION": added }]);
+    let grows = model.show(target);
+    model.json["nodes"][grows]["translation"] = json!([-3, 0, 0]);
+    let mut skinned = primitive.clone();
+    skinned["attributes"]["JOINTS_0"] = json!(model.accessor("VEC4", U8, &[0_u8, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0]));
+    skinned["attributes"]["WEIGHTS_0"] = json!(model.accessor("VEC4", F32, &[[1.0_f32, 0.0, 0.0, 0.0]; 3].concat()));
+    let bends = model.show(skinned);
+    model.json["nodes"][bends]["skin"] = json!(0);
+    let joints = [model.root(json!({ "translation": [3, 0, 0] })), model.root(json!({ "translation": [3, 0, 0] }))];
+    model.push("skins", json!({ "joints": joints }));
+    let vanishes = model.root(json!({ "mesh": 0, "translation": [0, 3, 0] }));
+    model.push("cameras", json!({ "type": "perspective", "perspective": { "yfov": 0.8, "znear": 0.1 } }));
+    let camera = model.root(json!({ "camera": 0, "translation": [0, 0, 12] }));
+    model.json["extensionsUsed"] = json!(["KHR_lights_punctual"]);
+    model.json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [{ "type": "point", "intensity": 900 }] } });
+    let light = model.root(json!({ "extensions": { "KHR_lights_punctual": { "light": 0 } } }));
+    let line = [0.0_f32, 1.0, 8.0, 0.0, 2.0, 12.0];
+    animate(&mut model, (0, "translation"), "LINEAR", &[0.0, 4.0], ("VEC3", F32, &line));
+    let scales = [1.0_f32, 1.0, 1.0, 0.0, 1.0, 0.0, 1.0, 1.0, 1.0];
+    animate(&mut model, (vanishes, "scale"), "STEP", &[0.0, 2.5, 3.5], ("VEC3", F32, &scales));
+    animate(
+        &mut model,
+        (camera, "translation"),
+        "LINEAR",
+        &[0.0, 4.0],
+        ("VEC3", F32, &[0.0_f32, 0.0, 12.0, 1.0, 1.0, 9.0]),
+    );
+    let moves_only = model.clone();
+    animate(&mut model, (light, "translation"), "LINEAR", &[0.0, 4.0], ("VEC3", F32, &line));
+    animate(&mut model, (grows, "weights"), "LINEAR", &[0.0, 4.0], ("SCALAR", F32, &[0.0_f32, 2.0]));
+    let turn = [Quat::IDENTITY, Quat::from_rotation_z(1.0)].map(|key| key.to_array()).concat();
+    animate(&mut model, (joints[1], "rotation"), "LINEAR", &[0.0, 4.0], ("VEC4", F32, &turn));
+    let folder = tempfile::tempdir().unwrap();
+    for (model, keeps, shares) in [(&model, true, false), (&model, false, false), (&moves_only, true, true)] {
+        let path = folder.path().join("model.glb");
+        std::fs::write(&path, model.glb()).unwrap();
+        let request = |at: f64| {
+            let mut request = LoadRequest::pictures(PictureChoices::default());
+            request.scene.at = Some(at);
+            request
+        };
+        let world_at = |at: f64| {
+            let scene = Opened::read(path.as_path(), &request(at)).unwrap().scene;
+            let flat = if keeps { FlatScene::with_instances(&scene) } else { FlatScene::new(&scene) };
+            (World::of_flat(flat.unwrap(), &BuildOptions::default()).unwrap(), scene)
+        };
+        let (first, scene) = world_at(1.0);
+        let mut animated = AnimatedWorld::new(&path, &request(1.0), scene, &first);
+        let mut before = first;
+        let mut shown = 1.0;
+        for at in [2.0, 1.0, 3.0, 3.9, 3.9, 0.25] {
+            let ((found, camera), (expected, scene)) = (animated.at(at).unwrap(), world_at(at));
+            assert!(
+                *found.scene() == FlatScene { camera: found.scene().camera, ..expected.scene().clone() },
+                "at {at}"
+            );
+            assert!(found.accel() == expected.accel(), "at {at}");
+            assert_eq!(camera, scene.camera, "at {at}");
+            // At 3 s a mesh has vanished, so the whole world is another one.
+            if at != 3.0 {
+                let is_same = keeps && at == shown;
+                assert_eq!(found.shares_geometries(&before), shares || is_same, "at {at}");
+                shown = at;
+                before = found;
+            }
+        }
+    }
 }
