@@ -815,7 +815,7 @@ struct Hit {
 // - `is_orthographic`: 1 for an orthographic camera, 0 for a perspective one. Kernels are made for one of the two
 //   (`CONSTANT_ORTHOGRAPHIC`).
 // - The rest is for frames of paths. `samples_log2`: the frame draws `2^samples_log2` samples of each pixel.
-//   `first_sample`: the index of the first of them, a multiple of their number. `range_begin`: the index of the first
+//   `first_sample`: the index of the first of them. `range_begin`: the index of the first
 //   sample of the picture, which can be one part of all samples. `pixel_filter`: `FILTER_BOX` and its like. `clamp`:
 //   the most light that a path adds to its pixel after its first hit, in any colour (radiance; infinity: any amount).
 //   `aperture`: radius of the lens (world units; 0: everything is sharp). `focus`: distance of what is sharp from the

@@ -36,6 +36,7 @@ use super::{
         PictureArgs, accel_help, accel_long_help, build_help, build_long_help, check_accel, instances_help, listed,
         traversal_help, traversal_long_help, with_words,
     },
+    render::Shutter,
 };
 
 const PROGRESS: &str = "How the progress is shown: auto, none, or openjd for schedulers of Open Job Description \
@@ -116,6 +117,12 @@ pub struct RenderArgs {
     /// (--fps F) [default with --path: all, from the first keyframe to the last]
     #[arg(long, value_name = "A-BxS|all", conflicts_with = "repeat")]
     pub frames: Option<FrameChoice>,
+    /// Expose each picture from OPEN to CLOSE, in frames (1 / F seconds, --fps F) from its own time on, for example
+    /// 0,0.5 or -0.25,0.25, so that what moves is blurred: each sample shows its own moment; for --integrator path,
+    /// without a noise filter
+    #[arg(long, value_name = "OPEN,CLOSE", allow_hyphen_values = true)]
+    #[arg(conflicts_with_all = ["time", "noise", "trace", "repeat"])]
+    pub shutter: Option<Shutter>,
     /// Leave out pictures whose files exist already, whatever they show, so that a film that was interrupted goes on
     /// where it ended
     #[arg(long, conflicts_with_all = ["repeat", "profile", "trace"])]
@@ -452,6 +459,28 @@ impl RenderArgs {
             )));
         }
         Ok((range != SampleRange::whole(n_samples)).then_some(range))
+    }
+
+    /// Refuses a film, or a shutter, of a scene in which nothing moves.
+    pub fn refuse_to_move(&self, scene: &Path) -> Result<(), CliError> {
+        let (scene, needed) = (scene.display(), "--path FILE or --turntable N");
+        match (self.is_film(), self.shutter) {
+            (true, _) => Err(CliError::Usage(format!("{scene}: nothing moves, so --frames needs {needed}"))),
+            (false, Some(_)) => Err(CliError::Usage(format!(
+                "{scene}: nothing moves, so --shutter needs animations, or --frames with {needed}"
+            ))),
+            (false, None) => Ok(()),
+        }
+    }
+
+    /// Refuses a shutter for pictures whose samples cannot have moments of their own.
+    pub fn check_shutter(&self, options: &RenderOptions) -> Result<(), CliError> {
+        let what = match self.shutter {
+            Some(_) if options.integrator != Integrator::Path => "--integrator path: only its samples can be joined",
+            Some(_) if options.noise_filter() != Denoise::Off => "--denoise off: the noise filter would blur edges",
+            _ => return Ok(()),
+        };
+        Err(CliError::Usage(format!("--shutter needs {what}")))
     }
 
     /// Sets the options of the command that are not those of every picture. Refuses a crop beyond the picture.

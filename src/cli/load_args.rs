@@ -58,9 +58,14 @@ impl LoadArgs {
         LoadOptions { recentre: true, ..self.options() }
     }
 
-    /// Returns the time of a frame, seconds.
-    pub fn seconds_of(&self, frame: u32) -> f64 {
-        f64::from(frame) / self.frames_a_second()
+    /// Returns the time of a frame, which may lie between two whole ones, seconds.
+    pub fn seconds_of(&self, frame: f64) -> f64 {
+        frame / self.frames_a_second()
+    }
+
+    /// Returns the time of `--at` or `--frame`, seconds.
+    pub fn seconds(&self) -> Option<f64> {
+        self.at.or(self.frame.map(|frame| self.seconds_of(frame.into())))
     }
 
     pub fn frames_a_second(&self) -> f64 {
@@ -87,7 +92,7 @@ impl LoadArgs {
             scene: self.scene_name.clone(),
             camera: self.camera.clone(),
             allow_outside,
-            at: self.at.or(self.frame.map(|frame| self.seconds_of(frame))),
+            at: self.seconds(),
             animation: self.animation(),
             ..LoadOptions::default()
         }

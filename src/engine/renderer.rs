@@ -106,27 +106,54 @@ impl Renderer {
         mut watcher: impl Watcher,
     ) -> Result<(Drawn, RangeSums), GpuError> {
         samples.check()?;
-        let (mut drawn, mut sums) = (None::<Drawn>, RangeSums::default());
+        let mut all = DrawnBlocks::default();
         for block in samples.blocks() {
-            match &mut self.backend {
-                Backend::Device(renderer) => renderer.set_first_sample(block.first)?,
-                Backend::Group(group) => group.set_first_sample(block.first),
-                Backend::Cpu(renderer) => renderer.set_first_sample(block.first),
-            }
-            let goal = Goal::Samples(block.len());
-            let next = self.draw_watched(camera, goal, &mut Unending(&mut watcher))?;
-            sums.push_mean(block, &self.picture()?.radiance, &next.layers);
-            match &mut drawn {
-                None => drawn = Some(next),
-                Some(all) => {
-                    all.profile.add(&next.profile);
-                    all.n_samples += next.n_samples;
-                    all.pixel_aovs.iter_mut().zip(&next.pixel_aovs).for_each(|(all, next)| all.join_noise(next));
-                }
+            self.draw_block(camera, block, &mut watcher, &mut all)?;
+        }
+        Ok(all.end())
+    }
+
+    /// Draws the samples of a range as [`Renderer::draw_range`] does, each at a moment of its own: `show` prepares the
+    /// renderer for a sample, such as by [`Renderer::set_world`], and returns its camera. So what moves between the
+    /// moments is blurred. The first sample's moment decides the AOVs. The watcher can end the picture after each
+    /// sample.
+    ///
+    /// # Errors
+    /// Fails as [`Renderer::draw_range`] and `show` do.
+    pub fn draw_moments<E: From<GpuError>>(
+        &mut self,
+        samples: SampleRange,
+        mut show: impl FnMut(&mut Self, u32) -> Result<Camera, E>,
+        mut watcher: impl Watcher,
+    ) -> Result<(Drawn, RangeSums), E> {
+        samples.check().map_err(GpuError::from)?;
+        let mut all = DrawnBlocks::default();
+        for first in samples.first..samples.end {
+            let camera = show(self, first)?;
+            self.draw_block(&camera, SampleRange { first, end: first + 1 }, &mut watcher, &mut all)?;
+            if watcher.ends() {
+                break;
             }
         }
-        let drawn = Drawn { layers: sums.mean_of_layers(), ..drawn.unwrap_or_default() };
-        Ok((drawn, sums))
+        Ok(all.end())
+    }
+
+    /// Draws an aligned block of samples.
+    fn draw_block(
+        &mut self,
+        camera: &Camera,
+        block: SampleRange,
+        watcher: &mut impl Watcher,
+        all: &mut DrawnBlocks,
+    ) -> Result<(), GpuError> {
+        match &mut self.backend {
+            Backend::Device(renderer) => renderer.set_first_sample(block.first)?,
+            Backend::Group(group) => group.set_first_sample(block.first),
+            Backend::Cpu(renderer) => renderer.set_first_sample(block.first),
+        }
+        let drawn = self.draw_watched(camera, Goal::Samples(block.len()), &mut Unending(watcher))?;
+        all.push(block, &self.picture()?.radiance, drawn);
+        Ok(())
     }
 
     /// Draws what a camera sees until the noise of each tile of the picture is low, or the tile has the most samples.
@@ -229,6 +256,31 @@ impl Renderer {
             Backend::Group(group) => Ok(Cow::Borrowed(group.picture())),
             Backend::Cpu(renderer) => Ok(Cow::Owned(renderer.picture())),
         }
+    }
+}
+
+/// Aligned blocks of samples that have been drawn one after the other.
+#[derive(Default)]
+struct DrawnBlocks {
+    drawn: Option<Drawn>,
+    sums: RangeSums,
+}
+
+impl DrawnBlocks {
+    fn push(&mut self, block: SampleRange, radiance: &[[f32; 4]], next: Drawn) {
+        self.sums.push_mean(block, radiance, &next.layers);
+        match &mut self.drawn {
+            None => self.drawn = Some(next),
+            Some(all) => {
+                all.profile.add(&next.profile);
+                all.n_samples += next.n_samples;
+                all.pixel_aovs.iter_mut().zip(&next.pixel_aovs).for_each(|(all, next)| all.join_noise(next));
+            }
+        }
+    }
+
+    fn end(self) -> (Drawn, RangeSums) {
+        (Drawn { layers: self.sums.mean_of_layers(), ..self.drawn.unwrap_or_default() }, self.sums)
     }
 }
 

@@ -86,8 +86,7 @@ impl BandedRenderer {
         Ok(())
     }
 
-    /// Sets the index of the next picture's first sample, a multiple of `2^SAMPLE_BLOCK_LOG2`. Only frames of paths
-    /// know it.
+    /// Sets the index of the next picture's first sample ([`PathOptions::first_sample`]). Only frames of paths know it.
     ///
     /// # Errors
     /// A Vulkan call fails.

@@ -33,6 +33,7 @@ pub use self::{
     },
 };
 pub use self::{
+    guess::turntable::Turntable,
     meshes::generate,
     model::{
         Alpha, AnimationChoice, AnimationInfo, Camera, Channel, ChosenLight, Clearcoat, Conductor, DenoiseChoice,

@@ -20,6 +20,7 @@ mod mips;
 mod mismatch;
 mod moved;
 mod path_materials;
+#[cfg(feature = "files")]
 mod posed;
 mod scene_hash;
 #[doc(hidden)]

@@ -206,3 +206,153 @@ fn one_file_has_all_frames() {
         assert_eq!(far, 0);
     }
 }
+
+/// Writes `bar.gltf`: a white bar of width 1 that moves from the left, -1.5 <= x <= -0.5, by 2 to the right in 2
+/// seconds, seen by a camera for which x is -2 to 2. With `deforms`, morph targets move it.
+fn with_bar(deforms: bool) -> TempDir {
+    let corners = [[-1.5_f32, -1.0, 0.0], [-0.5, -1.0, 0.0], [-0.5, 1.0, 0.0], [-1.5, 1.0, 0.0]];
+    let bytes = [
+        bytemuck::cast_slice::<f32, u8>(corners.as_flattened()),
+        bytemuck::cast_slice::<f32, u8>([[2.0_f32, 0.0, 0.0]; 4].as_flattened()),
+        bytemuck::cast_slice::<u32, u8>(&[0, 1, 2, 0, 2, 3]),
+        bytemuck::cast_slice::<f32, u8>(&[0.0, 2.0]),
+        bytemuck::cast_slice::<f32, u8>(&[0.0, 0.0, 0.0, 2.0, 0.0, 0.0]),
+        bytemuck::cast_slice::<f32, u8>(&[0.0, 1.0]),
+    ];
+    let kinds = [("VEC3", 5126, 4), ("VEC3", 5126, 4), ("SCALAR", 5125, 6)];
+    let kinds = kinds.into_iter().chain([("SCALAR", 5126, 2), ("VEC3", 5126, 2), ("SCALAR", 5126, 2)]);
+    let accessor = |(ix, (kind, component, n)): (usize, (&str, u32, usize))| {
+        let view = ix;
+        json!({ "bufferView": view, "componentType": component, "count": n, "type": kind })
+    };
+    let accessors: Vec<_> = kinds.enumerate().map(accessor).collect();
+    let mut begin = 0;
+    let views: Vec<_> = (bytes.iter())
+        .map(|bytes| {
+            begin += bytes.len();
+            json!({ "buffer": 0, "byteOffset": begin - bytes.len(), "byteLength": bytes.len() })
+        })
+        .collect();
+    let data = bytes.concat();
+    let (output, path) = if deforms { (5, "weights") } else { (4, "translation") };
+    let mut primitive = json!({ "attributes": { "POSITION": 0 }, "indices": 2, "material": 0 });
+    if deforms {
+        primitive["targets"] = json!([{ "POSITION": 1 }]);
+    }
+    let model = json!({
+        "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0, 1, 2] }],
+        "nodes": [
+            { "mesh": 0 }, { "camera": 0, "translation": [0, 0, 5] },
+            { "extensions": { "KHR_lights_punctual": { "light": 0 } } },
+        ],
+        "meshes": [{ "primitives": [primitive] }],
+        "materials": [{ "extensions": { "KHR_materials_unlit": {} } }],
+        "cameras": [{ "type": "orthographic", "orthographic": { "xmag": 2, "ymag": 0.5, "znear": 0.1, "zfar": 9 } }],
+        "animations": [{
+            "samplers": [{ "input": 3, "output": output }],
+            "channels": [{ "sampler": 0, "target": { "node": 0, "path": path } }],
+        }],
+        "extensionsUsed": ["KHR_lights_punctual", "KHR_materials_unlit"],
+        "extensions": { "KHR_lights_punctual": { "lights": [{ "type": "directional", "intensity": 3 }] } },
+        "buffers": [{
+            "byteLength": data.len(),
+            "uri": format!("data:application/octet-stream;base64,{}", STANDARD.encode(&data)),
+        }],
+        "bufferViews": views, "accessors": accessors,
+    });
+    let directory = TempDir::new().unwrap();
+    fs::write(directory.path().join("bar.gltf"), model.to_string()).unwrap();
+    directory
+}
+
+/// The red channel of a row of a picture of 40x10 pixels.
+fn row(path: &Path) -> Vec<f32> {
+    let picture = image::open(path).unwrap().into_rgb32f();
+    (0..40).map(|x| picture.get_pixel(x, 5)[0]).collect()
+}
+
+const BLURRED: [&str; 7] = ["-q", "--size", "40x10", "--integrator", "path", "--fps", "0.5"];
+
+/// A pixel is as bright as the share of the time in which the bar is before it, whatever moves: the bar or the camera.
+#[test]
+fn what_moves_while_the_shutter_is_open_is_blurred() {
+    let share = |x: f32, moved: f32| ((x + 1.5) / moved).clamp(0.0, 1.0) - ((x + 0.5) / moved).clamp(0.0, 1.0);
+    // The share of a pixel, which weighs its surroundings by a tent of twice its width, right of an edge.
+    let seen = |x: f32| match (10.0 * x).clamp(-1.0, 1.0) {
+        u if u < 0.0 => (1.0 + u).powi(2) / 2.0,
+        u => 1.0 - (1.0 - u).powi(2) / 2.0,
+    };
+    let check = |path: &Path, expected: &dyn Fn(f32) -> f32, (within, what): (f32, &str)| {
+        for (ix, found) in row(path).into_iter().enumerate() {
+            let expected = expected(-2.0 + 0.1 * (ix as f32 + 0.5));
+            assert!((found - expected).abs() < within, "{what}: pixel {ix} is {found}, not {expected}");
+        }
+    };
+    for (deforms, device, instances) in [
+        (false, "--cpu", "auto"),
+        (false, "--validate", "auto"),
+        (false, "--cpu", "flatten"),
+        (true, "--cpu", "auto"),
+        (true, "--validate", "flatten"),
+    ] {
+        let directory = with_bar(deforms);
+        let path = directory.path();
+        // Frames under the validation layer are slow.
+        let (spp, within) = if device == "--cpu" { ("256", 0.025) } else { ("64", 0.07) };
+        let common = [&["render", "bar.gltf", "--instances", instances, device, "--spp", spp], &BLURRED[..]].concat();
+        let render = |more: &[&str]| succeed(path, &[&common[..], more].concat());
+        let what = format!("{deforms} {device} {instances}");
+        render(&["--shutter", "0,1", "-o", "whole.exr"]);
+        check(&path.join("whole.exr"), &|x| share(x, 2.0), (within, &what));
+        // From the middle of the way on, and back: the last half is where the animation has ended.
+        render(&["--at", "1", "--shutter=-0.5,0.5", "-o", "middle.exr"]);
+        assert!(row(&path.join("middle.exr")) == row(&path.join("whole.exr")), "{what}");
+        render(&["--at", "2", "--shutter", "0,0.5", "-o", "end.exr"]);
+        check(&path.join("end.exr"), &|x| seen(x - 0.5) - seen(x - 1.5), (within, &what));
+        // Parts of the samples are joined to the same picture; frames of films are such pictures.
+        let rest = format!("16-{spp}");
+        render(&["--shutter", "0,1", "--samples", "0-16", "-o", "a.exr"]);
+        render(&["--shutter", "0,1", "--samples", &rest, "-o", "b.exr"]);
+        succeed(path, &["merge", "a.exr", "b.exr", "-q", "-o", "joined.exr"]);
+        render(&["--shutter", "0,1", "--frames", "0-1", "-o", "f#.exr"]);
+        for same in ["joined.exr", "f0.exr"] {
+            assert!(row(&path.join(same)) == row(&path.join("whole.exr")), "{same}, {what}");
+        }
+    }
+    let directory = with_bar(false);
+    let path = directory.path();
+    let keyframe = |frame, x| format!("[[keyframe]]\nframe = {frame}\neye = [{x}, 0, 5]\ntarget = [{x}, 0, 0]\n");
+    let keys = keyframe(0, 0) + &keyframe(1, -2);
+    fs::write(path.join("path.toml"), keys).unwrap();
+    let of_path = ["--cpu", "--spp", "64", "--animation", "none", "--path", "path.toml", "--frames", "0"];
+    let render = |more: &[&str]| succeed(path, &[&["render", "bar.gltf"], &BLURRED[..], &of_path, more].concat());
+    render(&["--shutter", "0,1", "-o", "moved#.exr"]);
+    render(&["-o", "still#.exr"]);
+    let [moved, still] = ["moved0.exr", "still0.exr"].map(|name| row(&path.join(name)));
+    let sum = |row: &[f32]| row.iter().sum::<f32>();
+    let n_lit = |row: &[f32]| row.iter().filter(|x| **x > 0.0).count();
+    assert!(
+        (sum(&moved) / sum(&still) - 1.0).abs() < 0.08 && n_lit(&moved) > 7 && n_lit(&still) < 6,
+        "{moved:?} {still:?}"
+    );
+}
+
+#[test]
+fn a_shutter_needs_motion_and_paths() {
+    let directory = with_bar(false);
+    let path = directory.path();
+    fs::write(path.join("still.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let render = ["render", "bar.gltf", "--cpu", "--integrator", "path", "--shutter"];
+    for (more, expected) in [
+        (&["0,0"][..], "closes before it opens"),
+        (&["0"], "expected OPEN,CLOSE"),
+        (&["0,1", "--denoise", "edge"], "--shutter needs --denoise off"),
+        (&["0,1", "--noise", "0.1"], "cannot be used with"),
+        (&["0,1", "--animation", "none"], "bar.gltf: nothing moves, so --shutter needs"),
+    ] {
+        fail(path, &[&render[..], more].concat(), 2, expected);
+    }
+    let whitted = ["render", "bar.gltf", "--cpu", "--integrator", "whitted", "--shutter", "0,1"];
+    fail(path, &whitted, 2, "--shutter needs --integrator path");
+    fail(path, &["render", "still.obj", "--cpu", "--shutter", "0,1"], 2, "still.obj: nothing moves");
+}

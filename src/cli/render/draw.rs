@@ -17,7 +17,7 @@ use kdray::{
     world::World,
 };
 
-use super::{deadline::Deadline, files::Files, noise::NoiseReached};
+use super::{deadline::Deadline, files::Files, motion::CameraMotion, noise::NoiseReached};
 use crate::cli::{
     args::RenderArgs,
     error::CliError,
@@ -72,6 +72,8 @@ pub struct Common<'a> {
     pub camera: Camera,
     /// The animations that play, if any do.
     pub animated: Option<&'a Mutex<AnimatedWorld>>,
+    /// The way of the camera, if it moves apart from animations.
+    pub motion: Option<&'a CameraMotion<'a>>,
     /// The file of all pictures, if they go to one.
     pub one_file: Option<&'a Mutex<OneFile>>,
     /// The end of each picture, if all samples are drawn.
@@ -162,8 +164,7 @@ fn draw_in_turn(
     let mut steps = common.steps(stage, views.len() as u32, renderer.n_bands());
     let (mut written, mut drawing) = (Vec::new(), Duration::ZERO);
     for view in views {
-        let camera = common.show(view, &mut renderer)?;
-        let drawn = draw_view(common, &mut renderer, &camera, &mut Bar(&mut steps))?;
+        let drawn = draw_view(common, view, &mut renderer, &mut Bar(&mut steps))?;
         drawing += begin.elapsed();
         written.push(write_view(common, view, drawn)?);
         begin = Instant::now();
@@ -188,29 +189,37 @@ fn draw_frames_apart(
     let written = film.draw(
         views.len() as u32,
         &mut Bar(&mut steps),
-        |renderer, frame_ix, tell_sample| {
-            let camera = common.show(view(frame_ix), renderer).map_err(|error| match error {
-                LoadError::Device(error) => error,
-                other => GpuError::Mismatch(other.to_string()),
-            })?;
-            draw_view(common, renderer, &camera, &mut || tell_sample())
-        },
+        |renderer, frame_ix, tell_sample| draw_view(common, view(frame_ix), renderer, &mut || tell_sample()),
         |frame_ix, drawn| write_view(common, view(frame_ix), drawn),
     )?;
     Ok((written, opening + film.longest_drawing()))
 }
 
 impl Common<'_> {
-    /// Lets a renderer show the world of a view. Returns the view's camera.
-    fn show(&self, view: &FrameJob, renderer: &mut Renderer) -> Result<Camera, LoadError> {
-        let mut own = self.camera;
+    /// Lets a renderer show the world of a view, `later` frames after its own time. Returns the camera.
+    fn show(&self, view: &FrameJob, later: f64, renderer: &mut Renderer) -> Result<Camera, GpuError> {
+        let load = &self.args.load;
+        let mut camera = view.camera.unwrap_or(self.camera);
         if let Some(animated) = self.animated {
-            let seconds = self.args.load.seconds_of(view.frame);
-            let (world, camera) = animated.lock().unwrap_or_else(PoisonError::into_inner).at(seconds)?;
+            let own = if self.args.is_film() {
+                load.seconds_of(view.frame.into())
+            } else {
+                load.seconds().unwrap_or_default()
+            };
+            let mut animated = animated.lock().unwrap_or_else(PoisonError::into_inner);
+            let (world, of_scene) = animated.at(own + load.seconds_of(later)).map_err(|error| match error {
+                LoadError::Device(error) => error,
+                other => GpuError::Mismatch(other.to_string()),
+            })?;
             renderer.set_world(&world)?;
-            own = camera;
+            camera = view.camera.unwrap_or(of_scene);
         }
-        Ok(view.camera.unwrap_or(own))
+        match self.motion {
+            Some(motion) if later != 0.0 => {
+                motion.camera_at(f64::from(view.frame) + later).map_err(|error| GpuError::Mismatch(error.to_string()))
+            }
+            _ => Ok(camera),
+        }
     }
 
     /// Returns the counter of the samples of all bands of all views.
@@ -233,15 +242,24 @@ impl Common<'_> {
 /// Draws a picture `--repeat` times.
 fn draw_view(
     common: &Common,
+    view: &FrameJob,
     renderer: &mut Renderer,
-    camera: &Camera,
     watcher: &mut dyn Watcher,
 ) -> Result<DrawnView, GpuError> {
+    // What is not blurred, and the record, show the picture's own time.
+    let camera = &common.show(view, 0.0, renderer)?;
     let device = renderer.device().cloned();
     let mut relay = Relay::new(common, watcher);
     let (mut drawn, mut sums, mut profiles, mut noise) = (Drawn::default(), RangeSums::default(), Vec::new(), None);
     let mut n_samples = common.n_drawn;
-    let picture = if let Some(range) = common.some_samples {
+    let picture = if let Some(shutter) = common.args.shutter {
+        let range = common.some_samples.unwrap_or(SampleRange::whole(common.n_drawn));
+        let show = |renderer: &mut Renderer, sample_ix| common.show(view, shutter.moment(sample_ix), renderer);
+        (drawn, sums) = renderer.draw_moments(range, show, &mut relay)?;
+        profiles.push(take(&mut drawn.profile));
+        n_samples = drawn.n_samples;
+        part(common, &sums.picture)
+    } else if let Some(range) = common.some_samples {
         (drawn, sums) = renderer.draw_range(camera, range, &mut relay)?;
         profiles.push(take(&mut drawn.profile));
         part(common, &sums.picture)

@@ -6,6 +6,7 @@
 //! files      the files of a picture
 //! views      the pictures of a scene: one, or one for each frame of a path
 //! session    one scene after the other on the same devices: loads, builds, draws
+//! motion     the way of the camera, and the shutter
 //! draw       draws the pictures of a scene, and writes them
 //! several    several scenes: what fails does not stop the others
 //! ```
@@ -14,6 +15,7 @@ mod deadline;
 mod draw;
 mod files;
 mod inputs;
+mod motion;
 mod names;
 mod noise;
 mod session;
@@ -24,6 +26,7 @@ use std::path::{Path, PathBuf};
 
 use kdray::{gpu::Device, output};
 
+pub use self::motion::Shutter;
 use self::{
     files::{STDOUT, check_outputs, only_job, roles},
     session::Session,

@@ -8,6 +8,7 @@ use std::{
 };
 
 use kdray::{
+    accel::AccelKind,
     engine::{
         AnimatedWorld, Engine, LoadRequest, Loaded, NoiseGoal, Opened, Work,
         choices::{Choices, ChosenAccel, Methods},
@@ -16,13 +17,14 @@ use kdray::{
     gpu::DeviceInfo,
     output::{self, FilmFile, Record, WholeRecord},
     util::progress,
-    world::World,
+    world::{World, instances::Instancing},
 };
 use tracing::info_span;
 
 use super::{
     deadline::Deadline,
     draw::{Common, DrawnPictures, FrameJob, OneFile, draw_and_write, draws_whole_frames},
+    motion::CameraMotion,
     views::NamedPath,
 };
 use crate::cli::{
@@ -82,6 +84,7 @@ impl Ready {
             options,
             camera,
             animated,
+            motion: None,
             one_file: None,
             goal,
             noise_goal,
@@ -131,34 +134,39 @@ impl<'a> Session<'a> {
         let deadline = Deadline::new(self.args.time_limit);
         // A turn shows a thing at rest, unless the user chooses an animation.
         let may_play = self.args.turntable.is_none() || self.args.load.animation.is_some();
-        let first_frame = (self.args.is_film() && may_play).then(|| views[0].frame);
-        let opened = self.open(scene, first_frame, deadline)?;
-        let is_animated = first_frame.is_some() && self.args.load.plays(&opened.scene.animations);
-        if self.args.is_film() && !is_animated && path.is_none() && self.args.turntable.is_none() {
-            let scene = scene.display();
-            let what = format!("{scene}: nothing moves, so --frames needs --path FILE or --turntable N");
-            return Err(CliError::Usage(what));
+        let time = self.args.is_film().then(|| self.args.load.seconds_of(views[0].frame.into()));
+        let time = time.or_else(|| self.args.shutter.map(|_| self.args.load.seconds().unwrap_or_default()));
+        let first_time = time.filter(|_| may_play);
+        let opened = self.open(scene, first_time, deadline)?;
+        let is_animated = first_time.is_some() && self.args.load.plays(&opened.scene.animations);
+        if !is_animated && path.is_none() && self.args.turntable.is_none() {
+            self.args.refuse_to_move(scene)?;
         }
         let first_scene = is_animated.then(|| opened.scene.clone());
-        if let Some(n_frames) = self.args.turntable {
-            let RenderOptions { width, height, .. } = opened.options;
-            let cameras = opened.scene.turntable(n_frames, width as f32 / height as f32);
-            views.iter_mut().for_each(|view| view.camera = Some(cameras[view.frame as usize]));
-        }
-        if let Some(path) = path {
-            let path = path.relative_to(opened.scene.origin);
+        let motion = match (self.args.turntable, path) {
+            (Some(n_frames), _) => {
+                let RenderOptions { width, height, .. } = opened.options;
+                Some(CameraMotion::Turn(opened.scene.turntable(n_frames, width as f32 / height as f32)))
+            }
+            (None, path) => path.map(|path| CameraMotion::Path(path.relative_to(opened.scene.origin))),
+        };
+        if let Some(motion) = &motion {
             for view in &mut views {
-                view.camera = Some(path.camera_at(view.frame)?);
+                view.camera = Some(motion.camera_at(view.frame.into())?);
             }
         }
-        let ready = self.build(opened, &views, deadline)?;
+        let ready = self.build(opened, &views, (is_animated, deadline))?;
         deadline.check("building")?;
         let animated = first_scene.map(|first| {
-            let request = self.request(first_frame, Default::default());
+            let request = self.request(first_time, Default::default());
             Mutex::new(AnimatedWorld::new(scene, &request, first, &ready.world))
         });
         let one_file = self.one_file(&views, &ready)?;
-        let common = Common { one_file: one_file.as_ref(), ..ready.common(self.args, animated.as_ref(), deadline) };
+        let common = Common {
+            one_file: one_file.as_ref(),
+            motion: motion.as_ref(),
+            ..ready.common(self.args, animated.as_ref(), deadline)
+        };
         let rendering = format!("rendering {}x{}", common.record.crop.width(), common.record.crop.height());
         let (engine, stage) = ((&ready.engine, &ready.world), (&self.progress, rendering.as_str()));
         let (drawn, _) = self.progress.stage(&rendering, || draw_and_write(&common, engine, &views, stage));
@@ -208,9 +216,16 @@ impl<'a> Session<'a> {
     }
 
     /// Builds the structure of a scene for its views, and chooses the methods.
-    fn build(&self, mut opened: Opened, views: &[FrameJob], deadline: Deadline) -> Result<Ready, CliError> {
+    /// `is_animated`: whether animations play.
+    fn build(
+        &self,
+        mut opened: Opened,
+        views: &[FrameJob],
+        (is_animated, deadline): (bool, Deadline),
+    ) -> Result<Ready, CliError> {
         let (args, progress) = (self.args, &self.progress);
         args.set_options(&mut opened.options)?;
+        args.check_shutter(&opened.options)?;
         let n_samples = args.samples(&opened.scene);
         let some_samples = args.some_samples(&opened.scene, &opened.options)?;
         let noise_goal = args.noise_goal(&opened.scene, &opened.options)?;
@@ -223,7 +238,16 @@ impl<'a> Session<'a> {
             n_at_once: if draws_whole_frames(engine, views) { engine.devices().count() as u32 } else { 1 },
         };
         let building = engine.builder().describe(n_triangles);
-        let engine = engine.clone().with_progress(progress.observer(&building, &[progress::Work::Building]));
+        // What moves is stored apart from what does not.
+        let mut request = args.picture.request();
+        if is_animated && request.instances == Instancing::Auto && request.accel == AccelKind::KdTree {
+            request.instances = Instancing::Keep;
+            progress.note("meshes are kept apart, since some move; --instances flatten stores them as one");
+        }
+        let engine = engine
+            .clone()
+            .with_request(request)
+            .with_progress(progress.observer(&building, &[progress::Work::Building]));
         let builder = engine.clone();
         let build = move || info_span!("build tree").in_scope(|| builder.build(opened, &work));
         let (built, _) = progress.stage(&building, || deadline.within("building", build));
@@ -234,19 +258,20 @@ impl<'a> Session<'a> {
         Ok(Ready { engine, world, options, accel, methods, samples, noise_goal, n_triangles, load_ms, build_ms })
     }
 
-    /// Returns the request for a scene. `frame`: the frame of the film at which animations are shown, if it is one.
-    fn request(&self, frame: Option<u32>, observer: progress::Progress) -> LoadRequest {
+    /// Returns the request for a scene. `time`: the time at which its animations are shown, if not that of the
+    /// arguments.
+    fn request(&self, time: Option<f64>, observer: progress::Progress) -> LoadRequest {
         let load = &self.args.load;
         let mut request = load.pictures(&self.args.picture, &self.args.look, observer);
-        request.scene.at = frame.map(|frame| load.seconds_of(frame)).or(request.scene.at);
+        request.scene.at = time.or(request.scene.at);
         request
     }
 
     /// Reads a scene.
-    fn open(&self, scene: &Path, frame: Option<u32>, deadline: Deadline) -> Result<Opened, CliError> {
+    fn open(&self, scene: &Path, time: Option<f64>, deadline: Deadline) -> Result<Opened, CliError> {
         let loading = format!("loading {}", scene.display());
         let observer = self.progress.observer(&loading, &[progress::Work::Reading, progress::Work::Images]);
-        let request = self.request(frame, observer);
+        let request = self.request(time, observer);
         let scene = scene.to_owned();
         let read = move || info_span!("load scene").in_scope(|| Opened::read(&scene, &request));
         let (read, _) = self.progress.stage(&loading, || deadline.within("loading", read));

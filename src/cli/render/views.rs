@@ -72,8 +72,8 @@ fn views_of_film(path: Option<&NamedPath>, args: &RenderArgs, output: &Path) -> 
         }
     };
     let shares_file = is_one_film(output);
-    let view = |(ix, frame)| {
-        path.map_or(Ok(()), |path| path.camera_at(frame).map(drop))?;
+    let view = |(ix, frame): (usize, u32)| {
+        path.map_or(Ok(()), |path| path.camera_at(frame.into()).map(drop))?;
         let picture = if shares_file { output.to_owned() } else { numbered(output, frame)? };
         Ok(FrameJob { camera: None, frame, ix, shares_file, files: Files::of(picture, &args.aov) })
     };
@@ -108,10 +108,10 @@ impl<'a> NamedPath<'a> {
 
     /// # Errors
     /// The curve leads through a camera that sees nothing at this frame.
-    pub fn camera_at(&self, frame: u32) -> Result<Camera, CliError> {
+    pub fn camera_at(&self, frame: f64) -> Result<Camera, CliError> {
         let refused =
             || self.refused(format!("at frame {frame}, eye and target coincide, or up points along the view"));
-        self.path.camera_at(f64::from(frame)).ok_or_else(refused)
+        self.path.camera_at(frame).ok_or_else(refused)
     }
 
     fn refused(&self, what: String) -> CliError {

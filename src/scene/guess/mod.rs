@@ -7,6 +7,6 @@ pub(crate) mod lamps;
 pub(crate) mod near;
 pub(crate) mod room;
 pub(crate) mod standard;
-mod turntable;
+pub(crate) mod turntable;
 #[cfg(feature = "files")]
 pub(crate) mod up_axis;
