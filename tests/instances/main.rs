@@ -5,6 +5,7 @@ mod support;
 
 mod casts;
 mod masks;
+mod memory;
 mod moved;
 mod pictures;
 mod refused;
