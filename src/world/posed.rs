@@ -1,5 +1,5 @@
-//! Worlds of a scene whose meshes are deformed, and whose instances, lights and camera are elsewhere. What stays as it
-//! is is shared with the world before: textures, and the kd-trees of meshes that keep their shapes.
+//! Worlds of a scene whose meshes are deformed and whose instances, lights and camera have moved. They share the
+//! textures with the world before, and the kd-trees of meshes that keep their shapes.
 
 use super::{
     FlatScene, Instances, Mismatch, World,
@@ -14,10 +14,10 @@ use crate::{
 };
 
 impl World {
-    /// Returns the world of a scene, built anew only where it has changed. The scene is this world's but for its camera
-    /// and lights, the places of its instances, and the vertices, normals and tangents of the meshes `deformed`, in
-    /// ascending order. `None` if that cannot be done: the world is flattened, an instance is stored in the world, or
-    /// will be, or more has changed.
+    /// Returns the world of a scene that differs from this one's only in its camera and lights, the transforms of its
+    /// instances, and the vertices, normals and tangents of some meshes. `deformed`: the indices of these meshes, in
+    /// ascending order. Only their kd-trees and the hierarchy are built. Returns `None` if this world is flattened, if
+    /// an instance needs a geometry in world space, or if the scene differs in more.
     ///
     /// # Errors
     /// The scene's parts do not fit together, or a vertex is too far from the origin.

@@ -46,7 +46,7 @@ impl Scene {
 #[derive(Clone, Debug)]
 pub struct Turntable {
     n_frames: u32,
-    /// The axis.
+    /// The axis of the turn, a unit vector.
     up: DVec3,
     /// The eye of the first camera.
     eye: DVec3,

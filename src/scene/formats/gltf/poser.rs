@@ -20,16 +20,16 @@ pub(crate) struct Poser {
     meshes: Vec<Mesh>,
     /// Those of them that no skin and no morph target deforms.
     rigid: HashMap<MeshKey, Option<Known>>,
-    /// The instances at the first moment, in the coordinates of the file.
-    first: Vec<Instance>,
-    /// Which of the file's lights and cameras the scene has.
+    /// The number of the file's instances.
+    n_instances: usize,
+    /// Whether the scene's lights are the file's, and which of the file's cameras is the scene's.
     has_lights: bool,
     camera_ix: Option<usize>,
 }
 
 impl Poser {
     /// Reads a file, whose scene at the moment of the options is known. Returns `None` if it is no glTF file, or if the
-    /// scene has other instances than the file: then it has been changed since.
+    /// scene's instances are not the file's.
     pub fn new(path: &Path, options: &LoadOptions, scene: &Scene) -> Option<Self> {
         let bytes = read_mesh(path).ok()?;
         if MeshFormat::of(path, &bytes) != MeshFormat::Gltf {
@@ -52,7 +52,8 @@ impl Poser {
         let camera_ix = scene.cameras.iter().position(|(_, camera)| *camera == scene.camera);
         let rigid = known.into_iter().filter(|((_, skin, _, weights), _)| skin.is_none() && weights.is_empty());
         let (rigid, options) = (rigid.collect(), options.clone());
-        fits.then_some(Self { document, options, meshes, rigid, first, has_lights, camera_ix })
+        let n_instances = first.len();
+        fits.then_some(Self { document, options, meshes, rigid, n_instances, has_lights, camera_ix })
     }
 
     /// Poses a scene of the file at a moment, seconds. Returns the indices of the meshes whose vertices have changed,
@@ -84,7 +85,7 @@ impl Poser {
 
     /// Gives a scene the places and meshes of a moment. Of `deformed`, the first mesh has the index `n_known`.
     fn put(&self, now: &[Instance], (n_known, deformed): (usize, Vec<Mesh>), scene: &mut Scene) -> Option<Vec<usize>> {
-        if now.len() != self.first.len() {
+        if now.len() != self.n_instances {
             return None;
         }
         // For each mesh of the scene, the one that stands for it.
