@@ -195,8 +195,7 @@ fn modules() -> Vec<Module> {
 }
 
 /// Returns the modules of a kernel that finds hits. The alpha test is inlined wherever a triangle is tested. Scenes
-/// without masked or blended materials are spared it, and flat worlds are spared what is for instances. Grids have no
-/// instances.
+/// without masked or blended materials are spared it, and flat worlds are spared what is for instances.
 fn searching_modules(kernel: &str, has_alpha_test: bool, path: &Path) -> Vec<Module> {
     let of_search = |search: &str| {
         let traversal = ("TRAVERSAL", Some(format!("TRAVERSAL_{}", search.to_uppercase())));
@@ -209,8 +208,8 @@ fn searching_modules(kernel: &str, has_alpha_test: bool, path: &Path) -> Vec<Mod
         let with = |more: Vec<(&'static str, Option<String>)>| iter::once(traversal.clone()).chain(more).collect();
         let of_alpha = alpha_test.clone().map(|alpha_test| module("_alpha", with(vec![alpha_test])));
         let instances = alpha_test.into_iter().chain([("WITH_INSTANCES", None)]).collect();
-        let of_instances = (search != "grid").then(|| module("_instances", with(instances)));
-        iter::once(module("", with(Vec::new()))).chain(of_alpha).chain(of_instances).collect::<Vec<_>>()
+        let of_instances = module("_instances", with(instances));
+        iter::once(module("", with(Vec::new()))).chain(of_alpha).chain([of_instances]).collect::<Vec<_>>()
     };
     SEARCH_MODULES.into_iter().flat_map(of_search).collect()
 }

@@ -307,6 +307,8 @@ struct Instance {
 //
 // - `root_offset`: of the root of the geometry's kd-tree in `kd_nodes`, bytes.
 // - `first_row`, `n_triangles`: the geometry's triangles in `triangles`.
+// - `first_cell`: of the geometry's grid in `grid_cells`. `n_cells_x`, `n_cells_y`, `n_cells_z` and `cell_size` are
+//   those of `AccelConstants`.
 struct GeometryConstants {
     vec3 box_min;
     float plane_epsilon;
@@ -315,7 +317,11 @@ struct GeometryConstants {
     uint root_offset;
     uint first_row;
     uint n_triangles;
-    uint reserved;
+    uint first_cell;
+    uint n_cells_x;
+    uint n_cells_y;
+    uint n_cells_z;
+    float cell_size;
 };
 
 // Node of the hierarchy over the instances, 32 bytes. Nodes 2 p and 2 p + 1 are siblings; node 0 is the root, and
@@ -345,7 +351,7 @@ struct InstanceRow {
 };
 // Rows that an `Instance`, a `GeometryConstants` and a `TopNode` take.
 #define INSTANCE_ROWS 7u
-#define GEOMETRY_ROWS 3u
+#define GEOMETRY_ROWS 4u
 #define TOP_NODE_ROWS 2u
 
 // A triangle as a leaf stores it, 48 bytes. A ray's test waits for this one load. With an index in its place, the

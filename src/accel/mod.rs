@@ -1,6 +1,7 @@
 //! Acceleration structures: kd-trees and grids, which find the triangles that a ray may hit. For single rays on the
 //! CPU, a kd-tree is converted to a wide hierarchy of boxes.
 
+pub(crate) mod bottom_level;
 mod bounds;
 pub mod grid;
 pub mod kdtree;
@@ -16,7 +17,7 @@ use glam::Vec3;
 use self::{
     grid::{GridLevels, GridOptions, LazyGrid},
     kdtree::{BuildOptions, KdTree},
-    two_level::{TreesId, TwoLevel},
+    two_level::{StructuresId, TwoLevel},
 };
 pub use self::{query::Query, search::Search, statistics::Statistics};
 use crate::layout::Triangle;
@@ -30,7 +31,7 @@ pub enum Accel {
     KdTree(KdTree),
     /// A grid. Each device builds its own grid. The host builds a grid only at the first [`LazyGrid::get`].
     Grid(LazyGrid),
-    /// A kd-tree for each geometry, and a hierarchy over the instances, which the host builds.
+    /// A kd-tree or a grid for each geometry, and a hierarchy over the instances, which the host builds.
     TwoLevel(Box<TwoLevel>),
 }
 
@@ -99,6 +100,15 @@ impl AccelKind {
             Self::Grid2 => "two-level grid",
         }
     }
+
+    /// The kind of a structure with so many levels of a grid's cells; 0 for a kd-tree.
+    pub(crate) fn of_grid_levels(n_levels: u32) -> Self {
+        match n_levels {
+            0 => Self::KdTree,
+            1 => Self::Grid,
+            _ => Self::Grid2,
+        }
+    }
 }
 
 impl Accel {
@@ -124,17 +134,17 @@ impl Accel {
         }
     }
 
-    /// What tells the trees of geometries from all others; none without instances.
-    pub(crate) fn trees_id(&self) -> Option<TreesId> {
-        if let Self::TwoLevel(two) = self { Some(two.trees_id()) } else { None }
+    /// What tells the structures of geometries from all others; none without instances.
+    pub(crate) fn structures_id(&self) -> Option<StructuresId> {
+        if let Self::TwoLevel(two) = self { Some(two.structures_id()) } else { None }
     }
 
     /// The kind of the structure, or of that of each geometry.
     pub fn kind(&self) -> AccelKind {
         match self {
-            Self::KdTree(_) | Self::TwoLevel(_) => AccelKind::KdTree,
-            Self::Grid(grid) if grid.options().levels.n_levels() == 1 => AccelKind::Grid,
-            Self::Grid(_) => AccelKind::Grid2,
+            Self::KdTree(_) => AccelKind::KdTree,
+            Self::Grid(grid) => AccelKind::of_grid_levels(grid.options().levels.n_levels()),
+            Self::TwoLevel(two) => AccelKind::of_grid_levels(two.n_grid_levels()),
         }
     }
 

@@ -22,8 +22,7 @@ impl Statistics {
     pub fn kind(&self) -> AccelKind {
         match self {
             Self::KdTree(_) => AccelKind::KdTree,
-            Self::Grid(grid) if grid.n_levels == 1 => AccelKind::Grid,
-            Self::Grid(_) => AccelKind::Grid2,
+            Self::Grid(grid) => AccelKind::of_grid_levels(grid.n_levels),
         }
     }
 

@@ -1,4 +1,4 @@
-//! The structure of a world of instances: a kd-tree for each geometry, and a hierarchy over the instances.
+//! The structure of a world of instances: a kd-tree or a grid for each geometry, and a hierarchy over the instances.
 
 use std::sync::{Arc, Weak};
 
@@ -6,7 +6,10 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::{
-    kdtree::{BuildOptions, KdTree, Statistics},
+    AccelOptions, Statistics,
+    bottom_level::BottomLevel,
+    grid::{self, Grid},
+    kdtree::{self, BuildOptions, KdTree},
     top_level::TopLevel,
 };
 use crate::{
@@ -30,81 +33,95 @@ impl StoredRange {
     }
 }
 
-/// Identity of the trees of all geometries. It does not keep them.
+/// Identity of the structures of all geometries. It does not keep them.
 #[derive(Clone, Debug)]
-pub struct TreesId(Weak<Vec<Arc<KdTree>>>);
+pub struct StructuresId(Weak<Vec<Arc<BottomLevel>>>);
 
-impl PartialEq for TreesId {
+impl PartialEq for StructuresId {
     fn eq(&self, other: &Self) -> bool {
         Weak::ptr_eq(&self.0, &other.0)
     }
 }
 
-/// The trees of all geometries, and the hierarchy over their instances.
+/// The structures of all geometries, and the hierarchy over their instances.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TwoLevel {
-    /// A tree for each geometry, in its own space.
-    trees: Arc<Vec<Arc<KdTree>>>,
+    /// A structure for each geometry, in its own space. All are of one kind.
+    structures: Arc<Vec<Arc<BottomLevel>>>,
     /// The index at which each tree's nodes begin where all trees are stored one after the other. All are even.
     node_begins: Arc<Vec<usize>>,
     top: TopLevel,
 }
 
 impl TwoLevel {
-    /// Builds all trees, and the hierarchy, on the current rayon pool. `stored`: the triangles of all geometries.
+    /// Builds all structures, and the hierarchy, on the current rayon pool. `stored`: the triangles of all geometries.
     pub fn build(
         stored: &[Triangle],
         ranges: &[StoredRange],
         instances: &[Instance],
-        options: &BuildOptions,
+        options: &AccelOptions,
         progress: &Progress,
     ) -> Self {
-        let build = |range: &StoredRange| Arc::new(KdTree::build_observed(range.of(stored), options, progress));
-        let trees: Vec<_> = ranges.par_iter().map(build).collect();
-        Self::of_trees(trees, instances)
+        let build = |range: &StoredRange| Arc::new(BottomLevel::build(range.of(stored), options, progress));
+        Self::of_structures(ranges.par_iter().map(build).collect(), instances)
     }
 
-    fn of_trees(trees: Vec<Arc<KdTree>>, instances: &[Instance]) -> Self {
-        let top = Self::top_of(&trees, instances);
-        let node_begins = begins(trees.iter().map(|tree| tree.nodes().len()));
-        Self { trees: Arc::new(trees), node_begins: Arc::new(node_begins), top }
+    fn of_structures(structures: Vec<Arc<BottomLevel>>, instances: &[Instance]) -> Self {
+        let top = Self::top_of(&structures, instances);
+        let node_begins = begins(structures.iter().map(|it| it.nodes().len()));
+        Self { structures: Arc::new(structures), node_begins: Arc::new(node_begins), top }
     }
 
-    /// Returns the structure of geometries some of which have other vertices. Only their trees are built, and the
+    /// Returns the structure of geometries some of which have other vertices. Only their structures are built, and the
     /// hierarchy. `deformed`: their indices. The other arguments are those of [`TwoLevel::build`].
     pub fn deformed(
         &self,
         deformed: &[usize],
         (stored, ranges): (&[Triangle], &[StoredRange]),
         instances: &[Instance],
-        options: &BuildOptions,
+        options: &AccelOptions,
     ) -> Self {
-        let build = |ix: &usize| Arc::new(KdTree::build(ranges[*ix].of(stored), options));
+        let build = |ix: &usize| Arc::new(BottomLevel::build(ranges[*ix].of(stored), options, &Progress::default()));
         let built: Vec<_> = deformed.par_iter().map(build).collect();
-        let mut trees = Vec::clone(&self.trees);
-        deformed.iter().zip(built).for_each(|(ix, tree)| trees[*ix] = tree);
-        Self::of_trees(trees, instances)
+        let mut structures = Vec::clone(&self.structures);
+        deformed.iter().zip(built).for_each(|(ix, structure)| structures[*ix] = structure);
+        Self::of_structures(structures, instances)
     }
 
     /// Returns the structure of the same geometries in other places. Only the hierarchy is built. `instances`: as many
     /// as before, each of the same geometry.
     pub fn moved(&self, instances: &[Instance]) -> Self {
-        Self { top: Self::top_of(&self.trees, instances), ..self.clone() }
+        Self { top: Self::top_of(&self.structures, instances), ..self.clone() }
     }
 
-    /// Returns what tells these trees, and those of all structures that share them, from all others.
-    pub fn trees_id(&self) -> TreesId {
-        TreesId(Arc::downgrade(&self.trees))
+    /// Returns what tells these structures, and those of all worlds that share them, from all others.
+    pub fn structures_id(&self) -> StructuresId {
+        StructuresId(Arc::downgrade(&self.structures))
     }
 
-    fn top_of(trees: &[Arc<KdTree>], instances: &[Instance]) -> TopLevel {
-        let boxes: Vec<_> = trees.iter().map(|tree| [tree.box_min(), tree.box_max()]).collect();
+    fn top_of(structures: &[Arc<BottomLevel>], instances: &[Instance]) -> TopLevel {
+        let boxes: Vec<_> = structures.iter().map(|it| it.bounds()).collect();
         TopLevel::new(instances, &boxes)
     }
 
-    /// The tree of each geometry.
-    pub fn trees(&self) -> &[Arc<KdTree>] {
-        &self.trees
+    /// The structure of each geometry.
+    pub fn structures(&self) -> &[Arc<BottomLevel>] {
+        &self.structures
+    }
+
+    /// The kd-trees of all geometries; none if they have grids.
+    pub fn trees(&self) -> impl Iterator<Item = &KdTree> {
+        self.structures.iter().filter_map(|it| it.as_kdtree())
+    }
+
+    /// The grids of all geometries; none if they have kd-trees.
+    fn grids(&self) -> impl Iterator<Item = &Grid> {
+        self.structures.iter().filter_map(|it| it.as_grid())
+    }
+
+    /// The number of levels of the grids' cells, 1 or 2; 0 for kd-trees.
+    pub fn n_grid_levels(&self) -> u32 {
+        self.grids().next().map_or(0, Grid::n_levels)
     }
 
     /// The hierarchy over the instances.
@@ -114,7 +131,7 @@ impl TwoLevel {
 
     /// The number of stored triangles.
     pub fn n_stored(&self) -> usize {
-        self.trees.iter().map(|tree| tree.n_triangles()).sum()
+        self.structures.iter().map(|it| it.n_triangles()).sum()
     }
 
     /// The least and the greatest corner of a box that holds all instances, world units.
@@ -130,15 +147,22 @@ impl TwoLevel {
 
     /// The greatest number of levels of a tree below its root.
     pub fn depth(&self) -> u32 {
-        self.trees.iter().map(|tree| tree.depth()).max().unwrap_or_default()
+        self.trees().map(KdTree::depth).max().unwrap_or_default()
     }
 
-    /// Computes the statistics of all trees together. The cost is the mean over the trees, weighted by their triangles.
-    /// `options`: those that the trees were built with.
-    pub fn statistics(&self, options: &BuildOptions) -> Statistics {
+    /// Computes the statistics of all structures together. `options`: those that they were built with.
+    pub fn statistics(&self, options: &AccelOptions) -> Statistics {
+        match options {
+            AccelOptions::KdTree(options) => Statistics::KdTree(self.tree_statistics(options)),
+            AccelOptions::Grid(_) => Statistics::Grid(self.grid_statistics()),
+        }
+    }
+
+    /// The cost is the mean over the trees, weighted by their triangles.
+    fn tree_statistics(&self, options: &BuildOptions) -> kdtree::Statistics {
         let n_stored = self.n_stored().max(1) as f64;
-        let mut all = Statistics { depth: self.depth(), ..Statistics::default() };
-        for tree in self.trees.iter() {
+        let mut all = kdtree::Statistics { depth: self.depth(), ..Default::default() };
+        for tree in self.trees() {
             let own = tree.statistics(tree.n_triangles(), options);
             all.n_nodes += own.n_nodes;
             all.n_leaves += own.n_leaves;
@@ -149,6 +173,22 @@ impl TwoLevel {
             all.bytes += own.bytes;
         }
         all.references_per_triangle = all.n_references as f64 / n_stored;
+        all.bytes += size_of_val(&self.top.nodes[..]) as u64;
+        all
+    }
+
+    fn grid_statistics(&self) -> grid::Statistics {
+        let mut all = grid::Statistics { n_levels: self.n_grid_levels(), ..Default::default() };
+        for own in self.grids().map(Grid::statistics) {
+            all.resolution = [0, 1, 2].map(|axis| all.resolution[axis].max(own.resolution[axis]));
+            all.n_upper_cells += own.n_upper_cells;
+            all.n_cells += own.n_cells;
+            all.n_empty_cells += own.n_empty_cells;
+            all.n_references += own.n_references;
+            all.n_coarser = all.n_coarser.max(own.n_coarser);
+            all.bytes += own.bytes;
+        }
+        all.references_per_triangle = all.n_references as f64 / self.n_stored().max(1) as f64;
         all.bytes += size_of_val(&self.top.nodes[..]) as u64;
         all
     }
@@ -165,28 +205,38 @@ impl TwoLevel {
         self.top.pad_from_afar
     }
 
-    /// Returns the index at which the entries of each tree's leaves begin.
+    /// Returns the index at which the entries of each geometry's leaves or cells begin.
     pub fn entry_begins(&self) -> Vec<usize> {
-        begins(self.trees.iter().map(|tree| tree.leaf_triangles().len()))
+        begins(self.structures.iter().map(|it| it.leaf_triangles().len()))
+    }
+
+    /// Returns the index at which the cells of each grid begin.
+    pub fn cell_begins(&self) -> Vec<usize> {
+        begins(self.structures.iter().map(|it| it.cells().len()))
     }
 
     /// Returns what a search through each geometry needs beside the arrays.
     pub fn geometry_constants(&self) -> Vec<GeometryConstants> {
-        let rows = begins(self.trees.iter().map(|tree| tree.n_triangles()));
-        let constants = |((tree, first_node), first_row): ((&Arc<KdTree>, &usize), usize)| {
-            let of_tree = tree.constants();
+        let rows = begins(self.structures.iter().map(|it| it.n_triangles()));
+        let cells = self.cell_begins();
+        let constants = |(ix, structure): (usize, &Arc<BottomLevel>)| {
+            let own = structure.constants();
             GeometryConstants {
-                box_min: of_tree.box_min,
-                plane_epsilon: of_tree.plane_epsilon,
-                box_max: of_tree.box_max,
-                origin_reach: of_tree.origin_reach,
-                root_offset: KD_NODE_BYTES * *first_node as u32,
-                first_row: first_row as u32,
-                n_triangles: tree.n_triangles() as u32,
-                reserved: 0,
+                box_min: own.box_min,
+                plane_epsilon: own.plane_epsilon,
+                box_max: own.box_max,
+                origin_reach: own.origin_reach,
+                root_offset: KD_NODE_BYTES * self.node_begins[ix] as u32,
+                first_row: rows[ix] as u32,
+                n_triangles: structure.n_triangles() as u32,
+                first_cell: cells[ix] as u32,
+                n_cells_x: own.n_cells_x,
+                n_cells_y: own.n_cells_y,
+                n_cells_z: own.n_cells_z,
+                cell_size: own.cell_size,
             }
         };
-        self.trees.iter().zip(self.node_begins.iter()).zip(rows).map(constants).collect()
+        self.structures.iter().enumerate().map(constants).collect()
     }
 }
 

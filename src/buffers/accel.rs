@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     accel::{
-        Accel,
+        Accel, AccelKind,
         grid::{Grid, LazyGrid},
         kdtree::{KdTree, Traversal, TraversalLinks},
         two_level::TwoLevel,
@@ -33,15 +33,13 @@ pub(super) fn bindings() -> impl Iterator<Item = u32> {
     [BIND_ACCEL, BIND_SUSPENDED_RAYS].into_iter().chain(SceneArrays::bindings())
 }
 
-/// Kind of acceleration structure, for which kernels are specialized.
+/// Kind of acceleration structure, of the world or of each geometry, for which kernels are specialized.
 #[derive(Clone, Copy)]
 enum Structure {
     /// A kd-tree. `mask_words`: the number of words of the traversal's bit mask, 1 or 2.
     KdTree { mask_words: u32 },
     /// A grid. `n_levels`: the number of levels of cells, 1 or 2.
     Grid { n_levels: u32 },
-    /// A kd-tree for each geometry, and a hierarchy over instances. `mask_words`: as of one kd-tree.
-    TwoLevel { mask_words: u32 },
 }
 
 /// Buffers of triangles, of their acceleration structure and of the constants of both. A clone is a second handle to
@@ -55,6 +53,8 @@ pub struct AccelBuffers {
     pub suspended_rays: SuspendedRays,
     access: SceneAccess,
     structure: Structure,
+    /// Whether the triangles are those of geometries, with a hierarchy over their instances.
+    pub is_instanced: bool,
     /// Whether `arrays` have the emitters, which only paths read.
     has_emitters: bool,
     /// The number of triangles in the world.
@@ -135,10 +135,11 @@ impl AccelBuffers {
             }
         }?;
         made.n_triangles = geometry.n_triangles();
+        made.is_instanced = geometry.instances().is_some();
         Ok(made)
     }
 
-    /// Uploads the triangles and the kd-trees of all geometries, and the instances with their hierarchy.
+    /// Uploads the triangles and the structures of all geometries, and the instances with their hierarchy.
     fn of_two_level(
         context: &Arc<Context>,
         triangles: &[Triangle],
@@ -165,10 +166,17 @@ impl AccelBuffers {
             leaf_planes: Content::Written { len: n_entries, write: &|first, part| joined.write_planes(first, part) },
             kd_slabs: Content::Written { len: n_slabs, write: &|first, part| joined.write_slabs(first, part) },
             kd_links: Content::Reserved(6 * n_nodes),
+            grid_cells: Content::Written {
+                len: joined.n_cells(),
+                write: &|first, part| joined.write_cells(first, part),
+            },
             ..common
         };
-        let mask_words = if two.depth() <= KD_WORD_DEPTH { 1 } else { 2 };
-        Self::with(context, contents, &constants, Structure::TwoLevel { mask_words })
+        let structure = match two.n_grid_levels() {
+            0 => Structure::KdTree { mask_words: if two.depth() <= KD_WORD_DEPTH { 1 } else { 2 } },
+            n_levels => Structure::Grid { n_levels },
+        };
+        Self::with(context, contents, &constants, structure)
     }
 
     /// Uploads triangles and their kd-tree.
@@ -274,6 +282,7 @@ impl AccelBuffers {
             filters: false,
             surface_kinds: SurfaceKinds::default(),
             structure,
+            is_instanced: false,
             uploaded,
         };
         made.upload_constants(context)?;
@@ -313,7 +322,7 @@ impl AccelBuffers {
         traversal: Traversal,
     ) -> Result<(), GpuError> {
         let (accel, instances) = (geometry.accel(), geometry.instances());
-        if let Accel::Grid(_) = accel {
+        if accel.kind() != AccelKind::KdTree {
             return Ok(());
         }
         let (value, limit) = (self.arrays.triangles.len() as u64, u64::from(BRUTE_MAX_TRIANGLES));
@@ -388,11 +397,6 @@ impl AccelBuffers {
         Ok(())
     }
 
-    /// Whether the triangles are those of geometries.
-    pub fn is_instanced(&self) -> bool {
-        matches!(self.structure, Structure::TwoLevel { .. })
-    }
-
     /// The way in which kernels read the arrays.
     pub fn access(&self) -> SceneAccess {
         self.access
@@ -401,14 +405,13 @@ impl AccelBuffers {
     /// The specialization constants of all kernels that read the arrays, in frames of paths or elsewhere.
     pub(super) fn constants(&self, of_paths: bool) -> Constants {
         let (mask_words, n_levels) = match self.structure {
-            Structure::KdTree { mask_words } | Structure::TwoLevel { mask_words } => (mask_words, 0),
+            Structure::KdTree { mask_words } => (mask_words, 0),
             Structure::Grid { n_levels } => (1, n_levels),
         };
-        let is_instanced = self.is_instanced();
         // One loop more stands around all others, so that more iterations go by in which a lane only waits.
         let budget = match self.suspended_rays.iteration_budget() {
             0 => 0,
-            budget if is_instanced => (budget / 8).max(4),
+            budget if self.is_instanced => (budget / 8).max(4),
             budget => budget,
         };
         let constants = Constants::new()
@@ -416,7 +419,7 @@ impl AccelBuffers {
             .set(constants::SKIPS_HIDDEN, self.filters)
             .set(constants::MASK_WORDS, mask_words)
             .set(constants::GRID_LEVELS, n_levels)
-            .set(constants::INSTANCED, is_instanced)
+            .set(constants::INSTANCED, self.is_instanced)
             .set(constants::ITERATION_BUDGET, budget);
         self.surface_kinds.set(constants, of_paths)
     }

@@ -254,7 +254,7 @@ impl Resources {
     /// enough to have indices.
     fn make_vertex_indices(&self, context: &Arc<Context>) -> Result<Buffer<u32>, GpuError> {
         let triangles = &self.accel.arrays.triangles;
-        let has_vertices = !self.accel.is_instanced();
+        let has_vertices = !self.accel.is_instanced;
         let triangles = if has_vertices && has_indices(triangles.len()) { triangles.download()? } else { Vec::new() };
         new_vertex_indices(context, &vertex_indices(&triangles))
     }

@@ -1,26 +1,28 @@
-//! The contents of a world of instances for the arrays of a device: the trees of all geometries, one after the other,
-//! with their indices counted from the first tree, and the rows of `instance_rows`.
+//! The contents of a world of instances for the arrays of a device: the structures of all geometries, one after the
+//! other, with their indices counted from the first one, and the rows of `instance_rows`.
 
 use bytemuck::{Pod, cast_slice};
 use rayon::prelude::*;
 
 use crate::{
-    accel::{kdtree::KdTree, two_level::TwoLevel},
+    accel::{bottom_level::BottomLevel, two_level::TwoLevel},
     gpu::GpuError,
     layout::{
-        AccelConstants, GEOMETRY_ROWS, INSTANCE_ROWS, InstanceRow, KD_LEAF, KD_NODE_BYTES, KD_PAIR_SHIFT, KdNode,
-        KdRope, LeafTriangle, Slab, TOP_NODE_ROWS, Triangle,
+        AccelConstants, GEOMETRY_ROWS, GridCell, INSTANCE_ROWS, InstanceRow, KD_LEAF, KD_NODE_BYTES, KD_PAIR_SHIFT,
+        KdNode, KdRope, LeafTriangle, Plane, Slab, TOP_NODE_ROWS, Triangle,
     },
     world::Instances,
 };
 
-/// Arrays of all trees, one after the other.
+/// Arrays of all structures, one after the other.
 pub struct Joined<'a> {
     two: &'a TwoLevel,
     /// The place of each tree's first node, and the number of all nodes.
     first_nodes: &'a [usize],
-    /// The place of each tree's first entry of a leaf, and the number of all entries.
+    /// The place of each geometry's first entry of a leaf or cell, and the number of all entries.
     first_entries: Vec<usize>,
+    /// The place of each grid's first cell, and the number of all cells.
+    first_cells: Vec<usize>,
     /// The place of each geometry's first triangle.
     first_rows: Vec<u32>,
 }
@@ -28,7 +30,8 @@ pub struct Joined<'a> {
 impl<'a> Joined<'a> {
     pub fn new(two: &'a TwoLevel, instances: &Instances) -> Self {
         let first_rows = instances.ranges.iter().map(|range| range.first_row).collect();
-        Self { two, first_nodes: two.node_begins(), first_entries: two.entry_begins(), first_rows }
+        let (first_entries, first_cells) = (two.entry_begins(), two.cell_begins());
+        Self { two, first_nodes: two.node_begins(), first_entries, first_cells, first_rows }
     }
 
     /// Checks that the offsets of nodes and the indices of entries fit in words.
@@ -38,7 +41,9 @@ impl<'a> Joined<'a> {
     pub fn check(&self) -> Result<(), GpuError> {
         let nodes = (self.n_nodes() as u64, u64::from(u32::MAX / KD_NODE_BYTES));
         let entries = (self.n_entries() as u64, u64::from(u32::MAX));
-        for (what, (value, limit)) in [("nodes of all kd-trees", nodes), ("entries of all leaves", entries)] {
+        let cells = (self.n_cells() as u64, u64::from(u32::MAX));
+        let all = [("nodes of all kd-trees", nodes), ("entries of all leaves", entries), ("cells of all grids", cells)];
+        for (what, (value, limit)) in all {
             if value > limit {
                 return Err(GpuError::Limit { what, value, limit });
             }
@@ -54,8 +59,12 @@ impl<'a> Joined<'a> {
         *self.first_entries.last().expect("the number of all")
     }
 
-    /// Writes the elements of all trees from element `first` on. `begins`: the places of the trees' first elements.
-    /// `element(tree_ix, ix)` is an element of a tree.
+    pub fn n_cells(&self) -> usize {
+        *self.first_cells.last().expect("the number of all")
+    }
+
+    /// Writes the elements of all structures from element `first` on. `begins`: the places of their first
+    /// elements. `element(geometry_ix, ix)` is an element of a structure.
     fn write<T: Pod + Send>(
         begins: &[usize],
         first: usize,
@@ -65,65 +74,78 @@ impl<'a> Joined<'a> {
         const CHUNK: usize = 1 << 14;
         part.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk_ix, chunk)| {
             let first = first + chunk_ix * CHUNK;
-            let mut tree_ix = begins.partition_point(|begin| *begin <= first) - 1;
+            let mut geometry_ix = begins.partition_point(|begin| *begin <= first) - 1;
             for (ix, written) in (first..).zip(chunk) {
-                while begins[tree_ix + 1] <= ix {
-                    tree_ix += 1;
+                while begins[geometry_ix + 1] <= ix {
+                    geometry_ix += 1;
                 }
-                *written = element(tree_ix, ix - begins[tree_ix]);
+                *written = element(geometry_ix, ix - begins[geometry_ix]);
             }
         });
     }
 
-    fn tree(&self, tree_ix: usize) -> &KdTree {
-        &self.two.trees()[tree_ix]
+    fn structure(&self, geometry_ix: usize) -> &BottomLevel {
+        &self.two.structures()[geometry_ix]
     }
 
     pub fn write_nodes(&self, first: usize, part: &mut [KdNode]) {
-        Self::write(self.first_nodes, first, part, |tree_ix, ix| {
-            let KdNode { split_or_first, axis_and_child } = self.tree(tree_ix).nodes()[ix];
+        Self::write(self.first_nodes, first, part, |geometry_ix, ix| {
+            let KdNode { split_or_first, axis_and_child } = self.structure(geometry_ix).nodes()[ix];
             if axis_and_child & KD_LEAF != 0 {
-                return KdNode { split_or_first: split_or_first + self.first_entries[tree_ix] as u32, axis_and_child };
+                return KdNode {
+                    split_or_first: split_or_first + self.first_entries[geometry_ix] as u32,
+                    axis_and_child,
+                };
             }
-            let first_pair = (self.first_nodes[tree_ix] / 2) as u32;
+            let first_pair = (self.first_nodes[geometry_ix] / 2) as u32;
             KdNode { split_or_first, axis_and_child: axis_and_child + (first_pair << KD_PAIR_SHIFT) }
         });
     }
 
     pub fn write_parents(&self, first: usize, part: &mut [u32]) {
         let first_pairs: Vec<_> = self.first_nodes.iter().map(|first| first / 2).collect();
-        Self::write(&first_pairs, first, part, |tree_ix, ix| {
-            self.tree(tree_ix).parents()[ix] + self.first_nodes[tree_ix] as u32
+        Self::write(&first_pairs, first, part, |geometry_ix, ix| {
+            self.structure(geometry_ix).parents()[ix] + self.first_nodes[geometry_ix] as u32
         });
     }
 
     pub fn write_entries(&self, stored: &[Triangle], first: usize, part: &mut [LeafTriangle]) {
-        Self::write(&self.first_entries, first, part, |tree_ix, ix| {
-            let triangle_ix = self.first_rows[tree_ix] + self.tree(tree_ix).leaf_triangles()[ix];
+        Self::write(&self.first_entries, first, part, |geometry_ix, ix| {
+            let triangle_ix = self.first_rows[geometry_ix] + self.structure(geometry_ix).leaf_triangles()[ix];
             let Triangle { v0, v1, v2, .. } = stored[triangle_ix as usize];
             LeafTriangle { v0, triangle_ix, v1, v2, ..LeafTriangle::default() }
         });
     }
 
-    pub fn write_planes(&self, first: usize, part: &mut [crate::layout::Plane]) {
-        Self::write(&self.first_entries, first, part, |tree_ix, ix| self.tree(tree_ix).leaf_planes()[ix]);
+    pub fn write_planes(&self, first: usize, part: &mut [Plane]) {
+        Self::write(&self.first_entries, first, part, |geometry_ix, ix| self.structure(geometry_ix).leaf_planes()[ix]);
+    }
+
+    pub fn write_cells(&self, first: usize, part: &mut [GridCell]) {
+        Self::write(&self.first_cells, first, part, |geometry_ix, ix| {
+            let grid = self.structure(geometry_ix).as_grid().expect("only grids have cells");
+            let GridCell { first, count } = grid.cells()[ix];
+            let is_block = grid.n_levels() == 2 && ix < grid.lattice().n_cubes();
+            let begins = if is_block { &self.first_cells } else { &self.first_entries };
+            GridCell { first: first + begins[geometry_ix] as u32, count }
+        });
     }
 
     /// The number of slabs: one for each node, or none if no tree has any.
     pub fn n_slabs(&self) -> usize {
-        if self.two.trees().iter().all(|tree| tree.slabs().is_empty()) { 0 } else { self.n_nodes() }
+        if self.two.structures().iter().all(|it| it.slabs().is_empty()) { 0 } else { self.n_nodes() }
     }
 
     pub fn write_slabs(&self, first: usize, part: &mut [Slab]) {
-        Self::write(self.first_nodes, first, part, |tree_ix, ix| {
-            self.tree(tree_ix).slabs().get(ix).copied().unwrap_or_default()
+        Self::write(self.first_nodes, first, part, |geometry_ix, ix| {
+            self.structure(geometry_ix).slabs().get(ix).copied().unwrap_or_default()
         });
     }
 
     /// Counts the nodes to which ropes lead from the first tree's. 0 leads out of the geometry.
     pub fn move_ropes(&self, ropes: &mut [KdRope]) {
-        for (tree_ix, range) in self.first_nodes.windows(2).enumerate() {
-            let first_node = self.first_nodes[tree_ix] as u32;
+        for (geometry_ix, range) in self.first_nodes.windows(2).enumerate() {
+            let first_node = self.first_nodes[geometry_ix] as u32;
             for rope in ropes[6 * range[0]..6 * range[1]].iter_mut().filter(|rope| rope.node_ix != 0) {
                 rope.node_ix += first_node;
             }
@@ -146,7 +168,10 @@ pub fn instance_rows(two: &TwoLevel, instances: &Instances, constants: &mut Acce
     constants.geometries_begin = rows.len() as u32;
     rows.extend_from_slice(cast_slice(&two.geometry_constants()));
     constants.top_nodes_begin = rows.len() as u32;
-    debug_assert_eq!(constants.top_nodes_begin - constants.geometries_begin, GEOMETRY_ROWS * two.trees().len() as u32);
+    debug_assert_eq!(
+        constants.top_nodes_begin - constants.geometries_begin,
+        GEOMETRY_ROWS * two.structures().len() as u32
+    );
     rows.extend_from_slice(cast_slice(&two.top().nodes));
     constants.instance_firsts_begin = rows.len() as u32;
     debug_assert_eq!(

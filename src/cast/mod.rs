@@ -41,7 +41,7 @@ use crate::{
     accel::{
         Query,
         kdtree::{Traversal, TraversalLinks},
-        two_level::TreesId,
+        two_level::StructuresId,
         wide_bvh::WideBvh,
     },
     buffers::{AccelBuffers, CastResources, ResumePass, hidden_words},
@@ -78,7 +78,7 @@ pub struct GpuCaster {
     /// The triangles and their acceleration structure, which may also be a grid.
     tree: AccelBuffers,
     /// What tells the trees of geometries from others; none without instances.
-    trees_id: Option<TreesId>,
+    structures_id: Option<StructuresId>,
     bindings: Arc<BindingLayout>,
     traversal: Traversal,
     /// The kernel for [`Query::Closest`], created at its first use.
@@ -105,7 +105,7 @@ impl GpuCaster {
             rays_per_batch: RAYS_PER_BATCH.min(most_rays(context.limits())),
             context: Arc::clone(context),
             tree: buffers,
-            trees_id: geometry.accel().trees_id(),
+            structures_id: geometry.accel().structures_id(),
             bindings,
             traversal,
             closest: None,
@@ -133,7 +133,7 @@ impl GpuCaster {
     /// The world was not made of this caster's, or memory runs out. Then nothing has changed.
     pub fn set_world(&mut self, world: &World) -> Result<(), GpuError> {
         let geometry = world.geometry();
-        check_trees(self.trees_id.as_ref(), geometry)?;
+        check_structures(self.structures_id.as_ref(), geometry)?;
         let mut tree = self.tree.clone();
         tree.set_instances(&self.context, geometry)?;
         self.resources = self.resources.with_accel(&self.bindings, &tree)?;
@@ -241,9 +241,9 @@ pub(crate) fn check_repetitions(n_times: u32) -> Result<(), BadOptions> {
     check("n_times", n_times, n_times <= MOST_REPETITIONS, || format!("at most {MOST_REPETITIONS}"))
 }
 
-/// Checks that a world differs in its instances at most. `trees_id`: that of the world before.
-fn check_trees(trees_id: Option<&TreesId>, geometry: Geometry) -> Result<(), GpuError> {
-    let is_same = trees_id.is_some() && trees_id == geometry.accel().trees_id().as_ref();
+/// Checks that a world differs in its instances at most. `structures_id`: that of the world before.
+fn check_structures(structures_id: Option<&StructuresId>, geometry: Geometry) -> Result<(), GpuError> {
+    let is_same = structures_id.is_some() && structures_id == geometry.accel().structures_id().as_ref();
     let wrong = || Mismatch::Scene("the world has other geometries than the caster's".to_owned());
     if is_same { Ok(()) } else { Err(wrong().into()) }
 }
@@ -306,7 +306,7 @@ impl<'a> CpuCaster<'a> {
     /// # Errors
     /// The world was not made of this caster's.
     pub fn set_world(&mut self, world: &World) -> Result<(), GpuError> {
-        check_trees(self.geometry().accel().trees_id().as_ref(), world.geometry())?;
+        check_structures(self.geometry().accel().structures_id().as_ref(), world.geometry())?;
         self.held = Held::Kept(world.clone());
         Ok(())
     }

@@ -59,7 +59,7 @@ impl<'a> FastTracer<'a> {
     pub fn at_level(inputs: &KernelInputs<impl ReadCounter>, search: impl Into<CpuSearch<'a>>, level: Level) -> Self {
         match search.into() {
             CpuSearch { wide: Some(bvh), .. } => Self::Wide(WideTraverser::new(bvh, level)),
-            CpuSearch { traversal: Traversal::Stack, .. } if inputs.lattice.is_none() => {
+            CpuSearch { traversal: Traversal::Stack, .. } if inputs.n_grid_levels == 0 => {
                 Self::Packets(PacketTraverser::new(level))
             }
             CpuSearch { traversal, .. } => Self::Single(Traverser::new(inputs, traversal)),

@@ -249,11 +249,7 @@ fn searching(
     traversal: Traversal,
     tests: impl IntoIterator<Item = Constant<bool>>,
 ) -> Shader {
-    let accel = match bindings.value(constants::GRID_LEVELS) {
-        0 => AccelKind::KdTree,
-        1 => AccelKind::Grid,
-        _ => AccelKind::Grid2,
-    };
+    let accel = AccelKind::of_grid_levels(bindings.value(constants::GRID_LEVELS));
     let search = Search::of(accel, traversal).module().expect("kernels have all searches of devices");
     let kind = match is_set(bindings, [constants::INSTANCED]) {
         true => "_instances", // which have all tests
@@ -312,7 +308,7 @@ mod tests {
     fn every_traversal_has_its_modules() {
         for (kernel, n_of_each) in [("cast", 1), ("path_trace", 2), ("shadow", 2), ("trace", 2)] {
             let modules: Vec<_> = modules_of(kernel).map(|module| module.file).collect();
-            let n_modules = n_of_each * (Traversal::ALL.len() + 1) + Traversal::ALL.len();
+            let n_modules = (n_of_each + 1) * (Traversal::ALL.len() + 1);
             assert_eq!(modules.len(), n_modules, "{kernel}: those of the grid, too, and of instances");
             for search in Search::all(false) {
                 let file = format!("{kernel}_{}.comp", search.module().unwrap());

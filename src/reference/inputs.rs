@@ -69,7 +69,7 @@ pub struct KernelInputs<'a, R = NoCounter> {
     pub kd_boxes: CountedSlice<'a, KdBox, R>,
     /// Six for each node, or none at all if the traversal does not use them.
     pub kd_ropes: CountedSlice<'a, KdRope, R>,
-    /// The lattice of a grid's upper cells; `None` for a kd-tree.
+    /// The lattice of a grid's upper cells; `None` for a kd-tree, and outside of instances.
     pub lattice: Option<&'a Lattice>,
     /// The cells of a grid (see [`Grid::cells`]); empty for a kd-tree.
     pub grid_cells: CountedSlice<'a, GridCell, R>,
@@ -93,21 +93,23 @@ impl<'a, R: Copy> KernelInputs<'a, R> {
     /// Returns the inputs of the search through an instance's geometry.
     pub fn of_instance(&self, Instanced { instances, two }: &Instanced<'a>, instance: &'a Instance) -> Self {
         let geometry_ix = instance.geometry_ix as usize;
-        let tree = &two.trees()[geometry_ix];
+        let structure = &*two.structures()[geometry_ix];
         let nodes = two.node_begins()[geometry_ix]..two.node_begins()[geometry_ix + 1];
-        let constants = tree.constants();
+        let constants = structure.constants();
         Self {
             box_min: constants.box_min,
             box_max: constants.box_max,
             origin_reach: constants.origin_reach,
             triangles: instances.ranges[geometry_ix].of(self.triangles),
-            kd_nodes: self.kd_nodes.with_items(tree.nodes()),
-            kd_parents: self.kd_parents.with_items(tree.parents()),
-            leaf_triangles: self.leaf_triangles.with_items(tree.leaf_triangles()),
-            leaf_planes: tree.leaf_planes(),
-            kd_slabs: self.kd_slabs.with_items(tree.slabs()),
+            kd_nodes: self.kd_nodes.with_items(structure.nodes()),
+            kd_parents: self.kd_parents.with_items(structure.parents()),
+            leaf_triangles: self.leaf_triangles.with_items(structure.leaf_triangles()),
+            leaf_planes: structure.leaf_planes(),
+            kd_slabs: self.kd_slabs.with_items(structure.slabs()),
             kd_boxes: self.kd_boxes.part(nodes.clone()),
             kd_ropes: self.kd_ropes.part(6 * nodes.start..6 * nodes.end),
+            lattice: structure.as_grid().map(Grid::lattice),
+            grid_cells: self.grid_cells.with_items(structure.cells()),
             inside: Some(instance),
             ..*self
         }
@@ -241,7 +243,8 @@ impl<'a> KernelInputs<'a> {
                 let origin_reach = two.origin_reach();
                 let constants = AccelConstants { box_min, box_max, origin_reach, ..AccelConstants::default() };
                 let instanced = geometry.instances().map(|instances| Instanced { instances, two });
-                Self { instanced, ..Self::without_accel(triangles, &constants) }
+                let n_grid_levels = two.n_grid_levels();
+                Self { instanced, n_grid_levels, ..Self::without_accel(triangles, &constants) }
             }
         }
     }

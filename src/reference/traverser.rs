@@ -59,7 +59,7 @@ impl Traverser {
     /// grid ignores it.
     pub fn new(inputs: &KernelInputs<impl ReadCounter>, traversal: Traversal) -> Self {
         match traversal {
-            _ if inputs.lattice.is_some() => Self::Grid,
+            _ if inputs.n_grid_levels > 0 => Self::Grid,
             Traversal::Mask => Self::Mask(Pending::new()),
             Traversal::MaskBoxes => Self::MaskBoxes(Pending::new()),
             Traversal::Restart => Self::Restart(Pending::new()),

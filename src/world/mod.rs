@@ -128,15 +128,12 @@ impl World {
     ) -> Result<Self, Mismatch> {
         check::check(&scene)?;
         options.check().map_err(Mismatch::AccelOptions)?;
-        let accel = match (&scene.instances, options) {
-            (Some(Instances { ranges, list, .. }), AccelOptions::KdTree(options)) => {
+        let accel = match &scene.instances {
+            Some(Instances { ranges, list, .. }) => {
                 let two = TwoLevel::build(&scene.triangles, ranges, list, options, progress);
                 Accel::TwoLevel(Box::new(two))
             }
-            (Some(_), AccelOptions::Grid(_)) => {
-                return Err(Mismatch::AccelOptions("instances are in kd-trees only".to_owned()));
-            }
-            (None, _) => Accel::new_observed(&scene.triangles, options, progress),
+            None => Accel::new_observed(&scene.triangles, options, progress),
         };
         Ok(Self::of_parts(scene, accel, options.clone()))
     }
@@ -218,15 +215,16 @@ impl World {
             (Accel::KdTree(tree), AccelOptions::KdTree(options)) => {
                 Statistics::KdTree(tree.statistics(scene.triangles.len(), options))
             }
-            (Accel::TwoLevel(two), AccelOptions::KdTree(options)) => Statistics::KdTree(two.statistics(options)),
+            (Accel::TwoLevel(two), options) => two.statistics(options),
             (Accel::Grid(grid), _) => Statistics::Grid(grid.statistics(&scene.triangles)),
-            (Accel::KdTree(_) | Accel::TwoLevel(_), AccelOptions::Grid(_)) => {
+            (Accel::KdTree(_), AccelOptions::Grid(_)) => {
                 unreachable!("a world's structure is of its options' kind")
             }
         }
     }
 
-    /// The report of the first device that has built the world's grid, if there is one.
+    /// The report of the first device that has built the world's grid, if there is one. The host builds the grids of
+    /// instances.
     pub fn grid_build(&self) -> Option<&DeviceBuild> {
         match &self.0.accel {
             Accel::KdTree(_) | Accel::TwoLevel(_) => None,

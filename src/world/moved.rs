@@ -1,5 +1,5 @@
 //! Worlds whose instances have changed: other places, materials, or rays that meet them. Everything else is shared with
-//! the world before: triangles, textures, and the kd-trees of the geometries. Only the hierarchy is built.
+//! the world before: triangles, textures, and the structures of the geometries. Only the hierarchy is built.
 
 use std::{
     collections::HashMap,
@@ -76,8 +76,8 @@ impl World {
                 if before.fixed.binary_search(&update.instance_ix).is_ok() {
                     return Err(wrong("its triangles are stored in the world, so it cannot move".to_owned()));
                 }
-                let of_tree = &two.trees()[instance.geometry_ix as usize];
-                place(instance, transform, [of_tree.box_min(), of_tree.box_max()]).map_err(wrong)?;
+                let bounds = two.structures()[instance.geometry_ix as usize].bounds();
+                place(instance, transform, bounds).map_err(wrong)?;
             }
             if let Some(rays) = update.rays {
                 instance.flags = instance.flags & INSTANCE_MIRRORED | flags_of(rays);
@@ -99,8 +99,8 @@ impl World {
     /// Returns whether both worlds differ in their instances at most: one was made of the other by
     /// [`World::with_instances_changed`].
     pub fn shares_geometries(&self, other: &Self) -> bool {
-        let trees = self.accel().trees_id();
-        Arc::ptr_eq(&self.0, &other.0) || trees.is_some() && trees == other.accel().trees_id()
+        let own = self.accel().structures_id();
+        Arc::ptr_eq(&self.0, &other.0) || own.is_some() && own == other.accel().structures_id()
     }
 }
 

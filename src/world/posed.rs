@@ -1,5 +1,5 @@
 //! Worlds of a scene whose meshes are deformed and whose instances, lights and camera have moved. They share the
-//! textures with the world before, and the kd-trees of meshes that keep their shapes.
+//! textures with the world before, and the structures of meshes that keep their shapes.
 
 use super::{
     FlatScene, Instances, Mismatch, World,
@@ -9,26 +9,24 @@ use super::{
     instances::Kept,
 };
 use crate::{
-    accel::{Accel, AccelOptions},
+    accel::Accel,
     scene::{Scene, Transform},
 };
 
 impl World {
     /// Returns the world of a scene that differs from this one's only in its camera and lights, the transforms of its
     /// instances, and the vertices, normals and tangents of some meshes. `deformed`: the indices of these meshes, in
-    /// ascending order. Only their kd-trees and the hierarchy are built. Returns `None` if this world is flattened, if
-    /// an instance needs a geometry in world space, or if the scene differs in more.
+    /// ascending order. Only their structures and the hierarchy are built. Returns `None` if this world is flattened,
+    /// if an instance needs a geometry in world space, or if the scene differs in more.
     ///
     /// # Errors
     /// The scene's parts do not fit together, or a vertex is too far from the origin.
     pub(crate) fn posed(&self, scene: &Scene, deformed: &[usize]) -> Result<Option<Self>, Mismatch> {
-        let (Accel::TwoLevel(two), AccelOptions::KdTree(options)) = (self.accel(), self.accel_options()) else {
-            return Ok(None);
-        };
+        let Accel::TwoLevel(two) = self.accel() else { return Ok(None) };
         let Some((flat, changed)) = self.scene().posed(scene, deformed)? else { return Ok(None) };
         check(&flat)?;
         let instances = flat.instances.as_ref().expect("a world of instances");
-        let two = two.deformed(&changed, (&flat.triangles, &instances.ranges), &instances.list, options);
+        let two = two.deformed(&changed, (&flat.triangles, &instances.ranges), &instances.list, self.accel_options());
         let accel = Accel::TwoLevel(Box::new(two));
         Ok(Some(Self::of_parts(flat, accel, self.accel_options().clone())))
     }

@@ -21,7 +21,7 @@ fn ray(origin: Vec3, direction: Vec3) -> Ray {
 }
 
 /// Rays from everywhere around some instances, most of them at one of them.
-fn rays_at(transforms: &[Transform], n: usize) -> Vec<Ray> {
+pub fn rays_at(transforms: &[Transform], n: usize) -> Vec<Ray> {
     let mut random = Random(7);
     let mut rays = Vec::with_capacity(n);
     while rays.len() < n {
@@ -35,7 +35,7 @@ fn rays_at(transforms: &[Transform], n: usize) -> Vec<Ray> {
 }
 
 /// The number of hits.
-fn n_hits(hits: &[Hit]) -> usize {
+pub fn n_hits(hits: &[Hit]) -> usize {
     hits.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count()
 }
 

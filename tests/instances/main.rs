@@ -4,6 +4,7 @@
 mod support;
 
 mod casts;
+mod grids;
 mod masks;
 mod memory;
 mod moved;

@@ -40,11 +40,11 @@ fn scene() -> Scene {
     scene
 }
 
-fn options() -> RenderOptions {
+pub fn options() -> RenderOptions {
     RenderOptions { width: 96, height: 72, max_depth: 4, denoise: Denoise::Off, ..RenderOptions::default() }
 }
 
-fn on_device(context: &Arc<Context>, world: &World, options: &RenderOptions) -> Picture {
+pub fn on_device(context: &Arc<Context>, world: &World, options: &RenderOptions) -> Picture {
     let mut renderer = GpuRenderer::new(context.clone(), world, options).expect("a renderer");
     let picture = renderer.render().expect("a frame").0;
     assert_silent(context);
@@ -87,10 +87,9 @@ fn instances_look_like_their_flattened_copies() {
     assert_alike("device and CPU", &pictures[0], &on_device, 0.01);
 }
 
-#[test]
-fn paths_through_instances_are_those_through_their_copies() {
+/// The scene, lit by triangles that shine, in two instances, and by a point.
+pub fn scene_of_lamps() -> Scene {
     let mut scene = scene();
-    // Triangles that shine, in two instances.
     let lamp = Material { name: "lamp".to_owned(), ke: Vec3::new(6.0, 5.0, 4.0), ..Material::default() };
     scene.materials.push(lamp);
     scene.meshes.push(mesh_of(&ball()));
@@ -101,6 +100,12 @@ fn paths_through_instances_are_those_through_their_copies() {
         scene.instances.push(Instance { mesh_ix: scene.meshes.len() - 1, transform, materials, ..Instance::default() });
     }
     scene.lights = vec![Light::Point { position: Vec3::new(2.0, 2.5, 3.0), intensity: Vec3::ONE }];
+    scene
+}
+
+#[test]
+fn paths_through_instances_are_those_through_their_copies() {
+    let scene = scene_of_lamps();
     let (kept, flat) = (kept(&scene), flattened(&scene));
     let context = device();
     let options = RenderOptions { integrator: Integrator::Path, primary: Primary::Trace, ..options() };

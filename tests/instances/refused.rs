@@ -2,7 +2,7 @@
 
 use glam::{DMat4, DQuat, DVec3, DVec4, Vec3};
 use kdray::{
-    accel::{AccelOptions, Query, grid::GridOptions, kdtree::BuildOptions, kdtree::Traversal},
+    accel::{Query, kdtree::BuildOptions, kdtree::Traversal},
     cast::{NO_TRIANGLE, Ray, cast_on_cpu},
     layout::Instance,
     scene::Transform,
@@ -45,8 +45,6 @@ fn instances_that_do_not_fit_together_are_refused() {
         let error = World::of_flat(changed, &BuildOptions::default()).expect_err("a refusal").to_string();
         assert!(error.contains(expected), "{error}, not {expected}");
     }
-    let error = World::with_accel(flat, &AccelOptions::Grid(GridOptions::uniform())).expect_err("a refusal");
-    assert_eq!(error.to_string(), "instances are in kd-trees only");
 }
 
 #[test]

@@ -44,10 +44,21 @@ struct GridWalk {
     float t_exit;
 };
 
+// The grid of the geometry that is searched, with INSTANCED: the lattice of its upper level, and its first cell.
+Lattice entered_lattice;
+uint entered_cell;
+
 // The lattice of the uniform grid, or of the upper level.
 Lattice upper_lattice() {
+    if (INSTANCED) return entered_lattice;
     uvec3 n_cells = uvec3(accel.n_cells_x, accel.n_cells_y, accel.n_cells_z);
     return Lattice(accel.box_min, accel.cell_size, accel.box_max, n_cells);
+}
+
+// The index of the upper level's first cell in grid_cells.
+uint upper_cell() {
+    if (INSTANCED) return entered_cell;
+    return 0u;
 }
 
 // Packs a cube's indices, which are below GRID_MAX_RESOLUTION, into 10 bits each.
@@ -105,7 +116,7 @@ void enter_lattice(TraversalRay ray, inout GridWalk walk) {
 GridWalk enter_grid(TraversalRay ray) {
     GridWalk walk;
     walk.lattice = upper_lattice();
-    walk.first_cell = 0u;
+    walk.first_cell = upper_cell();
     walk.upper_cube = IN_UPPER_LEVEL;
     walk.t_enter = ray.t_enter;
     walk.t_exit = min(ray.t_exit, LARGEST_T);
@@ -135,7 +146,7 @@ void enter_block(TraversalRay ray, GridCell block, inout GridWalk walk) {
 // Goes back to the cube of the upper level whose block the ray is in.
 void leave_block(TraversalRay ray, inout GridWalk walk) {
     walk.lattice = upper_lattice();
-    walk.first_cell = 0u;
+    walk.first_cell = upper_cell();
     walk.cube = unpack_cube(walk.upper_cube);
     walk.upper_cube = IN_UPPER_LEVEL;
     walk.t_next = exits_of(walk.lattice, ray, walk.cube);
@@ -222,13 +233,13 @@ uint suspend_in_grid(GridWalk walk, Visit visit, Nearest best) {
 void resume_in_grid(TraversalRay ray, out GridWalk walk, out Visit visit, out Nearest best) {
     SuspendedRay state = suspended_rays[resumed_slot];
     walk.lattice = upper_lattice();
-    walk.first_cell = 0u;
+    walk.first_cell = upper_cell();
     walk.upper_cube = IN_UPPER_LEVEL;
     walk.t_exit = min(ray.t_exit, LARGEST_T);
     if (state.siblings_done.x != IN_UPPER_LEVEL) {
         walk.upper_cube = state.siblings_done.x;
         uvec3 upper = unpack_cube(walk.upper_cube);
-        uvec2 block = load_grid_cells(cell_ix_of(walk.lattice, upper));
+        uvec2 block = load_grid_cells(walk.first_cell + cell_ix_of(walk.lattice, upper));
         walk.t_exit = min(least_of(exits_of(walk.lattice, ray, upper)), walk.t_exit);
         walk.lattice = lattice_within(walk.lattice, upper, block.y);
         walk.first_cell = block.x;

@@ -7,8 +7,8 @@
 // it another ray than that of the world. The box of each instance has a margin for that (src/accel/top_level.rs), so
 // that an instance is entered whenever the transformed ray can have a hit in it.
 //
-// Needs scene.glsl, search/suspended_rays.glsl, search/steps.glsl and search/traversal_ray.glsl, TESTS_BLENDED and
-// FROM_CAMERA. Provides `TopCell`, `TopRay`, `top_ray`,
+// Needs scene.glsl, search/suspended_rays.glsl, search/steps.glsl, search/traversal_ray.glsl, grid/grid.glsl,
+// TESTS_BLENDED and FROM_CAMERA. Provides `TopCell`, `TopRay`, `top_ray`,
 // `top_node_at`, `kind_of_rays`, `find_instance`, `leave_node` and `in_geometry`.
 
 // A node, and the pending siblings above it. NO_TRIANGLE in place of the node: nothing is left.
@@ -130,6 +130,11 @@ PathRay in_geometry(uint instance_ix, PathRay ray, out float inv_scale) {
     entered = Extent(
         low.xyz, low.w, high.xyz, high.w, floatBitsToUint(rest.x), floatBitsToUint(rest.y), floatBitsToUint(rest.z)
     );
+    if (TRAVERSAL == TRAVERSAL_GRID) {
+        vec4 grid = load_instance_rows(at + 3u);
+        entered_lattice = Lattice(low.xyz, grid.w, high.xyz, floatBitsToUint(grid.xyz));
+        entered_cell = floatBitsToUint(rest.w);
+    }
     precise vec3 offset = ray.origin - instance_row(instance_ix, 3u).xyz;
     ray.origin = local_vector(instance_ix, offset);
     ray.direction = local_vector(instance_ix, ray.direction);

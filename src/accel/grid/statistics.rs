@@ -8,7 +8,7 @@ use crate::layout::{GridCell, Plane};
 /// Statistics of a grid.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Statistics {
-    /// The number of cells of the upper level along x, y and z.
+    /// The number of cells of the upper level along x, y and z. Of the grids of several geometries, the greatest.
     pub resolution: [u32; 3],
     /// The number of levels of cells, 1 or 2.
     pub n_levels: u32,
@@ -24,7 +24,8 @@ pub struct Statistics {
     /// References divided by the number of triangles; 0 if there are no triangles.
     pub references_per_triangle: f64,
     /// The number of times that the cells' edges were doubled to keep to the limits of memory. With two levels, this
-    /// is the number of the upper level's doublings plus that of the halvings of all blocks' resolutions.
+    /// is the number of the upper level's doublings plus that of the halvings of all blocks' resolutions. Of several
+    /// grids, the greatest.
     pub n_coarser: u32,
     /// Size of cells, entries and their planes as the host stores them, bytes.
     pub bytes: u64,
