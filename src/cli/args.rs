@@ -518,7 +518,7 @@ impl RenderArgs {
 impl CastArgs {
     /// Refuses arguments that contradict each other.
     pub fn check(&self) -> Result<(), CliError> {
-        check_accel(self.accel, self.traversal, self.build, self.instances)?;
+        check_accel(self.accel, self.traversal, self.build)?;
         require_ending(&self.output, "npz", "a file of hits")
     }
 

@@ -124,16 +124,8 @@ fn primary_long_help() -> String {
 }
 
 /// Refuses arguments for kd-trees if the structure is a grid.
-pub fn check_accel(
-    accel: AccelKind,
-    traversal: OrAuto<Traversal>,
-    build: BuildPolicy,
-    instances: Instancing,
-) -> Result<(), CliError> {
+pub fn check_accel(accel: AccelKind, traversal: OrAuto<Traversal>, build: BuildPolicy) -> Result<(), CliError> {
     check_traversal(accel, traversal.pinned())?;
-    if accel != AccelKind::KdTree && instances == Instancing::Keep {
-        return Err(CliError::Usage(format!("--instances keep needs kd-trees, not --accel {accel}")));
-    }
     if accel != AccelKind::KdTree && build != BuildPolicy::Auto {
         return Err(CliError::Usage(format!("--build chooses a kd-tree: with --accel {accel}, a grid is built")));
     }
@@ -205,7 +197,7 @@ pub fn traversals_of_devices() -> String {
 impl PictureArgs {
     /// Refuses arguments that contradict each other.
     pub fn check(&self) -> Result<(), CliError> {
-        check_accel(self.accel, self.traversal, self.build, self.instances)?;
+        check_accel(self.accel, self.traversal, self.build)?;
         if let (Some(word @ (DenoiseWord::Off | DenoiseWord::Edge)), Some(_)) = (self.denoise, self.denoise_threshold) {
             let word = if word == DenoiseWord::Off { "off" } else { "edge" };
             return Err(CliError::Usage(format!("--denoise-threshold has no meaning with --denoise {word}")));

@@ -250,7 +250,7 @@ impl Builder {
         if let Work::Pictures { n_samples, n_at_once, .. } = *work {
             self.require_for_pictures(&options, n_samples, n_at_once)?;
         }
-        let keeps_instances = self.request.accel == AccelKind::KdTree && self.request.instances.keeps(&scene);
+        let keeps_instances = self.request.instances.keeps(&scene);
         let n_built = if keeps_instances { scene.n_stored() } else { scene.n_triangles() };
         let workload = work.workload(&scene, &options);
         let accel = self.request.choose_accel(self.processor, scene.n_triangles(), &workload);

@@ -344,20 +344,20 @@ fn kept_instances_have_the_hits_of_flattened_ones() {
     let shifted = RAYS.map(|[x, y, z, u, v, w, t_min, t_max]| [x + 4.0, 1.0 - y, z, u, v, w, t_min, t_max]);
     save(&path("rays.npy"), &[RAYS, shifted].concat());
     for device in [&[][..], &["--cpu"]] {
-        for kind in ["flatten", "keep"] {
-            let out = format!("{kind}.npz");
-            let arguments = ["cast", "scene.toml", "rays.npy", "-o", &out, "--instances", kind];
+        for (kind, accel) in [("flatten", "kdtree"), ("keep", "kdtree"), ("keep", "grid"), ("keep", "grid2")] {
+            let out = format!("{kind} {accel}.npz");
+            let arguments = ["cast", "scene.toml", "rays.npy", "-o", &out, "--instances", kind, "--accel", accel];
             succeed(directory.path(), &[&arguments[..], device].concat());
         }
-        let of = |kind: &str| {
-            let path = path(&format!("{kind}.npz"));
+        let of = |name: &str| {
+            let path = path(&format!("{name}.npz"));
             let (normals, uvs) = (load::<f32>(&path, "primitive_normals"), load::<f32>(&path, "primitive_uvs"));
             (load::<f32>(&path, "t_hit"), load::<u32>(&path, "primitive_ids"), normals, uvs)
         };
-        assert_eq!(of("keep"), of("flatten"));
-        let ids = ["keep", "flatten"].map(|kind| load::<u32>(&path(&format!("{kind}.npz")), "instance_ids").1);
-        assert!(ids[0] == ids[1] && ids[0].contains(&1), "rays hit the second instance");
+        for kept in ["keep kdtree", "keep grid", "keep grid2"] {
+            assert_eq!(of(kept), of("flatten kdtree"), "{kept}");
+            let ids = [kept, "flatten kdtree"].map(|name| load::<u32>(&path(&format!("{name}.npz")), "instance_ids").1);
+            assert!(ids[0] == ids[1] && ids[0].contains(&1), "rays hit the second instance");
+        }
     }
-    let grid = ["cast", "scene.toml", "rays.npy", "-o", "x.npz", "--instances", "keep", "--accel", "grid"];
-    fail(directory.path(), &grid, 2, "--instances keep needs kd-trees");
 }

@@ -71,8 +71,8 @@ fn frames_of_an_animation_are_pictures_at_their_times() {
         let directory = with_model(morphs);
         let path = directory.path();
         for device in ["--cpu", "--validate"] {
-            for instances in ["flatten", "keep"] {
-                let common = [&SMALL[..], &[device, "--instances", instances]].concat();
+            for (instances, accel) in [("flatten", "kdtree"), ("keep", "kdtree"), ("keep", "grid2")] {
+                let common = [&SMALL[..], &[device, "--instances", instances, "--accel", accel]].concat();
                 let render = |more: &[&str]| succeed(path, &[&["render", "moving.gltf"], &common[..], more].concat());
                 render(&["--frames", "0-4", "--fps", "2", "-o", "f#.png"]);
                 render(&["--frames", "3", "--fps", "2", "-o", "alone#.png"]);
@@ -80,7 +80,7 @@ fn frames_of_an_animation_are_pictures_at_their_times() {
                 render(&["--frame", "3", "--fps", "2", "-o", "frame.png"]);
                 let at = pixels(&path.join("at.png"));
                 for same in ["f3.png", "alone3.png", "frame.png"] {
-                    assert!(pixels(&path.join(same)) == at, "{same}, {device} {instances} {morphs}");
+                    assert!(pixels(&path.join(same)) == at, "{same}, {device} {instances} {accel} {morphs}");
                 }
                 let frames = [0, 1, 2, 3, 4].map(|frame| pixels(&path.join(format!("f{frame}.png"))));
                 assert!(frames.windows(2).all(|pair| pair[0] != pair[1]), "something moves in each frame");

@@ -8,7 +8,6 @@ use std::{
 };
 
 use kdray::{
-    accel::AccelKind,
     engine::{
         AnimatedWorld, Engine, LoadRequest, Loaded, NoiseGoal, Opened, Work,
         choices::{Choices, ChosenAccel, Methods},
@@ -240,7 +239,7 @@ impl<'a> Session<'a> {
         let building = engine.builder().describe(n_triangles);
         // What moves is stored apart from what does not.
         let mut request = args.picture.request();
-        if is_animated && request.instances == Instancing::Auto && request.accel == AccelKind::KdTree {
+        if is_animated && request.instances == Instancing::Auto {
             request.instances = Instancing::Keep;
             progress.note("meshes are kept apart, since some move; --instances flatten stores them as one");
         }
