@@ -98,7 +98,7 @@ impl FlatScene {
     pub fn new(scene: &Scene) -> Result<Self, Mismatch> {
         check_instances(scene)?;
         if let Some(instance) = scene.instances.iter().position(|instance| instance.rays != RayKinds::ALL) {
-            let what = "some rays pass through it, which needs --instances keep, and kd-trees".to_owned();
+            let what = "some rays pass through it, which needs --instances keep".to_owned();
             return Err(Mismatch::Instance { instance, what });
         }
         let mut parts = Parts { triangles: Vec::with_capacity(scene.n_triangles()), ..Parts::default() };
