@@ -79,6 +79,34 @@ bool resume_outer(out TopCell at, out Nearest best) {
     return is_inside;
 }
 
+// What the search through the instances needs between two of them is in local memory while a ray is in one.
+void spill_world_ray(PathRay ray) {
+    spill_pair(WORLD_RAY_SLOT, ray.origin.x, ray.origin.y);
+    spill_pair(WORLD_RAY_SLOT + 1u, ray.origin.z, ray.direction.x);
+    spill_pair(WORLD_RAY_SLOT + 2u, ray.direction.y, ray.direction.z);
+    spill_pair(LENGTHS_SLOT, 0.0, ray.t_max);
+}
+
+PathRay spilled_world_ray(PathRay ray) {
+    vec2 a = spilled_pair(WORLD_RAY_SLOT), b = spilled_pair(WORLD_RAY_SLOT + 1u), c = spilled_pair(WORLD_RAY_SLOT + 2u);
+    ray.origin = vec3(a, b.x);
+    ray.direction = vec3(b.y, c);
+    return ray;
+}
+
+void spill_top(TopCell at, float t_best, float inv_scale) {
+    spill_words(TOP_CELL_SLOT, uvec2(at.node_ix, at.pending));
+    spill_pair(TOP_LENGTHS_SLOT, t_best, inv_scale);
+}
+
+void load_spilled_top(out TopCell at, out float t_best, out float inv_scale) {
+    uvec2 cell = spilled_words(TOP_CELL_SLOT);
+    at = TopCell(cell.x, cell.y);
+    vec2 lengths = spilled_pair(TOP_LENGTHS_SLOT);
+    t_best = lengths.x;
+    inv_scale = lengths.y;
+}
+
 // Returns the closest hit in (t_min, t_max], or with any_hit one that need not be the closest. The direction has
 // about unit length. A miss has t = t_max. If the ray was suspended, the hit's triangle_ix is its mark. During the
 // search, all t are half of the ray's own (traversal_ray.glsl). Without INSTANCED, the loop has one turn; with it, one
@@ -89,6 +117,7 @@ Hit traverse(PathRay ray_in, float t_min, bool any_hit) {
     bool is_inside = false;
     if (INSTANCED) {
         if (is_resumed()) is_inside = resume_outer(at, best);
+        spill_world_ray(ray_in);
     }
     uint mark = 0u;
     bool goes_on = true;
@@ -99,11 +128,12 @@ Hit traverse(PathRay ray_in, float t_min, bool any_hit) {
         bool searches = true;
         if (INSTANCED) {
             count_iteration();
+            ray = spilled_world_ray(ray_in);
             uint instance_ix = 0u;
             if (is_inside) instance_ix = top_node_at(at.node_ix).link & ~TOP_LEAF;
-            else searches = find_instance(top_ray(ray_in, t_min), best.t, kind_of_rays(any_hit), at, instance_ix);
+            else searches = find_instance(top_ray(ray, t_min), best.t, kind_of_rays(any_hit), at, instance_ix);
             is_inside = false;
-            ray = in_geometry(instance_ix, ray_in, inv_scale);
+            ray = in_geometry(instance_ix, ray, inv_scale);
             ray.t_max = 2.0 * best.t * inv_scale;
             least_t = t_min * inv_scale;
             outer = OuterSearch(at.node_ix, at.pending, best.t, best.triangle_ix);
@@ -111,11 +141,14 @@ Hit traverse(PathRay ray_in, float t_min, bool any_hit) {
         float t_start;
         PathRay ray_near = near_scene(ray, least_t, t_start);
         TraversalRay prepared = traversal_ray(ray_near, least_t);
-        spill_pair(LENGTHS_SLOT, t_start, ray_in.t_max);
+        spill_pair(LENGTHS_SLOT, t_start, INSTANCED ? spilled_pair(LENGTHS_SLOT).y : ray_in.t_max);
         Nearest found = Nearest(0.5 * ray_near.t_max, best.triangle_ix);
+        if (INSTANCED) spill_top(at, best.t, inv_scale);
         if (searches) mark = search(prepared, any_hit, found);
         goes_on = false;
         if (INSTANCED) {
+            load_spilled_top(at, best.t, inv_scale);
+            t_start = spilled_pair(LENGTHS_SLOT).x;
             if (found.triangle_ix != best.triangle_ix && mark == 0u) {
                 // The reciprocal of a power of two.
                 float scale = uintBitsToFloat(0x7f000000u - floatBitsToUint(inv_scale));
