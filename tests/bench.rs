@@ -266,6 +266,31 @@ fn traversal_measures_every_variant_on_every_set() {
 }
 
 #[test]
+fn traversal_measures_instances_beside_the_flattened_scene() {
+    let directory = TempDir::new().unwrap();
+    write_mesh(directory.path());
+    let place = |x: f32| format!("[[mesh]]\nfile = \"torus.obj\"\ntransform = {{ translate = [{x:.1}, 0.0, 0.0] }}\n\n");
+    fs::write(directory.path().join("row.toml"), [-4.0, 0.0, 4.0].map(place).concat()).unwrap();
+    for more in [&[][..], &["--cpu"]] {
+        let suite = ["traversal", "row.toml", "--no-room", "--instances", "--size", "48x24", "--repeat", "2"];
+        let (text, json, _) = measure(directory.path(), &[&suite[..], more].concat());
+        let n_triangles = torus(24, 12).len();
+        let kept = &json["instances"];
+        assert_eq!((kept["n_instances"].as_u64(), kept["n_stored"].as_u64()), (Some(3), Some(n_triangles as u64)));
+        assert_eq!(json["n_triangles"].as_u64(), Some(3 * n_triangles as u64));
+        assert!(kept["bytes"].as_u64() < json["tree"]["bytes"].as_u64() && kept["move_ms"]["median"].is_f64());
+        for set in json["sets"].as_array().unwrap() {
+            let variants = set["variants"].as_array().unwrap();
+            let names: Vec<_> = variants.iter().map(|variant| variant["traversal"].as_str().unwrap()).collect();
+            // All traversals of the kd-tree but brute force.
+            assert_eq!(names.iter().filter(|name| name.ends_with(", instances")).count(), Traversal::ALL.len() - 1);
+            assert!(set["n_hits"].as_u64() > Some(0) && names.iter().all(|name| text.contains(name)));
+            assert!(variants.iter().all(|variant| variant["n_differing"] == 0), "{set}");
+        }
+    }
+}
+
+#[test]
 fn paper_measures_the_four_scenes_beside_the_papers_times() {
     let directory = TempDir::new().unwrap();
     let scene = "[[mesh]]\ngenerator = \"box\"\nsize = [1.0, 1.0, 1.0]\n\n[render]\nmax_depth = 2\n";
@@ -295,12 +320,13 @@ fn paper_measures_the_four_scenes_beside_the_papers_times() {
 fn mistakes_are_told_in_one_line_before_anything_is_measured() {
     let directory = TempDir::new().unwrap();
     write_mesh(directory.path());
-    let cases: [(&[&str], i32, &str); 11] = [
+    let cases: [(&[&str], i32, &str); 12] = [
         (&[], 2, "paper"),
         (&["pilot"], 2, "pilot"),
         (&["traversal"], 2, "MESH"),
         (&["traversal", "torus.obj", "--variants", "mask,rope"], 2, "`rope`"),
         (&["traversal", "torus.obj", "--cpu", "--device", "0"], 2, "--device"),
+        (&["traversal", "torus.obj", "--instances"], 2, "--no-room"),
         (&["traversal", "torus.obj", "--json", "x", "--svg", "x"], 2, "same file"),
         (&["paper", "--no-cpu", "--cpu-repeat", "2"], 2, "--cpu-repeat"),
         (&["traversal", "none.obj"], 3, "none.obj"),

@@ -16,22 +16,53 @@ use super::{
 use crate::{
     accel::{
         Query, Search,
-        kdtree::{Statistics, Traversal},
+        kdtree::{Statistics, Traversal, TraversalLinks},
     },
     cast::{GpuCaster, Ray, cast_ray},
     cpu::{self, CpuSearch},
     gpu::{Device, GpuError, Statistic, StatisticValue},
     layout::{Hit, NO_TRIANGLE},
-    reference::counting::steps::{Steps, count_steps},
+    reference::{
+        counting::steps::{Steps, count_steps},
+        inputs::KernelInputs,
+    },
+    scene::{Instance, Scene},
+    world::{InstanceUpdate, Mismatch, World},
 };
 
 /// Number of timed casts of one variant before the next variant's turn.
 pub const CASTS_PER_TURN: u16 = 5;
 
+/// A search through the stage's scene, or through the same scene as geometries and instances.
+struct Variant<'a> {
+    search: Search,
+    /// None: the stage's scene.
+    kept: Option<Kept<'a>>,
+}
+
+/// A scene whose meshes are stored once, and what the search through it reads beside the trees.
+struct Kept<'a> {
+    world: &'a World,
+    links: TraversalLinks,
+}
+
+impl Variant<'_> {
+    fn name(&self) -> String {
+        format!("{}{}", self.search, if self.kept.is_some() { ", instances" } else { "" })
+    }
+
+    fn inputs<'a>(&'a self, stage: &'a Stage) -> KernelInputs<'a> {
+        match &self.kept {
+            Some(kept) => KernelInputs::of_geometry(kept.world.geometry()).with_links(&kept.links),
+            None => stage.inputs_of(self.search),
+        }
+    }
+}
+
 /// The variants on one stage, ready for rays.
 pub struct Tracers<'a> {
     stage: &'a Stage,
-    variants: &'a [Search],
+    variants: Vec<Variant<'a>>,
     /// One caster per variant; `None` if the CPU casts with all threads of the current rayon pool.
     casters: Option<Vec<GpuCaster>>,
 }
@@ -41,11 +72,30 @@ impl<'a> Tracers<'a> {
     ///
     /// # Errors
     /// Fails as [`GpuCaster::new`] does.
-    pub fn new(device: Option<&Device>, stage: &'a Stage, variants: &'a [Search]) -> Result<Self, GpuError> {
+    pub fn new(device: Option<&Device>, stage: &'a Stage, variants: &[Search]) -> Result<Self, GpuError> {
         let caster =
             |device: &Device, variant: Search| GpuCaster::new(device, stage.geometry(variant), variant.traversal());
         let casters = device.map(|device| variants.iter().map(|&variant| caster(device, variant)).collect());
-        Ok(Self { stage, variants, casters: casters.transpose()? })
+        let casters = casters.transpose()?;
+        let variants = variants.iter().map(|&search| Variant { search, kept: None }).collect();
+        Ok(Self { stage, variants, casters })
+    }
+
+    /// Adds the searches through kd-trees once more, through the geometries and instances of the stage's scene.
+    /// `world`: of the same scene, with [`FlatScene::with_instances`](crate::world::FlatScene::with_instances).
+    ///
+    /// # Errors
+    /// Fails as [`GpuCaster::new`] does.
+    pub fn with_instances(mut self, device: Option<&Device>, world: &'a World) -> Result<Self, GpuError> {
+        let searches: Vec<_> = self.variants.iter().map(|variant| variant.search).collect();
+        for search in searches.into_iter().filter(|search| matches!(search, Search::KdTree(_))) {
+            if let (Some(device), Some(casters)) = (device, &mut self.casters) {
+                casters.push(GpuCaster::new(device, world.geometry(), search.traversal())?);
+            }
+            let links = TraversalLinks::of(world.accel(), search.traversal());
+            self.variants.push(Variant { search, kept: Some(Kept { world, links }) });
+        }
+        Ok(self)
     }
 
     /// Casts the rays `n_times` with each variant, in turns, and compares the hits with those that the CPU finds.
@@ -55,7 +105,8 @@ impl<'a> Tracers<'a> {
     pub fn measure(&mut self, set: &RaySet, n_times: u16) -> Result<SetResult, GpuError> {
         let rays: Vec<_> = set.rays.iter().map(cast_ray).collect();
         let query = query_of(set);
-        let expected = self.cast_on_cpu(Search::KdTree(Traversal::Mask), &rays, query);
+        let flat = Variant { search: Search::KdTree(Traversal::Mask), kept: None };
+        let expected = self.cast_on_cpu(&flat, &rays, query);
         let mut results = vec![(Some(Vec::new()), Difference::default()); self.variants.len()];
         let n_warm_up = self.n_warm_up(set)?;
         for n_casts in turns(n_times) {
@@ -67,17 +118,17 @@ impl<'a> Tracers<'a> {
             }
         }
         let result = |(variant_ix, (ms, difference)): (usize, (Option<Vec<f64>>, _))| {
-            let variant = self.variants[variant_ix];
+            let variant = &self.variants[variant_ix];
             let ms = ms.and_then(Spread::of);
             let mrays_per_s = ms.and_then(|ms| ms.mrays_per_s(rays.len() as u64));
-            let inputs = self.stage.inputs_of(variant);
-            let steps = || count_steps(&inputs, variant.traversal(), query, &set.rays);
-            let steps_a_ray = (variant != Search::Wide).then(|| StepsARay::new(&steps(), rays.len()));
+            let inputs = variant.inputs(self.stage);
+            let steps = || count_steps(&inputs, variant.search.traversal(), query, &set.rays);
+            let steps_a_ray = (variant.search != Search::Wide).then(|| StepsARay::new(&steps(), rays.len()));
             let kernel = match &self.casters {
                 Some(casters) => casters[variant_ix].statistics(query)?,
                 None => Vec::new(),
             };
-            Ok(VariantResult { traversal: variant.to_string(), ms, mrays_per_s, difference, steps_a_ray, kernel })
+            Ok(VariantResult { traversal: variant.name(), ms, mrays_per_s, difference, steps_a_ray, kernel })
         };
         Ok(SetResult {
             rays: set.kind,
@@ -122,18 +173,18 @@ impl<'a> Tracers<'a> {
         let mut hits = Vec::new();
         let once = |_| {
             let begin = Instant::now();
-            hits = self.cast_on_cpu(self.variants[variant_ix], rays, query);
+            hits = self.cast_on_cpu(&self.variants[variant_ix], rays, query);
             begin.elapsed().as_secs_f64() * 1e3
         };
         let ms = (0..n_times).map(once).collect();
         Ok((hits, Some(ms)))
     }
 
-    fn cast_on_cpu(&self, variant: Search, rays: &[Ray], query: Query) -> Vec<Hit> {
+    fn cast_on_cpu(&self, variant: &Variant, rays: &[Ray], query: Query) -> Vec<Hit> {
         let mut hits = vec![Hit::zeroed(); rays.len()];
-        let wide = (variant == Search::Wide).then(|| self.stage.world.wide_bvh()).flatten();
-        let search = CpuSearch { traversal: variant.traversal(), wide };
-        cpu::cast(&self.stage.inputs_of(variant), search, query, rays, &mut hits);
+        let wide = (variant.search == Search::Wide).then(|| self.stage.world.wide_bvh()).flatten();
+        let search = CpuSearch { traversal: variant.search.traversal(), wide };
+        cpu::cast(&variant.inputs(self.stage), search, query, rays, &mut hits);
         hits
     }
 }
@@ -162,7 +213,7 @@ pub struct SetResult {
 /// The result of one variant on one set of rays.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct VariantResult {
-    /// The variant's word: a traversal of the kd-tree, or a grid.
+    /// The variant's word: a traversal of the kd-tree, or a grid. Through instances, ", instances" follows.
     pub traversal: String,
     /// Time of the whole set; none where the device has no timestamps.
     pub ms: Option<Spread>,
@@ -227,9 +278,53 @@ pub struct Report {
     pub height: u32,
     pub n_triangles: usize,
     pub tree: Statistics,
+    /// The same scene as geometries and instances, if it was searched.
+    pub instances: Option<InstancesReport>,
     /// Number of timed casts of each set by each variant.
     pub n_times: u16,
     pub sets: Vec<SetResult>,
+}
+
+/// What a scene is as geometries and instances.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct InstancesReport {
+    pub n_instances: usize,
+    /// Number of stored triangles.
+    pub n_stored: usize,
+    /// Size of all kd-trees and of the hierarchy over the instances.
+    pub bytes: u64,
+    /// Time to move all instances: a new hierarchy, on the host.
+    pub move_ms: Spread,
+}
+
+impl InstancesReport {
+    /// Moves all instances of a scene that can move `n_times`, each to where it is. `world`: of the scene, with
+    /// [`FlatScene::with_instances`](crate::world::FlatScene::with_instances).
+    ///
+    /// # Errors
+    /// Fails as [`World::with_instances_changed`] does.
+    pub fn measure(scene: &Scene, world: &World, n_times: u16) -> Result<Self, Mismatch> {
+        let fixed = world.scene().instances.as_ref().map_or(&[][..], |instances| &instances.fixed);
+        let update = |(instance_ix, instance): (usize, &Instance)| InstanceUpdate {
+            instance_ix,
+            transform: Some(instance.transform.clone()),
+            ..InstanceUpdate::default()
+        };
+        let can_move = |update: &InstanceUpdate| fixed.binary_search(&update.instance_ix).is_err();
+        let updates: Vec<_> = scene.instances.iter().enumerate().map(update).filter(can_move).collect();
+        let mut ms = Vec::new();
+        for _ in 0..n_times {
+            let begin = Instant::now();
+            drop(world.with_instances_changed(&updates)?);
+            ms.push(begin.elapsed().as_secs_f64() * 1e3);
+        }
+        Ok(Self {
+            n_instances: scene.instances.len(),
+            n_stored: world.scene().triangles.len(),
+            bytes: world.statistics().bytes(),
+            move_ms: Spread::of(ms).expect("at least one time"),
+        })
+    }
 }
 
 impl Report {

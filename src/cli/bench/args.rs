@@ -96,6 +96,9 @@ pub struct TraversalArgs {
     /// Use the scene's own camera and first light, without a closed room around the scene
     #[arg(long)]
     pub no_room: bool,
+    /// Cast the rays also into the scene's meshes and instances, each mesh stored once, and time moving all instances
+    #[arg(long, requires = "no_room")]
+    pub instances: bool,
     /// Cast on all CPU threads, without Vulkan
     #[arg(long, conflicts_with = "device")]
     pub cpu: bool,

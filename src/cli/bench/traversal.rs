@@ -5,11 +5,11 @@ use kdray::{
     bench::{
         rays::ray_sets,
         stage::Stage,
-        traversal::{Report, SetResult, StepsARay, Tracers, VariantResult},
+        traversal::{InstancesReport, Report, SetResult, StepsARay, Tracers, VariantResult},
     },
     engine::{Opened, choices::TreeKind},
     gpu::{ContextOptions, Device, GpuError},
-    world::FlatScene,
+    world::{FlatScene, World},
 };
 
 use super::args::TraversalArgs;
@@ -29,17 +29,25 @@ pub fn run(args: &TraversalArgs) -> Result<(), CliError> {
     let progress = Progress::new(false, 7);
     let loading = format!("loading {}", args.mesh.display());
     let (opened, _) = progress.stage(&loading, || Opened::read(&args.mesh, &args.load.rays()));
-    let scene = FlatScene::new(&opened?.scene).map_err(GpuError::from)?;
+    let scene = opened?.scene;
+    let kept = args.instances.then(|| FlatScene::with_instances(&scene)).transpose().map_err(GpuError::from)?;
+    let flat = FlatScene::new(&scene).map_err(GpuError::from)?;
 
     let options = ContextOptions::new(args.device.clone(), false);
     let device = if args.cpu { None } else { Some(open_device(&options, &progress)?) };
     let build_options = TreeKind::Best.options(processor(device.as_ref()));
-    let building = format!("building the kd-tree of {} triangles", scene.triangles.len());
-    let (stage, _) = progress.stage(&building, || stage(args, scene, &build_options));
+    let building = format!("building the kd-tree of {} triangles", flat.triangles.len());
+    let (stage, _) = progress.stage(&building, || stage(args, flat, &build_options));
     let (sets, _) = progress.stage("making rays", || ray_sets(&stage));
 
+    let kept = kept.map(|kept| World::of_flat(kept, &build_options)).transpose().map_err(GpuError::from)?;
     let mut tracers = Tracers::new(device.as_ref(), &stage, &variants)?;
     let mut report = empty_report(args, &stage, device.as_ref());
+    if let Some(kept) = &kept {
+        tracers = tracers.with_instances(device.as_ref(), kept)?;
+        let measured = InstancesReport::measure(&scene, kept, args.repeat).map_err(GpuError::from)?;
+        report.instances = Some(measured);
+    }
     for set in &sets {
         let casting = format!("casting {} {} rays", set.rays.len(), set.kind.name());
         let (result, _) = progress.stage(&casting, || tracers.measure(set, args.repeat));
@@ -87,6 +95,7 @@ fn empty_report(args: &TraversalArgs, stage: &Stage, device: Option<&Device>) ->
         height: args.size.height,
         n_triangles,
         tree: stage.tree_statistics(),
+        instances: None,
         n_times: args.repeat,
         sets: Vec::new(),
     }
@@ -97,6 +106,16 @@ fn text(report: &Report) -> String {
     let room = if report.room { " in a closed room" } else { "" };
     let mut text = format!("{}: {} triangles{room}", report.scene, report.n_triangles);
     text += &format!("; kd-tree: {} nodes, depth {}\n", report.tree.n_nodes, report.tree.depth);
+    if let Some(kept) = &report.instances {
+        text += &format!(
+            "As {} instances: {} triangles, kd-trees {:.1} MB beside {:.1} MB; moving all takes {:.2} ms\n",
+            kept.n_instances,
+            kept.n_stored,
+            kept.bytes as f64 / 1e6,
+            report.tree.bytes as f64 / 1e6,
+            kept.move_ms.median
+        );
+    }
     text += &format!("{}x{} on {}", report.width, report.height, report.device);
     text += &report.driver.as_ref().map_or_else(String::new, |driver| format!(", {driver}"));
     text += &format!(", medians of {}\n\n", report.n_times);
