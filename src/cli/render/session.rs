@@ -8,7 +8,6 @@ use std::{
 };
 
 use kdray::{
-    accel::AccelKind,
     engine::{
         AnimatedWorld, Engine, LoadRequest, Loaded, NoiseGoal, Opened, Work,
         choices::{Choices, ChosenAccel, Methods},
@@ -17,7 +16,7 @@ use kdray::{
     gpu::DeviceInfo,
     output::{self, FilmFile, Record, WholeRecord},
     util::progress,
-    world::{World, instances::Instancing},
+    world::World,
 };
 use tracing::info_span;
 
@@ -238,10 +237,9 @@ impl<'a> Session<'a> {
             n_at_once: if draws_whole_frames(engine, views) { engine.devices().count() as u32 } else { 1 },
         };
         let building = engine.builder().describe(n_triangles);
-        // What moves is stored apart from what does not.
-        let mut request = args.picture.request();
-        if is_animated && request.instances == Instancing::Auto && request.accel == AccelKind::KdTree {
-            request.instances = Instancing::Keep;
+        let asked = args.picture.request();
+        let request = if is_animated { asked.for_motion() } else { asked };
+        if request != asked {
             progress.note("meshes are kept apart, since some move; --instances flatten stores them as one");
         }
         let engine = engine
