@@ -25,7 +25,7 @@ use kdray::{
     world::{FlatScene, World},
 };
 use serde_json::Value;
-use support::{device, meshes::torus, scenes};
+use support::{animated::moving, device, meshes::torus, scenes};
 use tempfile::TempDir;
 
 const SIZE: (u32, u32) = (33, 23);
@@ -269,7 +269,8 @@ fn traversal_measures_every_variant_on_every_set() {
 fn traversal_measures_instances_beside_the_flattened_scene() {
     let directory = TempDir::new().unwrap();
     write_mesh(directory.path());
-    let place = |x: f32| format!("[[mesh]]\nfile = \"torus.obj\"\ntransform = {{ translate = [{x:.1}, 0.0, 0.0] }}\n\n");
+    let place =
+        |x: f32| format!("[[mesh]]\nfile = \"torus.obj\"\ntransform = {{ translate = [{x:.1}, 0.0, 0.0] }}\n\n");
     fs::write(directory.path().join("row.toml"), [-4.0, 0.0, 4.0].map(place).concat()).unwrap();
     for more in [&[][..], &["--cpu"]] {
         let suite = ["traversal", "row.toml", "--no-room", "--instances", "--size", "48x24", "--repeat", "2"];
@@ -317,10 +318,37 @@ fn paper_measures_the_four_scenes_beside_the_papers_times() {
 }
 
 #[test]
+fn motion_measures_the_parts_of_frames() {
+    let directory = TempDir::new().unwrap();
+    fs::write(directory.path().join("moving.gltf"), moving(true).to_string()).unwrap();
+    for more in [&[][..], &["--cpu"], &["--instances", "flatten"]] {
+        let suite = ["motion", "moving.gltf", "--size", "32x24", "--frames", "5", "--fps", "2"];
+        let (text, json, svg) = measure(directory.path(), &[&suite[..], more].concat());
+        check_xml(&svg);
+        assert_eq!((json["suite"].as_str(), json["n_frames"].as_u64()), (Some("motion"), Some(5)));
+        assert_eq!(json["keeps_instances"], !more.contains(&"flatten"));
+        let median = |part: &Value| part["ms"]["median"].as_f64().unwrap();
+        let parts = json["parts"].as_array().unwrap();
+        let names: Vec<_> = parts.iter().map(|part| part["name"].as_str().unwrap()).collect();
+        assert_eq!(names, ["pose", "build", "upload", "passes"]);
+        assert!(parts.iter().all(|part| median(part) > 0.0), "{json}");
+        let passes = json["passes"].as_array().unwrap();
+        assert!(passes.iter().any(|pass| pass["name"] == "shade" && median(pass) > 0.0), "{json}");
+        // A frame takes as long as its parts one after the other, and nothing of it is forgotten.
+        let least: f64 = parts.iter().map(|part| part["ms"]["min"].as_f64().unwrap()).sum();
+        let wall = |key: &str| json["wall_ms"][key].as_f64().unwrap();
+        assert!(least <= wall("min"), "{json}");
+        let rate = json["frames_per_s"].as_f64().unwrap();
+        assert!(1e3 / wall("max") <= rate && rate <= 1e3 / wall("min"), "{json}");
+        assert!(text.contains("wall clock") && text.contains("frames a second"), "{text}");
+    }
+}
+
+#[test]
 fn mistakes_are_told_in_one_line_before_anything_is_measured() {
     let directory = TempDir::new().unwrap();
     write_mesh(directory.path());
-    let cases: [(&[&str], i32, &str); 12] = [
+    let cases: [(&[&str], i32, &str); 13] = [
         (&[], 2, "paper"),
         (&["pilot"], 2, "pilot"),
         (&["traversal"], 2, "MESH"),
@@ -329,6 +357,7 @@ fn mistakes_are_told_in_one_line_before_anything_is_measured() {
         (&["traversal", "torus.obj", "--instances"], 2, "--no-room"),
         (&["traversal", "torus.obj", "--json", "x", "--svg", "x"], 2, "same file"),
         (&["paper", "--no-cpu", "--cpu-repeat", "2"], 2, "--cpu-repeat"),
+        (&["motion", "torus.obj", "--cpu"], 2, "nothing moves"),
         (&["traversal", "none.obj"], 3, "none.obj"),
         (&["paper", "--scenes", "none"], 3, "cornell.toml"),
         (&["traversal", "torus.obj", "--device", "abacus"], 4, "abacus"),

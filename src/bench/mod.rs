@@ -9,6 +9,7 @@
 //!   difference hits -> the number that differ from the CPU's
 //! driver     suite: the searches against the driver's own ray tracing
 //! size       suite: one shape of more and more triangles
+//! motion     suite: the frames of an animation, from the pose to the picture
 //! chart      numbers -> SVG
 //! ```
 //!
@@ -18,6 +19,7 @@
 pub mod chart;
 pub mod difference;
 pub mod driver;
+pub mod motion;
 pub mod paper;
 pub mod rays;
 pub mod size;

@@ -229,6 +229,21 @@ impl Resources {
         })
     }
 
+    /// Makes the resources that have the pixels of another frame, with their contents, if these fit the options.
+    ///
+    /// # Errors
+    /// Memory runs out.
+    pub fn with_pixels_of(&self, other: &Self, options: &RenderOptions) -> Result<Option<Self>, GpuError> {
+        if !other.pixels.fit(&self.constants, options) {
+            return Ok(None);
+        }
+        let take = |next: &mut Self| {
+            next.pixels.clone_from(&other.pixels);
+            Ok(())
+        };
+        self.changed(take).map(Some)
+    }
+
     /// Makes resources for another number of batches and bounces. The contents of `bounces` and the counters are
     /// undefined.
     ///

@@ -1,14 +1,17 @@
 //! The worlds of a file whose animations play: one for each moment, of which each shares with the one before what has
 //! not changed.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
+};
 
 use glam::DVec3;
 use tracing::dispatcher::{Dispatch, with_default};
 
 use super::load::{LoadError, LoadRequest, Opened};
 use crate::{
-    scene::{Camera, Instance, Light, LoadOptions, Poser, Scene},
+    scene::{AnimationChoice, Camera, Instance, Light, LoadOptions, Poser, Scene},
     world::{FlatScene, InstanceUpdate, World},
 };
 
@@ -31,6 +34,16 @@ pub struct AnimatedWorld {
     world: World,
     /// The meshes of the scene, in ascending order, that differ from the world's: the last moment had no world.
     deformed: Vec<usize>,
+    times: MomentTimes,
+}
+
+/// Times of making the world of a moment, milliseconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MomentTimes {
+    /// Time of placing what moves and of deforming meshes, or of reading the file if it is read again.
+    pub pose_ms: f64,
+    /// Time of building what rays search, and whatever else the new world does not share.
+    pub build_ms: f64,
 }
 
 impl AnimatedWorld {
@@ -39,7 +52,18 @@ impl AnimatedWorld {
     pub fn new(path: &Path, request: &LoadRequest, scene: Scene, world: &World) -> Self {
         let poser = with_default(&Dispatch::none(), || Poser::new(path, &request.scene, &scene));
         let (path, request, world) = (path.to_owned(), request.clone(), world.clone());
-        Self { path, request, poser, scene, world, deformed: Vec::new() }
+        Self { path, request, poser, scene, world, deformed: Vec::new(), times: MomentTimes::default() }
+    }
+
+    /// Chooses the animations that further moments show.
+    pub fn set_animation(&mut self, animation: AnimationChoice) {
+        self.poser.iter_mut().for_each(|poser| poser.set_animation(animation.clone()));
+        self.request.scene.animation = animation;
+    }
+
+    /// Returns the times of the last moment that had a world.
+    pub fn times(&self) -> MomentTimes {
+        self.times
     }
 
     /// Returns the world at another moment, seconds, and its camera. A warning tells of things that cannot be shown
@@ -48,12 +72,14 @@ impl AnimatedWorld {
     /// # Errors
     /// The file cannot be read any more, or shows nothing at this moment.
     pub fn at(&mut self, seconds: f64) -> Result<(World, Camera), LoadError> {
+        let begin = Instant::now();
         let before = (self.scene.instances.clone(), self.scene.lights.clone());
         // Its warnings are those of the first moment.
         let pose = |poser: &mut Poser| with_default(&Dispatch::none(), || poser.pose(seconds, &mut self.scene));
         let Some(deformed) = self.poser.as_mut().map(pose).transpose()?.flatten() else {
             return self.read_again(seconds);
         };
+        let posed = Instant::now();
         self.deformed.extend(deformed);
         self.deformed.sort_unstable();
         self.deformed.dedup();
@@ -61,6 +87,7 @@ impl AnimatedWorld {
             Ok(world) => {
                 self.world = world.clone();
                 self.deformed.clear();
+                self.times = MomentTimes::of([begin, posed]);
                 Ok((world, self.scene.camera))
             }
             Err(error) => {
@@ -92,7 +119,8 @@ impl AnimatedWorld {
     }
 
     /// Reads the file again at a moment. What is shown at the next moment does not depend on it.
-    fn read_again(&self, seconds: f64) -> Result<(World, Camera), LoadError> {
+    fn read_again(&mut self, seconds: f64) -> Result<(World, Camera), LoadError> {
+        let begin = Instant::now();
         let scene = LoadOptions { at: Some(seconds), ..self.request.scene.clone() };
         let request = LoadRequest { scene, ..self.request.clone() };
         let read = || Opened::read(&self.path, &request);
@@ -102,6 +130,7 @@ impl AnimatedWorld {
             tracing::warn!("{}: at {seconds} s, {n_missing} meshes cannot be shown", self.path.display());
         }
         self.keep_guesses(&mut scene);
+        let posed = Instant::now();
         let is_same = self.deformed.is_empty()
             && scene.materials == self.scene.materials
             && scene.meshes == self.scene.meshes
@@ -112,6 +141,7 @@ impl AnimatedWorld {
             });
         let before = || (self.scene.instances.clone(), self.scene.lights.clone());
         let world = if is_same { self.posed(&scene, &before())? } else { self.built(&scene)? };
+        self.times = MomentTimes::of([begin, posed]);
         Ok((world, scene.camera))
     }
 
@@ -142,5 +172,14 @@ impl AnimatedWorld {
             None => FlatScene::new(scene)?,
         };
         Ok(World::with_accel(flat, self.world.accel_options())?)
+    }
+}
+
+impl MomentTimes {
+    /// Returns the times of a moment that is ready now. `begin`, `posed`: when its work began, and when what moves had
+    /// its place.
+    fn of([begin, posed]: [Instant; 2]) -> Self {
+        let ms = |time: Duration| time.as_secs_f64() * 1e3;
+        Self { pose_ms: ms(posed - begin), build_ms: ms(posed.elapsed()) }
     }
 }

@@ -72,14 +72,17 @@ impl GpuRenderer {
 
     /// Draws another world from now on. The next sample is the first of a new picture. If the world was made of this
     /// renderer's by [`World::with_instances_changed`], only the instances are uploaded, and emitters that have
-    /// changed.
+    /// changed. The picture that is displayed stays so until another one is drawn.
     ///
     /// # Errors
     /// The world exceeds the device's limits or memory, or the driver refuses a kernel. Then nothing has changed.
     pub fn set_world(&mut self, world: &World) -> Result<(), GpuError> {
         if !world.shares_geometries(&self.world) {
             let scene = (self.context.clone(), world);
-            let next = Self::with_capacity(scene, &self.options, self.budget.fixed_capacity, None)?;
+            let mut next = Self::with_capacity(scene, &self.options, self.budget.fixed_capacity, None)?;
+            if let Some(resources) = next.resources.with_pixels_of(&self.resources, &self.in_use)? {
+                (next.resources, next.displayed) = (resources, self.displayed);
+            }
             self.become_other(next);
             return Ok(());
         }

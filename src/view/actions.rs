@@ -11,6 +11,7 @@ use super::{
     message::{Message, Topic},
     pick::pick,
     session::Session,
+    timeline::Timeline,
 };
 use crate::{
     frame::{Integrator, RenderOptions, View},
@@ -18,6 +19,7 @@ use crate::{
     output::{self, OutputError},
     render::Displayed,
     scene::{Camera, Projection},
+    world::World,
 };
 
 /// The reason why a picture was not saved.
@@ -62,9 +64,10 @@ impl Session {
             Action::Show(view) => self.settings.view = view,
             Action::Pick { x, y } => {
                 if let Some(displayed) = gpu.front().displayed() {
-                    self.pick(gpu.front().options(), displayed, window, (x, y));
+                    self.pick((gpu.seen(), gpu.front().options()), displayed, window, (x, y));
                 }
             }
+            Action::Play => self.loaded.timeline.iter_mut().for_each(Timeline::toggle),
             Action::ChangeMotion | Action::TogglePanel | Action::ToggleKeys | Action::Quit => {}
         }
     }
@@ -114,11 +117,17 @@ impl Session {
     }
 
     /// Follows the rays of the displayed picture's pixel at a point of the window. `window` and `at` are in pixels.
-    fn pick(&mut self, options: &RenderOptions, displayed: Displayed, window: (u32, u32), at: (f64, f64)) {
+    fn pick(
+        &mut self,
+        (world, options): (&World, &RenderOptions),
+        displayed: Displayed,
+        window: (u32, u32),
+        at: (f64, f64),
+    ) {
         let (width, height) = displayed.size;
         let pixel = pixel_at(at, window, displayed.size);
         let options = RenderOptions { width, height, ..options.clone() };
-        self.picked = Some(pick(&self.loaded.built.world, &options, &displayed.camera, pixel));
+        self.picked = Some(pick(world, &options, &displayed.camera, pixel));
     }
 
     /// Reads the AOVs of the pixel at a point of the window, if the view shows AOVs. While a sample is drawn in
@@ -224,7 +233,8 @@ mod tests {
         let seen = session.loaded.scene().camera;
         let displayed = Displayed { size: (80, 60), camera: seen };
         session.controller.look(0.5, 0.0);
-        session.pick(&settings.options, displayed, (640, 480), (320.0, 300.0));
+        let world = session.loaded.built.world.clone();
+        session.pick((&world, &settings.options), displayed, (640, 480), (320.0, 300.0));
         let picked = session.picked.expect("rays");
         assert_eq!(picked.pixel, uvec2(40, 37), "a pixel of the small picture that is seen");
         let to_hit = picked.rays[0].hit.as_ref().expect("a hit").point_world - seen.eye;

@@ -201,6 +201,14 @@ impl Controller {
         self.camera = camera;
     }
 
+    /// Moves the start. A camera that is there, since the user has not moved it, moves with it.
+    pub fn move_start(&mut self, start: Camera) {
+        if self.camera == self.start {
+            self.camera = start;
+        }
+        self.start = start;
+    }
+
     /// Takes over another scene's start and bounds. The camera and the flight stay; `moved` is the way by which a point
     /// of the file has moved in world space.
     pub fn set_scene(&mut self, start: Camera, bounds: (Vec3, Vec3), moved: Vec3) {

@@ -7,6 +7,7 @@ use crate::{
     engine::choices::{Cache, Choices, Methods, Request, Workload},
     frame::RenderOptions,
     gpu::{Context, GpuError},
+    world::World,
 };
 
 /// A device, or the CPU, that renders a scene.
@@ -19,6 +20,12 @@ pub struct GpuSession {
     other: Option<ViewRenderer>,
     /// Whether the picture of the other renderer is shown, since `renderer` has not drawn any since it was changed to.
     shows_other: bool,
+    /// Whether the other renderer still has the world of an earlier moment.
+    is_other_late: bool,
+    /// The world that is drawn.
+    world: World,
+    /// The world of the picture that is shown.
+    seen: World,
     /// The device; none if the CPU draws.
     pub context: Option<Arc<Context>>,
 }
@@ -37,9 +44,11 @@ impl GpuSession {
     ) -> Result<Self, GpuError> {
         let methods = methods_for(context.as_ref(), loaded, request, (options.width, options.height))?;
         let options = methods.apply(options);
-        let renderer = ViewRenderer::new(context.as_ref(), &loaded.built.world, &options)?;
+        let world = loaded.built.world.clone();
+        let renderer = ViewRenderer::new(context.as_ref(), &world, &options)?;
         let choices = Choices::of_pictures(loaded.built.accel, methods);
-        Ok(Self { renderer, choices, other: None, shows_other: false, context })
+        let seen = world.clone();
+        Ok(Self { renderer, choices, other: None, shows_other: false, is_other_late: false, world, seen, context })
     }
 
     /// Changes to the renderer of another kind of pictures. It is made at the first change; from then on, both are
@@ -50,13 +59,34 @@ impl GpuSession {
     /// The buffers exceed the device's memory. Then nothing has changed.
     pub fn change_to(&mut self, options: &RenderOptions) -> Result<(), GpuError> {
         let is_of = |renderer: &mut ViewRenderer| PictureKind::of(renderer.options()) == PictureKind::of(options);
+        let is_late = std::mem::take(&mut self.is_other_late);
         let renderer = match self.other.take_if(is_of) {
+            Some(mut other) if is_late => {
+                other.set_world(&self.world)?;
+                other
+            }
             Some(other) => other,
             None => self.renderer.sharing(options)?,
         };
         self.other = Some(std::mem::replace(&mut self.renderer, renderer));
         self.shows_other = true;
         Ok(())
+    }
+
+    /// Draws the world of another moment from now on. If that fails, the previous one stays.
+    ///
+    /// # Errors
+    /// The world exceeds the device's limits or memory.
+    pub fn set_world(&mut self, world: &World) -> Result<(), GpuError> {
+        self.renderer.set_world(world)?;
+        self.world = world.clone();
+        self.is_other_late = self.other.is_some();
+        Ok(())
+    }
+
+    /// Returns the world of the picture that is shown.
+    pub fn seen(&self) -> &World {
+        &self.seen
     }
 
     /// Releases the renderer that is not used.
@@ -69,6 +99,7 @@ impl GpuSession {
     /// Notes that the renderer that draws now has a picture of the present view, which is shown from now on.
     pub fn note_picture(&mut self) {
         self.shows_other = false;
+        self.seen = self.world.clone();
     }
 
     /// Returns the renderer whose picture is shown.
@@ -87,11 +118,12 @@ impl GpuSession {
         self.context.as_ref().map_or(Ok(()), |context| context.wait_for_all())
     }
 
-    /// Replaces the renderer that draws, and with it the other one.
-    fn install(&mut self, renderer: ViewRenderer) -> Result<(), GpuError> {
+    /// Replaces the renderer that draws by one of another world, and with it the other one.
+    fn install(&mut self, renderer: ViewRenderer, world: &World) -> Result<(), GpuError> {
         self.wait_for_all()?;
         self.renderer = renderer;
-        (self.other, self.shows_other) = (None, false);
+        (self.other, self.shows_other, self.is_other_late) = (None, false, false);
+        (self.world, self.seen) = (world.clone(), world.clone());
         Ok(())
     }
 
@@ -103,7 +135,7 @@ impl GpuSession {
         let camera = *self.renderer.camera();
         let mut renderer = ViewRenderer::new(self.context.as_ref(), &loaded.built.world, self.renderer.options())?;
         renderer.set_camera(&camera);
-        self.install(renderer)
+        self.install(renderer, &loaded.built.world)
     }
 
     /// Replaces the scene by that of another file, from whose camera the next picture is drawn. Chooses traversal and
@@ -117,7 +149,8 @@ impl GpuSession {
         let methods =
             methods_for(self.context.as_ref(), loaded, loaded.load_settings.builder.request, (width, height))?;
         let options = methods.apply(&RenderOptions { width, height, ..loaded.built.options.clone() });
-        self.install(ViewRenderer::new(self.context.as_ref(), &loaded.built.world, &options)?)?;
+        let world = &loaded.built.world;
+        self.install(ViewRenderer::new(self.context.as_ref(), world, &options)?, world)?;
         Ok(options)
     }
 
@@ -131,7 +164,7 @@ impl GpuSession {
         let before = context.replace_shaders(shaders);
         let remade = self.renderer.remake_passes();
         match remade {
-            Ok(()) => (self.other, self.shows_other) = (None, false),
+            Ok(()) => (self.other, self.shows_other, self.is_other_late) = (None, false, false),
             Err(_) => drop(context.replace_shaders(before)),
         }
         remade

@@ -30,6 +30,8 @@ pub enum Action {
     ChangeUp,
     /// Draws the other picture while the camera moves.
     ChangeMotion,
+    /// Plays the animations, or pauses them.
+    Play,
     TogglePanel,
     /// Shows or hides the list of keys.
     ToggleKeys,
@@ -131,6 +133,7 @@ impl Input {
             KeyCode::KeyU => Some(Action::ChangeUp),
             KeyCode::KeyM => Some(Action::ChangeMotion),
             KeyCode::KeyH | KeyCode::F1 => Some(Action::ToggleKeys),
+            KeyCode::Space => Some(Action::Play),
             KeyCode::Tab => Some(Action::TogglePanel),
             KeyCode::Escape => Some(Action::Quit),
             KeyCode::Digit1 => Some(Action::Show(View::Picture)),

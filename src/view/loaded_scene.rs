@@ -4,10 +4,11 @@ use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 
+use super::timeline::Timeline;
 use crate::{
     accel::Statistics,
     engine::{Builder, LoadError, LoadRequest, Loaded, Opened},
-    scene::Scene,
+    scene::{AnimationChoice, Scene},
     util::progress::Progress,
     world::FlatScene,
 };
@@ -29,8 +30,10 @@ pub struct LoadedScene {
     pub load_settings: LoadSettings,
     /// The scene with its structure, and the options of its pictures.
     pub built: Loaded,
-    /// Figures of the structure.
+    /// Figures of the structure, as it was when the scene was loaded.
     pub statistics: Statistics,
+    /// The animations; none if the scene has none, or none of them is to be shown.
+    pub(super) timeline: Option<Timeline>,
 }
 
 impl LoadedScene {
@@ -47,7 +50,13 @@ impl LoadedScene {
     /// # Errors
     /// The scene's parts do not fit together, or the host has too little memory.
     pub fn build(path: Option<&Path>, opened: Opened, settings: &LoadSettings) -> Result<Self, LoadError> {
-        let built = settings.builder.build(opened, &settings.request.work)?;
+        let is_animated = path.is_some()
+            && !opened.scene.animations.is_empty()
+            && settings.request.scene.animation != AnimationChoice::None;
+        let first = is_animated.then(|| opened.scene.clone());
+        let request = settings.builder.request;
+        let request = if is_animated { request.for_motion() } else { request };
+        let built = Builder { request, ..settings.builder.clone() }.build(opened, &settings.request.work)?;
         let (path, statistics) = (path.map(Path::to_owned), built.world.statistics());
         // When the file is read again, nobody waits for it, and the window keeps its exposure.
         let mut load_settings = settings.clone();
@@ -56,7 +65,9 @@ impl LoadedScene {
         if let Some(picture) = &mut load_settings.request.picture {
             picture.exposure = Some(built.options.exposure);
         }
-        Ok(Self { path, statistics, built, load_settings })
+        let timeline =
+            path.as_deref().zip(first).map(|(path, first)| Timeline::new(path, &load_settings.request, first));
+        Ok(Self { path, statistics, built, load_settings, timeline })
     }
 
     /// Returns a scene without triangles. It takes the place of a loaded scene while no file is open.

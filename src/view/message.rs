@@ -10,6 +10,7 @@ const SHOWN_FOR: Duration = Duration::from_secs(8);
 pub enum Topic {
     Device,
     Scene,
+    Time,
     Shaders,
     Settings,
     File,

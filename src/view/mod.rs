@@ -28,6 +28,9 @@ mod screen;
 mod script;
 mod session;
 mod shaders;
+mod timeline;
+#[cfg(test)]
+mod timeline_tests;
 pub mod tour;
 mod ui;
 pub mod watch;

@@ -237,7 +237,10 @@ impl Session {
                 // The camera stays where it is in the file.
                 let moved = (self.loaded.scene().origin - loaded.scene().origin).as_vec3();
                 self.controller.set_scene(loaded.scene().camera, loaded.built.bounds, moved);
-                self.loaded = loaded;
+                let before = std::mem::replace(&mut self.loaded, loaded);
+                if let (Some(now), Some(before)) = (&mut self.loaded.timeline, &before.timeline) {
+                    now.go_on(before);
+                }
                 self.picked = None;
                 // The next picture is drawn small, so that it is shown at once.
                 self.pace.moved(Instant::now());

@@ -92,6 +92,18 @@ impl ViewRenderer {
         }
     }
 
+    /// Draws another world from now on. The displayed picture stays until another one is drawn.
+    pub fn set_world(&mut self, world: &World) -> Result<(), GpuError> {
+        match self {
+            Self::Device(renderer) => renderer.set_world(world),
+            Self::Cpu(view) => {
+                view.renderer.set_world(world);
+                view.world = world.clone();
+                Ok(())
+            }
+        }
+    }
+
     pub fn camera(&self) -> &Camera {
         match self {
             Self::Device(renderer) => renderer.camera(),

@@ -14,6 +14,7 @@ use super::{
     panel::{Facts, Settings},
     pick::Picked,
     saver::Saver,
+    timeline::Timeline,
 };
 use crate::{
     accel::Statistics,
@@ -56,8 +57,8 @@ pub struct Session {
     /// Whether a user moves the camera. Then a new picture is first drawn small, so that it is shown at once. With a
     /// script, only frames in which the camera moves are drawn small: see `Script::direct`.
     is_interactive: bool,
-    /// Whether the last frame was drawn while the camera moved.
-    is_moving: bool,
+    /// Whether the last frame was drawn while the camera moved, or an animation played.
+    pub(super) is_moving: bool,
     /// Whether the last frame completed a sample.
     has_new_sample: bool,
     /// The kind of the pictures that are drawn now.
@@ -123,6 +124,7 @@ impl Session {
         is_small
             || self.controller.flight.is_under_way()
             || self.pace.is_moving(now)
+            || self.loaded.timeline.as_ref().is_some_and(Timeline::is_busy)
             || self.is_learning()
             || PictureKind::of(options) != self.at_rest() // the picture at rest is due
             || self.has_new_sample // the overlay shows its figures a frame later
@@ -207,6 +209,7 @@ impl Session {
         }
         // Frames in flight read the objects that change here.
         gpu.wait_for_all()?;
+        self.show_moment(gpu, now)?;
         self.budgets.iter_mut().for_each(|budget| budget.set_budget(self.settings.budget_ms));
         self.fit_window(gpu, window)?;
         self.drawing = PictureKind::of(gpu.renderer.options());
@@ -425,6 +428,7 @@ impl Session {
             pointed: self.pointed,
             picked: self.picked.as_ref(),
             message: self.message.as_ref(),
+            timeline: self.loaded.timeline.as_ref(),
         }
     }
 

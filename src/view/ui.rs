@@ -111,7 +111,8 @@ pub fn lay_out(
 ) -> Layout {
     let size = window.inner_size();
     let projection = session.controller.camera().projection;
-    let mut edited = Edited { settings: session.settings.clone(), projection };
+    let playback = session.loaded.timeline.as_ref().map(|timeline| *timeline.playback());
+    let mut edited = Edited { settings: session.settings.clone(), projection, playback };
     let facts = session.facts(gpu, (size.width, size.height), is_flying);
     let layout = ui.layout(window, layers, &mut edited, &facts);
     let now = Instant::now();
@@ -123,6 +124,12 @@ pub fn lay_out(
         session.pace.note_input(now);
         session.pace.moved(now);
         session.controller.set_projection(edited.projection);
+    }
+    if let (Some(timeline), Some(set)) =
+        (&mut session.loaded.timeline, edited.playback.filter(|_| edited.playback != playback))
+    {
+        session.pace.note_input(now);
+        timeline.set(set);
     }
     layout
 }

@@ -2,6 +2,7 @@
 
 #![allow(dead_code, unused_imports)] // each test target uses a part of it
 
+pub mod animated;
 pub mod arrays;
 pub mod chain;
 pub mod command;

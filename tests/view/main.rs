@@ -11,6 +11,7 @@ mod motion;
 mod on_cpu;
 mod shaders;
 mod slow;
+mod timeline;
 
 use std::{
     fs,

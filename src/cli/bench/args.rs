@@ -17,8 +17,10 @@ use crate::cli::{
     error::CliError,
     file_roles::FileRoles,
     load_args::LoadArgs,
+    look_args::LookArgs,
     picture_args::{
-        accel_help, accel_long_help, fixed_traversal_help, fixed_traversal_long_help, listed, traversals_of_devices,
+        PictureArgs, accel_help, accel_long_help, fixed_traversal_help, fixed_traversal_long_help, listed,
+        traversals_of_devices,
     },
 };
 
@@ -35,6 +37,8 @@ pub enum Suite {
     Driver(DriverArgs),
     /// Measure how build time and time per ray grow with the number of triangles, on a generated mesh
     Size(SizeArgs),
+    /// Measure the frames of an animation: the pose, the build of what rays search, the upload and the passes
+    Motion(Box<MotionArgs>),
 }
 
 #[derive(clap::Args)]
@@ -152,6 +156,31 @@ pub struct SizeArgs {
     #[arg(long, value_name = "N", default_value_t = 25, value_parser = value_parser!(u16).range(1..=10_000))]
     pub repeat: u16,
     /// Cast on all CPU threads, without Vulkan
+    #[arg(long, conflicts_with = "device")]
+    pub cpu: bool,
+    /// Vulkan device to use: its index in `kdray devices`, or a part of its name [default: a
+    /// discrete GPU, else an integrated one, else a software driver]
+    #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
+    pub device: Option<DeviceSelector>,
+    #[command(flatten)]
+    pub files: FileArgs,
+}
+
+#[derive(clap::Args)]
+#[group(skip)]
+pub struct MotionArgs {
+    /// glTF file with animations, or scene file that names one
+    pub scene: PathBuf,
+    #[command(flatten)]
+    pub load: LoadArgs,
+    #[command(flatten)]
+    pub look: LookArgs,
+    #[command(flatten)]
+    pub picture: PictureArgs,
+    /// Number of timed frames, 1 to 100000; the animation begins again after its end
+    #[arg(long, value_name = "N", default_value_t = 300, value_parser = value_parser!(u32).range(1..=100_000))]
+    pub frames: u32,
+    /// Draw on all CPU threads, without Vulkan
     #[arg(long, conflicts_with = "device")]
     pub cpu: bool,
     /// Vulkan device to use: its index in `kdray devices`, or a part of its name [default: a

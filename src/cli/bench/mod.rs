@@ -2,6 +2,7 @@
 
 mod args;
 mod driver;
+mod motion;
 mod paper;
 mod size;
 mod traversal;
@@ -17,6 +18,7 @@ pub fn run(suite: &Suite) -> Result<(), CliError> {
         Suite::Traversal(args) => traversal::run(args),
         Suite::Driver(args) => driver::run(args),
         Suite::Size(args) => size::run(args),
+        Suite::Motion(args) => motion::run(args),
     }
 }
 

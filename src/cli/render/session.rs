@@ -16,7 +16,7 @@ use kdray::{
     gpu::DeviceInfo,
     output::{self, FilmFile, Record, WholeRecord},
     util::progress,
-    world::{World, instances::Instancing},
+    world::World,
 };
 use tracing::info_span;
 
@@ -237,10 +237,9 @@ impl<'a> Session<'a> {
             n_at_once: if draws_whole_frames(engine, views) { engine.devices().count() as u32 } else { 1 },
         };
         let building = engine.builder().describe(n_triangles);
-        // What moves is stored apart from what does not.
-        let mut request = args.picture.request();
-        if is_animated && request.instances == Instancing::Auto {
-            request.instances = Instancing::Keep;
+        let asked = args.picture.request();
+        let request = if is_animated { asked.for_motion() } else { asked };
+        if request != asked {
             progress.note("meshes are kept apart, since some move; --instances flatten stores them as one");
         }
         let engine = engine

@@ -158,6 +158,13 @@ impl Workload {
 }
 
 impl Request {
+    /// Returns the request for a scene in which instances move: what moves is stored apart from what does not, unless
+    /// the user has chosen otherwise.
+    pub fn for_motion(self) -> Self {
+        let is_open = self.instances == Instancing::Auto;
+        Self { instances: if is_open { Instancing::Keep } else { self.instances }, ..self }
+    }
+
     /// Returns the requested kind of acceleration structure for `n_triangles` triangles. For a kd-tree, it is the
     /// user's tree, or else the rule's.
     pub fn choose_accel(&self, processor: Processor, n_triangles: usize, workload: &Workload) -> ChosenAccel {

@@ -80,3 +80,20 @@ pub struct AnimationInfo {
     /// Number of nodes whose morph targets it weighs.
     pub n_morphed: usize,
 }
+
+impl AnimationChoice {
+    /// Returns the index of the animation that is shown alone, if one is and the file has it.
+    pub(crate) fn index_in(&self, animations: &[AnimationInfo]) -> Option<usize> {
+        let Self::Named(name) = self else { return None };
+        let named = animations.iter().position(|animation| animation.name == *name);
+        named.or_else(|| name.parse().ok().filter(|ix| *ix < animations.len()))
+    }
+}
+
+impl AnimationInfo {
+    /// Returns the first and the last moment of animations that are shown together, seconds. The first is 0 or, if a
+    /// key is before that, the first key's.
+    pub(crate) fn range(shown: &[Self]) -> (f64, f64) {
+        shown.iter().fold((0.0, 0.0), |(begin, end), it| (it.begin.min(begin), it.end.max(end)))
+    }
+}

@@ -3,7 +3,7 @@
 use egui::{Align2, Area, Color32, Frame, Grid, Id, Order, RichText, ScrollArea, Ui, Window, vec2};
 
 /// Keys and mouse actions, each with its effect. docs/guide.md has the same rows.
-pub const KEYS: [(&str, &str); 17] = [
+pub const KEYS: [(&str, &str); 18] = [
     ("left drag, right drag", "go around the target, look around"),
     ("middle drag, Shift + left drag", "move sideways, up and down"),
     ("wheel", "nearer, farther, to where the mouse points"),
@@ -17,6 +17,7 @@ pub const KEYS: [(&str, &str); 17] = [
     ("1, 2 3 4", "picture; depth, normals, triangles: primary rays only"),
     ("5, 6", "steps, rays: sums over all rays, slow as the picture"),
     ("M", "with path, what is drawn in motion: whitted, paths, or filtered paths"),
+    ("space", "play the animations of the file, or pause them"),
     ("P", "print the camera as a scene file has it"),
     ("S, F12", "save what is seen, drawn in full"),
     ("H, F1, ?", "show or hide these keys"),
@@ -51,10 +52,10 @@ pub fn show(ui: &Ui, frame: Frame) {
         });
 }
 
-/// Shows a line that names the key for the list.
-pub fn hint(ui: &Ui, frame: Frame) {
+/// Shows a line that names the key for the list. `below`: the height of what is below it, points.
+pub fn hint(ui: &Ui, frame: Frame, below: f32) {
     let corner = Align2::RIGHT_BOTTOM;
-    Area::new(Id::new("hint")).anchor(corner, [-MARGIN, -MARGIN]).interactable(false).show(ui.ctx(), |ui| {
+    Area::new(Id::new("hint")).anchor(corner, [-MARGIN, -MARGIN - below]).interactable(false).show(ui.ctx(), |ui| {
         frame.show(ui, |ui| ui.label(RichText::new("H, F1 or ? shows the keys").strong()));
     });
 }

@@ -5,6 +5,7 @@ mod graph;
 mod keys;
 mod legend;
 mod tables;
+mod time;
 
 use std::time::Instant;
 
@@ -16,6 +17,7 @@ use super::{
     loaded_scene::LoadedScene,
     message::Message,
     pick::Picked,
+    timeline::{Playback, Timeline},
 };
 use crate::{
     frame::{Profile, RenderOptions, View},
@@ -53,6 +55,8 @@ pub struct Edited {
     pub settings: Settings,
     /// The camera's projection.
     pub projection: Projection,
+    /// What is set of the time line, if there is one.
+    pub playback: Option<Playback>,
 }
 
 /// The parts of the overlay that are shown.
@@ -115,6 +119,15 @@ pub struct Facts<'a> {
     pub picked: Option<&'a Picked>,
     /// The last message, unless a later success on the same topic has cleared it.
     pub message: Option<&'a Message>,
+    /// The animations, if the scene has any.
+    pub timeline: Option<&'a Timeline>,
+}
+
+impl Facts<'_> {
+    /// Returns the height at the window's lower edge that the time line takes, points.
+    fn below(&self) -> f32 {
+        self.timeline.map_or(0.0, |_| time::HEIGHT)
+    }
 }
 
 /// Lays out a line in the window's middle, which says what the window waits for.
@@ -137,6 +150,9 @@ pub fn show(ui: &mut Ui, layers: Layers, edited: &mut Edited, facts: &Facts) {
     if layers.panel {
         legend::show(ui, frame, facts);
         panel(ui, frame, edited, facts);
+        if let (Some(playback), Some(timeline)) = (&mut edited.playback, facts.timeline) {
+            time::show(ui, frame, playback, timeline);
+        }
     } else if layers.messages {
         message_alone(ui, frame, facts);
     }
@@ -146,7 +162,7 @@ pub fn show(ui: &mut Ui, layers: Layers, edited: &mut Edited, facts: &Facts) {
     if layers.keys {
         keys::show(ui, frame);
     } else if layers.hint {
-        keys::hint(ui, frame);
+        keys::hint(ui, frame, if layers.panel { facts.below() } else { 0.0 });
     }
 }
 
@@ -155,7 +171,7 @@ fn panel(ui: &mut Ui, frame: Frame, edited: &mut Edited, facts: &Facts) {
         ui.ctx(),
         |ui| {
             ui.set_width(WIDTH);
-            let room = ui.ctx().content_rect().height() - 60.0;
+            let room = ui.ctx().content_rect().height() - 60.0 - facts.below();
             ScrollArea::vertical()
                 .max_height(room.max(80.0))
                 .min_scrolled_height(room.max(80.0))

@@ -9,7 +9,7 @@ use hashbrown::HashMap;
 use super::{Document, Known, LoadedBefore, Loader, MeshKey, Nodes, cameras, lights, read};
 use crate::scene::{
     formats::mesh_file::{MeshFormat, read_mesh},
-    model::{Instance, LoadOptions, Mesh, Scene, SceneError},
+    model::{AnimationChoice, Instance, LoadOptions, Mesh, Scene, SceneError},
 };
 
 /// A glTF file that can be posed.
@@ -54,6 +54,11 @@ impl Poser {
         let (rigid, options) = (rigid.collect(), options.clone());
         let n_instances = first.len();
         fits.then_some(Self { document, options, meshes, rigid, n_instances, has_lights, camera_ix })
+    }
+
+    /// Chooses the animations that further moments show.
+    pub fn set_animation(&mut self, animation: AnimationChoice) {
+        self.options.animation = animation;
     }
 
     /// Poses a scene of the file at a moment, seconds. Returns the indices of the meshes whose vertices have changed,
