@@ -166,6 +166,13 @@ fn numbers_of_samples_may_alternate() {
             .map(|renderer| renderer.draw_range(&camera, range.parse().unwrap(), || ()).unwrap().1.picture);
         assert!(sums[0] == sums[1], "{range}");
     }
+    // Samples that are drawn one by one have any index.
+    let range = "16-39".parse().unwrap();
+    for renderer in [&mut alone, &mut several] {
+        let together = renderer.draw_range(&camera, range, || ()).unwrap().1;
+        let apart = renderer.draw_moments(range, |_, _| Ok::<_, GpuError>(camera), || ()).unwrap().1;
+        assert!(apart.picture == together.picture);
+    }
 }
 
 /// Pictures that a device draws in several bands have them again in the next picture.

@@ -148,9 +148,8 @@ impl RenderOptions {
 /// Options of [`Integrator::Path`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathOptions {
-    /// Index of the picture's first sample in each pixel. Pictures of other samples are independent of this one, and
-    /// their mean is the picture of all samples: with the same bits if this is a multiple of `2^SAMPLE_BLOCK_LOG2`, or
-    /// the picture has one sample.
+    /// Index of the picture's first sample in each pixel, a multiple of `2^SAMPLE_BLOCK_LOG2`. Pictures of other
+    /// samples are independent of this one, and their mean is the picture of all samples.
     pub first_sample: u32,
     /// The density of samples around the centre of their pixel.
     pub filter: PixelFilter,

@@ -78,7 +78,7 @@ impl BandedRenderer {
             return Ok(());
         }
         let options = RenderOptions { crop: Some(crop), noise_tiles: None, ..self.renderer.options().clone() };
-        options.check()?;
+        options.check_ranges()?;
         let bands = bands(self.renderer.context.limits(), &options);
         let crop = largest(&bands, &options).unwrap_or(crop);
         self.renderer.set_options(&RenderOptions { crop: Some(crop), ..options })?;
@@ -86,7 +86,8 @@ impl BandedRenderer {
         Ok(())
     }
 
-    /// Sets the index of the next picture's first sample ([`PathOptions::first_sample`]). Only frames of paths know it.
+    /// Sets the index of the next picture's first sample: any index if the picture has a single sample, else that of an
+    /// aligned block of its samples. Only frames of paths know it.
     ///
     /// # Errors
     /// A Vulkan call fails.
