@@ -242,6 +242,14 @@ impl CpuRenderer {
         self.reset_samples();
     }
 
+    /// Sets the random numbers of the next pictures ([`PathOptions::seed`](crate::frame::PathOptions::seed)). The next
+    /// sample is the first of a new picture.
+    pub fn set_seed(&mut self, seed: u32) {
+        self.options.paths.seed = seed;
+        self.frame.set_options(&self.options);
+        self.reset_samples();
+    }
+
     /// Sets the part of the picture that is drawn next: noise tiles or, without them, the crop of the options. The next
     /// sample is the first of a new picture, and has the index `first_sample`.
     pub(crate) fn set_window(&mut self, noise_tiles: Option<NoiseTiles>, first_sample: u32) {

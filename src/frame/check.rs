@@ -3,7 +3,8 @@
 use super::{BadOptions, Denoise, Goal, Integrator, NoiseTiles, PathOptions, RenderOptions, SampleRange};
 use crate::{gpu::GpuError, layout::SAMPLE_BLOCK_LOG2};
 
-/// The last value that an index of a first sample may have: the indices of all samples of a picture fit 32 bits.
+/// The last value that an index of a first sample may have: the indices of all samples of a picture, of whatever seed,
+/// fit 32 bits.
 const MOST_FIRST_SAMPLE: u32 = 1 << 31;
 
 impl From<BadOptions> for GpuError {
@@ -48,10 +49,12 @@ impl RenderOptions {
             let most = Self::MOST_THRESHOLD;
             check("threshold", threshold, (0.0..=most).contains(&threshold), || format!("0 to {most}"))?;
         }
-        let PathOptions { first_sample, filter: _, clamp, aperture, focus } = self.paths;
+        let PathOptions { seed, first_sample, filter: _, clamp, aperture, focus } = self.paths;
         check("clamp", clamp, clamp > 0.0, || "above 0".to_owned())?;
         check("aperture", aperture, aperture == 0.0 || is_positive(aperture), || "finite and at least 0".to_owned())?;
         focus.map_or(Ok(()), |focus| number("focus", focus, is_positive(focus)))?;
+        let most = PathOptions::MOST_SEED;
+        check("seed", seed, seed <= most, || format!("at most {most}"))?;
         let is_right = first_sample <= MOST_FIRST_SAMPLE;
         check("first_sample", first_sample, is_right, || format!("at most {MOST_FIRST_SAMPLE}"))?;
         self.check_part()
@@ -169,6 +172,7 @@ mod tests {
         ("aperture is inf", |it| it.paths.aperture = f32::INFINITY),
         ("focus is 0, not a finite number above 0", |it| it.paths.focus = Some(0.0)),
         ("focus is NaN", |it| it.paths.focus = Some(f32::NAN)),
+        ("seed is 32768, not at most 32767", |it| it.paths.seed = 32_768),
         ("first_sample is 8, not a multiple of 16", |it| it.paths.first_sample = 8),
         ("first_sample is 4294967280, not at most 2147483648", |it| it.paths.first_sample = u32::MAX - 15),
         ("crop is 5,1,4,2, not pixels of a picture of 40x30", |it| it.crop = crop(5, 1, 4, 2)),

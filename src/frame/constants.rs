@@ -51,7 +51,7 @@ impl Frame {
             PixelFilter::Tent => FILTER_TENT,
             PixelFilter::Gaussian => FILTER_GAUSSIAN,
         };
-        self.range_begin = options.paths.first_sample;
+        self.range_begin = options.paths.range_begin();
         self.clamp = options.paths.clamp;
         self.aperture = options.paths.aperture;
         self.focus = options.paths.focus.unwrap_or(0.0);

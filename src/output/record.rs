@@ -54,6 +54,9 @@ pub struct WholeRecord {
     pub height: u32,
     /// Number of samples of each pixel of the whole picture.
     pub n_samples: u32,
+    /// Which random numbers paths have; 0 for whitted, which has none.
+    #[serde(default)]
+    pub seed: u32,
     /// How light is computed.
     pub integrator: String,
     /// Number of bounces, the primary rays included.
@@ -107,6 +110,7 @@ impl WholeRecord {
             width,
             height,
             n_samples,
+            seed: if of_paths { paths.seed } else { 0 },
             integrator: options.integrator.to_string(),
             max_depth,
             exposure,

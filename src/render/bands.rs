@@ -92,11 +92,22 @@ impl BandedRenderer {
     /// # Errors
     /// A Vulkan call fails.
     pub fn set_first_sample(&mut self, first_sample: u32) -> Result<(), GpuError> {
+        self.set_paths(PathOptions { first_sample, ..self.renderer.options().paths })
+    }
+
+    /// Sets the random numbers of the next pictures ([`PathOptions::seed`]).
+    ///
+    /// # Errors
+    /// A Vulkan call fails.
+    pub fn set_seed(&mut self, seed: u32) -> Result<(), GpuError> {
+        self.set_paths(PathOptions { seed, ..self.renderer.options().paths })
+    }
+
+    fn set_paths(&mut self, paths: PathOptions) -> Result<(), GpuError> {
         let options = self.renderer.options();
-        if options.paths.first_sample == first_sample {
+        if options.paths == paths {
             return Ok(());
         }
-        let paths = PathOptions { first_sample, ..options.paths };
         self.renderer.set_options(&RenderOptions { paths, ..options.clone() })
     }
 

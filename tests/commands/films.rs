@@ -337,6 +337,37 @@ fn what_moves_while_the_shutter_is_open_is_blurred() {
     );
 }
 
+/// The noise of a film is the same in all frames, or that of each frame's number, whichever frames are drawn.
+#[test]
+fn noise_is_fixed_or_new_in_each_frame() {
+    let directory = with_bar(false);
+    let path = directory.path();
+    let key = |frame| format!("[[keyframe]]\nframe = {frame}\neye = [0, 0, 5]\ntarget = [0, 0, 0]\n");
+    fs::write(path.join("path.toml"), key(0) + &key(9)).unwrap();
+    for device in ["--cpu", "--validate"] {
+        // A lens blurs the bar, with noise.
+        let still = ["--animation", "none", "--path", "path.toml", "--spp", "4", "--aperture", "0.9", "--focus", "3"];
+        let common = [&["render", "bar.gltf", device], &BLURRED[..], &still].concat();
+        let render = |more: &[&str]| succeed(path, &[&common[..], more].concat());
+        render(&["--frames", "2-3", "-o", "fixed#.exr"]);
+        render(&["--frames", "2-3", "--seed", "frame", "-o", "new#.exr"]);
+        render(&["--frames", "3", "--seed", "frame", "-o", "alone#.exr"]);
+        render(&["--frames", "2", "--seed", "3", "-o", "three#.exr"]);
+        let row = |name: &str| row(&path.join(name));
+        assert!(row("fixed2.exr") == row("fixed3.exr") && row("new2.exr") != row("new3.exr"), "{device}");
+        assert!(row("new3.exr") == row("alone3.exr") && row("new3.exr") == row("three2.exr"), "{device}");
+        assert!(row("new2.exr") != row("fixed2.exr") && row("new2.exr") != row("alone3.exr"), "{device}");
+    }
+    for word in ["32768", "-1", "frames"] {
+        fail(
+            path,
+            &["render", "bar.gltf", &format!("--seed={word}")],
+            2,
+            "expected a number from 0 to 32767, or frame",
+        );
+    }
+}
+
 #[test]
 fn a_shutter_needs_motion_and_paths() {
     let directory = with_bar(false);

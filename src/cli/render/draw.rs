@@ -10,7 +10,7 @@ use std::{
 use kdray::{
     cpu,
     engine::{AnimatedWorld, Engine, LoadError, NoiseGoal, Renderer},
-    frame::{Drawn, Goal, Picture, Profile, RangeSums, RenderOptions, SampleRange, SampleSums, Watcher},
+    frame::{Drawn, Goal, Integrator, Picture, Profile, RangeSums, RenderOptions, SampleRange, SampleSums, Watcher},
     gpu::{DeviceInfo, GpuError},
     output::{FilmFile, Layers, OutputError, Record, WholeRecord},
     scene::Camera,
@@ -246,6 +246,7 @@ fn draw_view(
     renderer: &mut Renderer,
     watcher: &mut dyn Watcher,
 ) -> Result<DrawnView, GpuError> {
+    renderer.set_seed(common.args.seed_of(view.frame))?;
     // What is not blurred, and the record, show the picture's own time.
     let camera = &common.show(view, 0.0, renderer)?;
     let device = renderer.device().cloned();
@@ -298,7 +299,7 @@ fn write_view(common: &Common, view: &FrameJob, of_view: DrawnView) -> Result<Wr
         let limit = humantime::format_duration(limit);
         tracing::warn!("the picture ends with the samples so far, since --time-limit {limit} is over");
     }
-    let mut record = record_of(common, &camera, written.n_samples);
+    let mut record = record_of(common, view, &camera, written.n_samples);
     if is_cut {
         record.whole.noise = None;
     }
@@ -324,9 +325,12 @@ fn write_view(common: &Common, view: &FrameJob, of_view: DrawnView) -> Result<Wr
 }
 
 /// Returns the record of a picture. `n_samples`: the number that was drawn, if the picture has all samples.
-fn record_of(common: &Common, camera: &Camera, n_samples: u32) -> Record {
+fn record_of(common: &Common, view: &FrameJob, camera: &Camera, n_samples: u32) -> Record {
     let mut record = common.record.clone();
     record.whole.camera = WholeRecord::camera(camera);
+    if common.options.integrator == Integrator::Path {
+        record.whole.seed = common.args.seed_of(view.frame);
+    }
     if common.some_samples.is_none() {
         record.whole.n_samples = n_samples;
         record.samples = SampleRange::whole(n_samples);
