@@ -337,6 +337,32 @@ fn what_moves_while_the_shutter_is_open_is_blurred() {
     );
 }
 
+/// Parts of pictures of other times or shutters are not joined.
+#[test]
+fn parts_have_one_time_and_one_shutter() {
+    let directory = with_bar(false);
+    let path = directory.path();
+    let common = [&["render", "bar.gltf", "--cpu", "--spp", "32", "--instances", "keep"], &BLURRED[..5]].concat();
+    let render = |more: &[&str]| succeed(path, &[&common[..], more].concat());
+    let merge = |parts: [&str; 2]| succeed(path, &["merge", parts[0], parts[1], "-q", "-o", "joined.exr"]);
+    let refused = |parts: [&str; 2], what: &str| {
+        fail(path, &["merge", parts[0], parts[1], "-q", "-o", "joined.exr"], 3, what);
+    };
+    let (early, late) = (["--samples", "0-16"], ["--samples", "16-32"]);
+    render(&[&early[..], &["--fps", "0.5", "--shutter", "0,0.1", "-o", "a.exr"]].concat());
+    render(&[&late[..], &["--fps", "0.5", "--shutter", "0,0.1", "-o", "b.exr"]].concat());
+    render(&[&late[..], &["--fps", "0.5", "--shutter", "0,0.3", "-o", "long.exr"]].concat());
+    render(&[&late[..], &["--shutter", "0,0.1", "--fps", "24", "-o", "fast.exr"]].concat());
+    merge(["a.exr", "b.exr"]);
+    let own = "shutter: \"0,0.1 at 0.5 frames a second\" and ";
+    refused(["a.exr", "long.exr"], &format!("{own}\"0,0.3 at 0.5 frames a second\""));
+    refused(["a.exr", "fast.exr"], &format!("{own}\"0,0.1 at 24 frames a second\""));
+    render(&[&early[..], &["--fps", "0.5", "--frames", "0-1", "-o", "early#.exr"]].concat());
+    render(&[&late[..], &["--fps", "0.5", "--frames", "0-1", "-o", "late#.exr"]].concat());
+    merge(["early1.exr", "late1.exr"]);
+    refused(["early0.exr", "late1.exr"], "time: \"0 s\" and \"2 s\"");
+}
+
 /// The noise of a film is the same in all frames, or that of each frame's number, whichever frames are drawn.
 #[test]
 fn noise_is_fixed_or_new_in_each_frame() {

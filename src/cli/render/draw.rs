@@ -196,21 +196,23 @@ fn draw_frames_apart(
 }
 
 impl Common<'_> {
+    /// Returns the time of a view's animations, seconds.
+    fn seconds_of(&self, view: &FrameJob) -> f64 {
+        let load = &self.args.load;
+        if self.args.is_film() { load.seconds_of(view.frame.into()) } else { load.seconds().unwrap_or_default() }
+    }
+
     /// Lets a renderer show the world of a view, `later` frames after its own time. Returns the camera.
     fn show(&self, view: &FrameJob, later: f64, renderer: &mut Renderer) -> Result<Camera, GpuError> {
         let load = &self.args.load;
         let mut camera = view.camera.unwrap_or(self.camera);
         if let Some(animated) = self.animated {
-            let own = if self.args.is_film() {
-                load.seconds_of(view.frame.into())
-            } else {
-                load.seconds().unwrap_or_default()
-            };
             let mut animated = animated.lock().unwrap_or_else(PoisonError::into_inner);
-            let (world, of_scene) = animated.at(own + load.seconds_of(later)).map_err(|error| match error {
-                LoadError::Device(error) => error,
-                other => GpuError::Mismatch(other.to_string()),
-            })?;
+            let (world, of_scene) =
+                animated.at(self.seconds_of(view) + load.seconds_of(later)).map_err(|error| match error {
+                    LoadError::Device(error) => error,
+                    other => GpuError::Mismatch(other.to_string()),
+                })?;
             renderer.set_world(&world)?;
             camera = view.camera.unwrap_or(of_scene);
         }
@@ -328,6 +330,9 @@ fn write_view(common: &Common, view: &FrameJob, of_view: DrawnView) -> Result<Wr
 fn record_of(common: &Common, view: &FrameJob, camera: &Camera, n_samples: u32) -> Record {
     let mut record = common.record.clone();
     record.whole.camera = WholeRecord::camera(camera);
+    if common.animated.is_some() || common.args.load.seconds().is_some() {
+        record.whole.time = Some(format!("{} s", common.seconds_of(view)));
+    }
     if common.options.integrator == Integrator::Path {
         record.whole.seed = common.args.seed_of(view.frame);
     }

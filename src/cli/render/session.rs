@@ -75,6 +75,8 @@ impl Ready {
         let Self { engine, world, options, accel, samples, noise_goal, .. } = self;
         let mut record = record(engine, world, options, *accel, *samples);
         record.whole.noise = args.noise;
+        let rate = args.load.frames_a_second();
+        record.whole.shutter = args.shutter.map(|shutter| format!("{shutter} at {rate} frames a second"));
         let (n_samples, some_samples) = *samples;
         let n_drawn = some_samples.map_or(n_samples, |range| range.len());
         let goal = args.time.map_or(Goal::Samples(n_drawn), Goal::Time);
