@@ -346,6 +346,11 @@ impl RenderArgs {
         self.path.is_some() || self.frames.is_some() || self.turntable.is_some()
     }
 
+    /// Whether pictures show several moments.
+    pub fn moves(&self) -> bool {
+        self.is_film() || self.shutter.is_some()
+    }
+
     /// Returns the arguments with the path in the scene's pack, if the user wants frames and names no path.
     pub fn with_packed_path(self, scene: &Path) -> Result<Self, CliError> {
         if self.frames.is_none() || self.path.is_some() || self.turntable.is_some() {

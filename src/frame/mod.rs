@@ -52,7 +52,7 @@ pub use self::{
     sample_range::{BlockSum, SampleRange, SampleSums, variance_of_joined},
     view::View,
 };
-pub(crate) use self::{drawn::Unending, resource::for_resources};
+pub(crate) use self::{constants::ImagePlane, drawn::Unending, resource::for_resources};
 use std::ops::Range;
 
 use rayon::prelude::*;

@@ -13,7 +13,7 @@ use kdray::{
         AnimatedWorld, Engine, LoadRequest, Loaded, NoiseGoal, Opened, Work,
         choices::{Choices, ChosenAccel, Methods},
     },
-    frame::{Goal, Profile, RenderOptions, SampleRange},
+    frame::{Aov, Goal, Profile, RenderOptions, SampleRange},
     gpu::DeviceInfo,
     output::{self, FilmFile, Record, WholeRecord},
     util::progress,
@@ -84,6 +84,7 @@ impl Ready {
         Common {
             args,
             options,
+            world,
             camera,
             animated,
             motion: None,
@@ -138,6 +139,8 @@ impl<'a> Session<'a> {
         let may_play = self.args.turntable.is_none() || self.args.load.animation.is_some();
         let time = self.args.is_film().then(|| self.args.load.seconds_of(views[0].frame.into()));
         let time = time.or_else(|| self.args.shutter.map(|_| self.args.load.seconds().unwrap_or_default()));
+        // A single picture shows its time without being told what moves, but the layer of motion needs to know it.
+        let time = time.or(self.args.load.seconds().filter(|_| self.args.aov.contains(&Aov::Motion)));
         let first_time = time.filter(|_| may_play);
         let opened = self.open(scene, first_time, deadline)?;
         let is_animated = first_time.is_some() && self.args.load.plays(&opened.scene.animations);
@@ -242,7 +245,7 @@ impl<'a> Session<'a> {
         let building = engine.builder().describe(n_triangles);
         // What moves is stored apart from what does not.
         let mut request = args.picture.request();
-        if is_animated && request.instances == Instancing::Auto && request.accel == AccelKind::KdTree {
+        if is_animated && args.moves() && request.instances == Instancing::Auto && request.accel == AccelKind::KdTree {
             request.instances = Instancing::Keep;
             progress.note("meshes are kept apart, since some move; --instances flatten stores them as one");
         }
