@@ -41,6 +41,7 @@ impl Expected {
         let of_aov = |aov: &Aov| match aov.is_of_means() {
             true if *aov == Aov::Normal => ["X", "Y", "Z"].map(|component| format!("{aov}.{component}")).to_vec(),
             true => colour(format!("{aov}.")).to_vec(),
+            false if *aov == Aov::Motion => ["motion.X", "motion.Y"].map(str::to_owned).to_vec(),
             false => aov.channels(&[]).into_iter().map(|channel| channel.name).collect(),
         };
         let mut names: Vec<_> = self.aovs.iter().flat_map(of_aov).chain(colour(String::new())).collect();
@@ -76,6 +77,8 @@ impl Expected {
             "variance" if self.n_samples.is_none_or(|n| n == 1) => *value >= 0.0,
             "normal" => value.abs() <= 1.0 + 1e-6,
             "position" => value.is_finite(),
+            // Nothing moves in single pictures.
+            "motion" => *value == 0.0,
             _ => value.is_finite() && *value >= 0.0,
         };
         if let Some(wrong) = values.iter().find(|value| !is_sound(value)) {
@@ -83,7 +86,7 @@ impl Expected {
         }
         let may_vanish = self.is_part && ["emission", "normal", "id", "material"].contains(&layer);
         let is_told = |value: &f64| *value != 0.0 && (layer != "depth" || value.is_finite());
-        (!may_vanish && !values.iter().any(is_told)).then(|| "no value says anything".to_owned())
+        (!may_vanish && layer != "motion" && !values.iter().any(is_told)).then(|| "no value says anything".to_owned())
     }
 
     /// Checks the files of a picture: its own, that of the layers, and the heat map.
@@ -165,7 +168,8 @@ fn write_and_check(options: &RenderOptions, n_samples: Option<u32>, (picture, dr
     let directory = TempDir::new().unwrap();
     let aovs = aovs_of(options);
     let means = drawn.layers.0.each_ref().map(Vec::as_slice);
-    let layers = Layers { aovs: &aovs, pixel_aovs: &drawn.pixel_aovs, means, ..Layers::default() };
+    let (pixel_aovs, motion) = (&drawn.pixel_aovs, &vec![[0.0; 2]; drawn.pixel_aovs.len()]);
+    let layers = Layers { aovs: &aovs, pixel_aovs, motion, means, ..Layers::default() };
     let path = directory.path().join("x.png");
     let written = output::write_layers(&path.with_extension("exr"), picture, &layers);
     written.and_then(|()| output::write_picture(&path, picture)).unwrap_or_else(|error| panic!("{case}: {error}"));
@@ -379,6 +383,7 @@ fn a_faulty_layer_is_noticed() {
     let expected = Expected { size: (2, 1), n_samples: Some(2), aovs, is_part: false };
     let channel = |name: String| match name.rsplit_once('.') {
         Some((_, "ID" | "N")) => Channel { name, samples: Samples::Uint(vec![2, 2]) },
+        Some(("motion", _)) => Channel { name, samples: Samples::Float(vec![0.0; 2]) },
         _ => Channel { name, samples: Samples::Float(vec![0.0, 0.5]) },
     };
     let mut sound: Vec<_> = expected.names().into_iter().map(channel).collect();
@@ -399,6 +404,9 @@ fn a_faulty_layer_is_noticed() {
     for (i, spoil) in (0..sound.len()).flat_map(|i| spoil.map(|spoil| (i, spoil))) {
         let mut spoilt = sound.clone();
         spoil(&mut spoilt[i].samples);
+        if spoilt == sound {
+            continue; // motion without motion
+        }
         assert!(expected.fault(&spoilt).is_some_and(|fault| fault.starts_with(&sound[i].name)), "{:?}", spoilt[i]);
     }
     assert!(expected.fault(&sound[1..]).is_some());

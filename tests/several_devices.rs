@@ -166,6 +166,23 @@ fn numbers_of_samples_may_alternate() {
             .map(|renderer| renderer.draw_range(&camera, range.parse().unwrap(), || ()).unwrap().1.picture);
         assert!(sums[0] == sums[1], "{range}");
     }
+    // Each seed has samples of its own.
+    let [of_alone, of_several] = [&mut alone, &mut several].map(|renderer| {
+        [(5, 48), (5, 8), (0, 48), (0, 8)].map(|(seed, n_samples)| {
+            renderer.set_seed(seed).unwrap();
+            renderer.draw(&camera, Goal::Samples(n_samples), || ()).unwrap();
+            renderer.picture().unwrap().into_owned()
+        })
+    });
+    assert!(of_alone == of_several && of_alone[0] != of_alone[2] && of_alone[1] != of_alone[3]);
+    assert!(several.set_seed(1 << 15).unwrap_err().to_string().contains("seed is 32768, not at most 32767"));
+    // Samples that are drawn one by one have any index.
+    let range = "16-39".parse().unwrap();
+    for renderer in [&mut alone, &mut several] {
+        let together = renderer.draw_range(&camera, range, || ()).unwrap().1;
+        let apart = renderer.draw_moments(range, |_, _| Ok::<_, GpuError>(camera), || ()).unwrap().1;
+        assert!(apart.picture == together.picture);
+    }
 }
 
 /// Pictures that a device draws in several bands have them again in the next picture.

@@ -821,9 +821,9 @@ struct Hit {
 // - `is_orthographic`: 1 for an orthographic camera, 0 for a perspective one. Kernels are made for one of the two
 //   (`CONSTANT_ORTHOGRAPHIC`).
 // - The rest is for frames of paths. `samples_log2`: the frame draws `2^samples_log2` samples of each pixel.
-//   `first_sample`: the index of the first of them. `range_begin`: the index of the first
-//   sample of the picture, which can be one part of all samples. `pixel_filter`: `FILTER_BOX` and its like. `clamp`:
-//   the most light that a path adds to its pixel after its first hit, in any colour (radiance; infinity: any amount).
+//   `first_sample`: the index of the first of them. `range_begin`: the index of the first sample of the picture, which
+//   can be one part of all samples of its seed. `pixel_filter`: `FILTER_BOX` and its like. `clamp`: the most light that
+//   a path adds to its pixel after its first hit, in any colour (radiance; infinity: any amount).
 //   `aperture`: radius of the lens (world units; 0: everything is sharp). `focus`: distance of what is sharp from the
 //   eye, along `forward` (world units). `focuses_on_target`: 1 if that is the distance of the camera's target.
 //   `samples_reciprocal`: 1 / `n_samples`. The host divides, because devices round quotients in different ways.

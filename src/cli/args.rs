@@ -36,7 +36,7 @@ use super::{
         PictureArgs, accel_help, accel_long_help, build_help, build_long_help, check_accel, instances_help, listed,
         traversal_help, traversal_long_help, with_words,
     },
-    render::Shutter,
+    render::{Seed, Shutter},
 };
 
 const PROGRESS: &str = "How the progress is shown: auto, none, or openjd for schedulers of Open Job Description \
@@ -123,6 +123,11 @@ pub struct RenderArgs {
     #[arg(long, value_name = "OPEN,CLOSE", allow_hyphen_values = true)]
     #[arg(conflicts_with_all = ["time", "noise", "trace", "repeat"])]
     pub shutter: Option<Shutter>,
+    /// Which noise the picture has, for --integrator path; pictures of whitted have none, and stay the same: 0 to 32767
+    /// for one that is fixed, also in films, or frame for the number of the frame (--frames, --frame), so that each has
+    /// its own [default: 0]
+    #[arg(long, value_name = "N|frame", default_value = "0", hide_default_value = true)]
+    pub seed: Seed,
     /// Leave out pictures whose files exist already, whatever they show, so that a film that was interrupted goes on
     /// where it ended
     #[arg(long, conflicts_with_all = ["repeat", "profile", "trace"])]
@@ -341,12 +346,22 @@ impl RenderArgs {
         self.path.is_some() || self.frames.is_some() || self.turntable.is_some()
     }
 
+    /// Whether pictures show several moments.
+    pub fn moves(&self) -> bool {
+        self.is_film() || self.shutter.is_some()
+    }
+
     /// Returns the arguments with the path in the scene's pack, if the user wants frames and names no path.
     pub fn with_packed_path(self, scene: &Path) -> Result<Self, CliError> {
         if self.frames.is_none() || self.path.is_some() || self.turntable.is_some() {
             return Ok(self);
         }
         Ok(Self { path: packed_path(scene)?, ..self })
+    }
+
+    /// Returns the seed of a picture. `frame`: its number in a film.
+    pub fn seed_of(&self, frame: u32) -> u32 {
+        self.seed.of_frame(if self.is_film() { frame } else { self.load.frame.unwrap_or(0) })
     }
 
     /// Refuses arguments that contradict each other.

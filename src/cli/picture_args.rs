@@ -228,11 +228,11 @@ impl PictureArgs {
             tonemap: self.tonemap,
             denoise: self.denoise(),
             paths: PathOptions {
-                first_sample: 0,
                 filter: self.pixel_filter.unwrap_or(paths.filter),
                 clamp: self.clamp.unwrap_or(paths.clamp),
                 aperture: self.aperture.unwrap_or(paths.aperture),
                 focus: self.focus.or(paths.focus),
+                ..paths
             },
         }
     }

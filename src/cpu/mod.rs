@@ -12,6 +12,7 @@
 //!       lambertian_surfaces, lambertian_steps, area_lights   the steps of sixteen paths at Lambertian surfaces
 //!       vec3x16, turns           sixteen vectors; sines and cosines of sixteen angles
 //!   timing   wall-clock times of passes
+//! motion_vectors   where the points that pixels show are in the next frame
 //! meter    the exposure of a scene whose light has physical units
 //! trace    the reference's passes that trace rays, with the tracer of this folder
 //!   tracer   traces rays one after the other, or as packets:
@@ -28,6 +29,7 @@ mod lambertian_steps;
 mod lambertian_surfaces;
 pub mod lanes;
 mod meter;
+mod motion_vectors;
 pub mod packet;
 pub mod packet_traverser;
 pub mod packet_triangle;
@@ -47,6 +49,7 @@ pub mod wide_traverser;
 
 pub use self::{
     meter::metered_exposure,
+    motion_vectors::motion_vectors,
     render::{Batching, CpuRenderer},
     trace::{cast, shadow, trace, visibility},
     tracer::CpuSearch,

@@ -234,10 +234,18 @@ impl CpuRenderer {
         self.batching.n_pixels = most_pixels.map_or(n_pixels, |most| most.clamp(1, n_pixels));
     }
 
-    /// Sets the index of the picture's first sample, a multiple of `2^SAMPLE_BLOCK_LOG2`. Only frames of paths know it.
-    /// The next sample is the first of a new picture.
+    /// Sets the index of the picture's first sample: any index if the picture has a single sample, else that of an
+    /// aligned block of its samples. Only frames of paths know it. The next sample is the first of a new picture.
     pub fn set_first_sample(&mut self, first_sample: u32) {
         self.options.paths.first_sample = first_sample;
+        self.frame.set_options(&self.options);
+        self.reset_samples();
+    }
+
+    /// Sets the random numbers of the next pictures ([`PathOptions::seed`](crate::frame::PathOptions::seed)). The next
+    /// sample is the first of a new picture.
+    pub fn set_seed(&mut self, seed: u32) {
+        self.options.paths.seed = seed;
         self.frame.set_options(&self.options);
         self.reset_samples();
     }

@@ -9,8 +9,8 @@ use super::{
 use crate::{
     cpu::{self, Batching},
     frame::{
-        BadOptions, Denoise, Drawn, DrawnTiles, FrameRenderer, Goal, Integrator, NoiseTiles, Picture, RangeSums,
-        RenderOptions, SampleRange, TileSamples, Unending, Watcher,
+        BadOptions, Denoise, Drawn, DrawnTiles, FrameRenderer, Goal, Integrator, NoiseTiles, PathOptions, Picture,
+        RangeSums, RenderOptions, SampleRange, TileSamples, Unending, Watcher,
     },
     gpu::{Context, DeviceInfo, ExternalImage, GpuError, TimelinePoint},
     render::BandedRenderer,
@@ -80,6 +80,25 @@ impl Renderer {
                 Ok(())
             }
         }
+    }
+
+    /// Sets the random numbers of the next pictures ([`PathOptions::seed`]). Only pictures of paths have any.
+    ///
+    /// # Errors
+    /// The seed is out of its range, or a Vulkan call fails.
+    pub fn set_seed(&mut self, seed: u32) -> Result<(), GpuError> {
+        let paths = PathOptions { seed, ..self.options.paths };
+        let options = RenderOptions { paths, ..self.options.clone() };
+        options.check()?;
+        if options.integrator == Integrator::Path {
+            match &mut self.backend {
+                Backend::Device(renderer) => renderer.set_seed(seed)?,
+                Backend::Group(group) => group.set_seed(seed)?,
+                Backend::Cpu(renderer) => renderer.set_seed(seed),
+            }
+        }
+        self.options = options;
+        Ok(())
     }
 
     /// Draws what a camera sees. The watcher is notified of each sample of each band. If it uses [`Watcher::part`], it

@@ -21,6 +21,9 @@ pub enum Aov {
     Id,
     /// Index of the material that it hits; 4294967295 for a miss.
     Material,
+    /// Vector from the pixel to where the point of [`Aov::Position`] is in the next frame's picture: pixels to the
+    /// right and upwards. For a miss, that of a point infinitely far away.
+    Motion,
     /// Number of the rays of the pixel's first sample: primary, secondary and shadow rays.
     Rays,
     /// Number of entries of the acceleration structure that these rays read, such as nodes and triangles in leaves.
@@ -46,6 +49,7 @@ named_enum!(Aov {
     Albedo = "albedo": "mean of the samples' reflectances, of glass its tint, linear, 0 to 1",
     Id = "id": "index of the triangle; 4294967295 where nothing is hit",
     Material = "material": "index of the material; 4294967295 where nothing is hit",
+    Motion = "motion": "pixels to the right and up to where the point is one frame later; 0 where nothing moves",
     Rays = "rays": "number of primary, secondary and shadow rays of the pixel's first sample",
     Cost = "cost": "nodes or cells, and triangles that these rays read; also drawn as NAME.cost.png",
     Variance = "variance": "variance of the pixel's mean luminance, from its samples; needs --integrator path",
@@ -119,7 +123,8 @@ impl Aov {
         if matches!(self, Self::Normal | Self::Position) { ["X", "Y", "Z"] } else { ["R", "G", "B"] }
     }
 
-    /// Returns the output's channels, from a picture's AOVs. Layers that are means of all samples are none of them.
+    /// Returns the output's channels, from a picture's AOVs. Layers that are means of all samples are none of them, and
+    /// neither is [`Aov::Motion`].
     pub fn channels(self, pixel_aovs: &[PixelAovs]) -> Vec<Channel> {
         let float = |component: &str, value: fn(&PixelAovs) -> f32| Channel {
             name: format!("{self}.{component}"),
@@ -142,7 +147,7 @@ impl Aov {
             Self::Cost => vec![uint("N", |f| f.n_steps)],
             Self::Variance => vec![float("Y", |f| f.variance)],
             Self::Samples => vec![uint("N", |f| f.n_samples)],
-            Self::Emission | Self::Direct | Self::Indirect | Self::Albedo | Self::Normal => Vec::new(),
+            Self::Emission | Self::Direct | Self::Indirect | Self::Albedo | Self::Normal | Self::Motion => Vec::new(),
         }
     }
 }

@@ -3,7 +3,8 @@
 use super::{BadOptions, Denoise, Goal, Integrator, NoiseTiles, PathOptions, RenderOptions, SampleRange};
 use crate::{gpu::GpuError, layout::SAMPLE_BLOCK_LOG2};
 
-/// The last value that an index of a first sample may have: the indices of all samples of a picture fit 32 bits.
+/// The last value that an index of a first sample may have: the indices of all samples of a picture, of whatever seed,
+/// fit 32 bits.
 const MOST_FIRST_SAMPLE: u32 = 1 << 31;
 
 impl From<BadOptions> for GpuError {
@@ -20,12 +21,19 @@ impl RenderOptions {
     /// The greatest threshold of [`Denoise::Paper`].
     pub const MOST_THRESHOLD: f32 = 4.0;
 
-    /// Checks that frames can be rendered with the options. Whatever renders calls it first.
+    /// Checks that pictures can be rendered with the options. Whatever renders calls it first.
     ///
     /// # Errors
     /// An option is out of its range, the crop or a noise tile is outside the picture, or noise tiles are asked for
     /// without paths or with a noise filter. The message is one line, which names the option and its range.
     pub fn check(&self) -> Result<(), BadOptions> {
+        self.check_ranges()?;
+        self.check_first_sample(1 << SAMPLE_BLOCK_LOG2)
+    }
+
+    /// Checks what [`RenderOptions::check`] does, but lets the picture begin with any sample, as those do that have a
+    /// single sample.
+    pub(crate) fn check_ranges(&self) -> Result<(), BadOptions> {
         let count = |name: &str, value: u32, most: u32| {
             check(name, value, (1..=most).contains(&value), || format!("1 to {most}"))
         };
@@ -41,13 +49,32 @@ impl RenderOptions {
             let most = Self::MOST_THRESHOLD;
             check("threshold", threshold, (0.0..=most).contains(&threshold), || format!("0 to {most}"))?;
         }
-        let PathOptions { first_sample, filter: _, clamp, aperture, focus } = self.paths;
+        let PathOptions { seed, first_sample, filter: _, clamp, aperture, focus } = self.paths;
         check("clamp", clamp, clamp > 0.0, || "above 0".to_owned())?;
         check("aperture", aperture, aperture == 0.0 || is_positive(aperture), || "finite and at least 0".to_owned())?;
         focus.map_or(Ok(()), |focus| number("focus", focus, is_positive(focus)))?;
+        let most = PathOptions::MOST_SEED;
+        check("seed", seed, seed <= most, || format!("at most {most}"))?;
         let is_right = first_sample <= MOST_FIRST_SAMPLE;
         check("first_sample", first_sample, is_right, || format!("at most {MOST_FIRST_SAMPLE}"))?;
         self.check_part()
+    }
+
+    /// Checks that the samples of a picture can be drawn together: they begin with a block of the tree in which samples
+    /// are added, or are an aligned block of it, as a single sample is.
+    pub(crate) fn check_samples(&self, goal: Goal) -> Result<(), BadOptions> {
+        let most = 1 << SAMPLE_BLOCK_LOG2;
+        self.check_first_sample(match goal {
+            Goal::Samples(n_samples) if n_samples < most => n_samples.next_power_of_two(),
+            _ => most,
+        })
+    }
+
+    fn check_first_sample(&self, size: u32) -> Result<(), BadOptions> {
+        let first = self.paths.first_sample;
+        check("first_sample", first, first.is_multiple_of(size), || {
+            format!("a multiple of {size} up to {MOST_FIRST_SAMPLE}")
+        })
     }
 
     /// Checks the crop and the noise tiles.
@@ -145,6 +172,8 @@ mod tests {
         ("aperture is inf", |it| it.paths.aperture = f32::INFINITY),
         ("focus is 0, not a finite number above 0", |it| it.paths.focus = Some(0.0)),
         ("focus is NaN", |it| it.paths.focus = Some(f32::NAN)),
+        ("seed is 32768, not at most 32767", |it| it.paths.seed = 32_768),
+        ("first_sample is 8, not a multiple of 16", |it| it.paths.first_sample = 8),
         ("first_sample is 4294967280, not at most 2147483648", |it| it.paths.first_sample = u32::MAX - 15),
         ("crop is 5,1,4,2, not pixels of a picture of 40x30", |it| it.crop = crop(5, 1, 4, 2)),
         ("crop is 5,1,5,2", |it| it.crop = crop(5, 1, 5, 2)),
@@ -170,6 +199,25 @@ mod tests {
             let error = options.check().expect_err(expected).to_string();
             assert!(error.starts_with(expected), "{error}, not {expected}");
         }
+    }
+
+    #[test]
+    fn samples_that_are_drawn_together_are_blocks() {
+        let from = |first_sample, goal| {
+            let paths = PathOptions { first_sample, ..PathOptions::default() };
+            RenderOptions { paths, ..RenderOptions::default() }.check_samples(goal)
+        };
+        for (first_sample, n_samples) in [(7, 1), (7, 0), (20, 2), (20, 3), (8, 8), (32, 100), (16, 32)] {
+            assert_eq!(from(first_sample, Goal::Samples(n_samples)), Ok(()), "{n_samples} from {first_sample} on");
+        }
+        for (first_sample, n_samples, size) in [(7, 2, 2), (20, 5, 8), (8, 9, 16), (8, 32, 16)] {
+            let error = from(first_sample, Goal::Samples(n_samples)).unwrap_err().to_string();
+            assert!(
+                error.starts_with(&format!("first_sample is {first_sample}, not a multiple of {size} up")),
+                "{error}"
+            );
+        }
+        assert!(from(8, Goal::Time(Duration::ZERO)).is_err() && from(16, Goal::Time(Duration::ZERO)).is_ok());
     }
 
     #[test]

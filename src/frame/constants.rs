@@ -51,7 +51,7 @@ impl Frame {
             PixelFilter::Tent => FILTER_TENT,
             PixelFilter::Gaussian => FILTER_GAUSSIAN,
         };
-        self.range_begin = options.paths.first_sample;
+        self.range_begin = options.paths.range_begin();
         self.clamp = options.paths.clamp;
         self.aperture = options.paths.aperture;
         self.focus = options.paths.focus.unwrap_or(0.0);
@@ -106,14 +106,14 @@ fn moved_by(step: DVec2) -> DMat4 {
 /// The picture's rectangle in the world. It is at unit distance from the eye of a perspective camera. Its middle is the
 /// eye of an orthographic camera. `forward`: the direction of the view. `right`, `up`: the vectors from
 /// the rectangle's centre to its right and to its upper edge, world space.
-struct ImagePlane {
-    forward: DVec3,
-    right: DVec3,
-    up: DVec3,
+pub(crate) struct ImagePlane {
+    pub forward: DVec3,
+    pub right: DVec3,
+    pub up: DVec3,
 }
 
 impl ImagePlane {
-    fn new(camera: &Camera, aspect: f64) -> Self {
+    pub fn new(camera: &Camera, aspect: f64) -> Self {
         let forward = (camera.target.as_dvec3() - camera.eye.as_dvec3()).normalize();
         let right = forward.cross(camera.up.as_dvec3()).normalize();
         let half_height = match camera.projection {

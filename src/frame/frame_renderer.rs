@@ -85,8 +85,10 @@ pub trait FrameRenderer {
     /// Draws a new picture of the window, and reports its progress to the watcher, which can end it after any frame.
     ///
     /// # Errors
-    /// Fails as [`FrameRenderer::draw_frame`] does.
+    /// Fails as [`FrameRenderer::draw_frame`] does, or if the options' first sample is none from which so many samples
+    /// can be drawn together.
     fn draw_window(&mut self, goal: Goal, watcher: &mut impl Watcher) -> Result<Drawn, GpuError> {
+        self.options().check_samples(goal)?;
         self.reset_samples();
         let RenderOptions { integrator, pixel_aovs, .. } = *self.options();
         // The samples of paths are at random places of their pixels.

@@ -52,7 +52,7 @@ pub use self::{
     sample_range::{BlockSum, SampleRange, SampleSums, variance_of_joined},
     view::View,
 };
-pub(crate) use self::{drawn::Unending, resource::for_resources};
+pub(crate) use self::{constants::ImagePlane, drawn::Unending, resource::for_resources};
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -148,9 +148,12 @@ impl RenderOptions {
 /// Options of [`Integrator::Path`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathOptions {
-    /// Index of the picture's first sample in each pixel. Pictures of other samples are independent of this one, and
-    /// their mean is the picture of all samples: with the same bits if this is a multiple of `2^SAMPLE_BLOCK_LOG2`, or
-    /// the picture has one sample.
+    /// Which random numbers the picture has, 0 to [`PathOptions::MOST_SEED`]. The noise of pictures of two seeds is
+    /// independent: each has a range of samples of its own, of which there are [`SampleRange::MOST`].
+    pub seed: u32,
+    /// Index of the picture's first sample in each pixel, among those of its seed: a multiple of
+    /// `2^SAMPLE_BLOCK_LOG2`. Pictures of other samples are independent of this one, and their mean is the picture of
+    /// all samples.
     pub first_sample: u32,
     /// The density of samples around the centre of their pixel.
     pub filter: PixelFilter,
@@ -164,9 +167,19 @@ pub struct PathOptions {
     pub focus: Option<f32>,
 }
 
+impl PathOptions {
+    /// The greatest seed. The indices of all samples of all seeds fit 32 bits.
+    pub const MOST_SEED: u32 = (1 << 15) - 1;
+
+    /// Returns the index of the picture's first sample among those of all seeds.
+    pub(crate) fn range_begin(&self) -> u32 {
+        SampleRange::MOST * self.seed + self.first_sample
+    }
+}
+
 impl Default for PathOptions {
     fn default() -> Self {
-        Self { first_sample: 0, filter: PixelFilter::Tent, clamp: f32::INFINITY, aperture: 0.0, focus: None }
+        Self { seed: 0, first_sample: 0, filter: PixelFilter::Tent, clamp: f32::INFINITY, aperture: 0.0, focus: None }
     }
 }
 

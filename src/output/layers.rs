@@ -22,6 +22,8 @@ pub struct Layers<'a> {
     pub aovs: &'a [Aov],
     /// An entry for each pixel; may be empty without AOVs.
     pub pixel_aovs: &'a [PixelAovs],
+    /// The vectors of [`Aov::Motion`], if `aovs` lists it: X and Y of each pixel.
+    pub motion: &'a [[f32; 2]],
     /// The layers that are means of all samples. Those that `aovs` lists have the pixels of the picture.
     pub means: [&'a [[f32; 4]]; Aov::OF_MEANS.len()],
     /// Sums of blocks of samples, for parts of a picture whose means do not tell the sums.
@@ -88,6 +90,7 @@ fn channels(picture: &Picture, layers: &Layers) -> Vec<Channel> {
                 let (mean, sums) = (layers.means[layer_ix], layers.mean_sums[layer_ix]);
                 channels.extend(components(&format!("{aov}."), aov.components(), mean, sums));
             }
+            None if *aov == Aov::Motion => channels.extend(float_channels("motion.", ["X", "Y"], layers.motion)),
             None => channels.extend(aov.channels(layers.pixel_aovs)),
         }
     }
@@ -96,14 +99,16 @@ fn channels(picture: &Picture, layers: &Layers) -> Vec<Channel> {
 
 /// Returns the channels of a mean of samples, and of the sums of its blocks. `prefix`: the layer and a dot, or nothing.
 fn components(prefix: &str, names: [&str; 3], mean: &[[f32; 4]], sums: &[BlockSum]) -> Vec<Channel> {
-    fn channels<const N: usize>(prefix: &str, names: [&str; 3], pixels: &[[f32; N]]) -> [Channel; 3] {
-        std::array::from_fn(|ix| Channel {
-            name: format!("{prefix}{}", names[ix]),
-            samples: Samples::Float(pixels.iter().map(|pixel| pixel[ix]).collect()),
-        })
-    }
-    let sums = sums.iter().flat_map(|block| channels(&sum_prefix(prefix, block.samples), names, &block.sums));
-    channels(prefix, names, mean).into_iter().chain(sums).collect()
+    let sums = sums.iter().flat_map(|block| float_channels(&sum_prefix(prefix, block.samples), names, &block.sums));
+    float_channels(prefix, names, mean).into_iter().chain(sums).collect()
+}
+
+/// Returns the channels of the first `M` components of pixels.
+fn float_channels<const M: usize, const N: usize>(prefix: &str, names: [&str; M], pixels: &[[f32; N]]) -> [Channel; M] {
+    std::array::from_fn(|ix| Channel {
+        name: format!("{prefix}{}", names[ix]),
+        samples: Samples::Float(pixels.iter().map(|pixel| pixel[ix]).collect()),
+    })
 }
 
 /// Returns what the names of the channels begin with that have the sums of a block of samples. `prefix`: what those of

@@ -54,6 +54,16 @@ pub struct WholeRecord {
     pub height: u32,
     /// Number of samples of each pixel of the whole picture.
     pub n_samples: u32,
+    /// The time at which animations are shown, with its unit; none if they stand at rest.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub time: Option<String>,
+    /// When the picture is exposed, in frames from its time on, and the frames a second; none if all samples show one
+    /// moment.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub shutter: Option<String>,
+    /// Which random numbers paths have; 0 for whitted, which has none.
+    #[serde(default)]
+    pub seed: u32,
     /// How light is computed.
     pub integrator: String,
     /// Number of bounces, the primary rays included.
@@ -107,6 +117,9 @@ impl WholeRecord {
             width,
             height,
             n_samples,
+            time: None,
+            shutter: None,
+            seed: if of_paths { paths.seed } else { 0 },
             integrator: options.integrator.to_string(),
             max_depth,
             exposure,

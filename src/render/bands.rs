@@ -78,7 +78,7 @@ impl BandedRenderer {
             return Ok(());
         }
         let options = RenderOptions { crop: Some(crop), noise_tiles: None, ..self.renderer.options().clone() };
-        options.check()?;
+        options.check_ranges()?;
         let bands = bands(self.renderer.context.limits(), &options);
         let crop = largest(&bands, &options).unwrap_or(crop);
         self.renderer.set_options(&RenderOptions { crop: Some(crop), ..options })?;
@@ -86,16 +86,28 @@ impl BandedRenderer {
         Ok(())
     }
 
-    /// Sets the index of the next picture's first sample ([`PathOptions::first_sample`]). Only frames of paths know it.
+    /// Sets the index of the next picture's first sample: any index if the picture has a single sample, else that of an
+    /// aligned block of its samples. Only frames of paths know it.
     ///
     /// # Errors
     /// A Vulkan call fails.
     pub fn set_first_sample(&mut self, first_sample: u32) -> Result<(), GpuError> {
+        self.set_paths(PathOptions { first_sample, ..self.renderer.options().paths })
+    }
+
+    /// Sets the random numbers of the next pictures ([`PathOptions::seed`]).
+    ///
+    /// # Errors
+    /// A Vulkan call fails.
+    pub fn set_seed(&mut self, seed: u32) -> Result<(), GpuError> {
+        self.set_paths(PathOptions { seed, ..self.renderer.options().paths })
+    }
+
+    fn set_paths(&mut self, paths: PathOptions) -> Result<(), GpuError> {
         let options = self.renderer.options();
-        if options.paths.first_sample == first_sample {
+        if options.paths == paths {
             return Ok(());
         }
-        let paths = PathOptions { first_sample, ..options.paths };
         self.renderer.set_options(&RenderOptions { paths, ..options.clone() })
     }
 

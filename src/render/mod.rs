@@ -86,6 +86,7 @@ impl GpuRenderer {
     /// An option is out of its range, the scene or the picture exceeds the device's limits or memory, the device lacks
     /// 64-bit atomics for [`Primary::SoftwareRaster`], or the driver refuses a shader.
     pub fn new(context: Arc<Context>, world: &World, options: &RenderOptions) -> Result<Self, GpuError> {
+        options.check()?;
         Self::with_capacity((context, world), options, None, None)
     }
 
@@ -122,7 +123,7 @@ impl GpuRenderer {
         fixed_capacity: Option<u32>,
         shared: Option<&Self>,
     ) -> Result<Self, GpuError> {
-        options.check()?;
+        options.check_ranges()?;
         let scene = world.scene();
         let (asked, options) = (options.clone(), &in_use(options));
         let both = MATERIAL_REFLECT | MATERIAL_REFRACT;

@@ -106,7 +106,7 @@ impl GpuRenderer {
     /// Creates the buffers and kernels that the changed options need, and then installs them by steps that cannot
     /// fail.
     fn remake(&mut self, options: &RenderOptions) -> Result<(), GpuError> {
-        options.check()?;
+        options.check_ranges()?;
         let (asked, options) = (options.clone(), &in_use(options));
         if options.integrator != self.in_use.integrator {
             return self.replace(&asked);

@@ -1,8 +1,9 @@
 //! Tests of films: animations of glTF files, and turns around scenes.
 
-use std::{fs, path::Path};
+use std::{collections::BTreeMap, fs, path::Path};
 
 use base64::{Engine, engine::general_purpose::STANDARD};
+use exr::prelude::{FlatSamples, ReadChannels, ReadLayers};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -295,6 +296,164 @@ fn what_moves_while_the_shutter_is_open_is_blurred() {
         (sum(&moved) / sum(&still) - 1.0).abs() < 0.08 && n_lit(&moved) > 7 && n_lit(&still) < 6,
         "{moved:?} {still:?}"
     );
+}
+
+/// The channels of a file, by their names.
+fn layers(path: &Path) -> BTreeMap<String, FlatSamples> {
+    let reader = exr::prelude::read().no_deep_data().largest_resolution_level().all_channels();
+    let image = reader.first_valid_layer().all_attributes().from_file(path).unwrap();
+    let channels = image.layer_data.channel_data.list;
+    channels.into_iter().map(|channel| (channel.name.to_string(), channel.sample_data)).collect()
+}
+
+/// The channels of some names, pixel by pixel.
+fn vectors<const N: usize>(path: &Path, names: [&str; N]) -> Vec<[f32; N]> {
+    let layers = layers(path);
+    let channels = names.map(|name| layers[name].values_as_f32().collect::<Vec<_>>());
+    (0..channels[0].len()).map(|ix| std::array::from_fn(|channel_ix| channels[channel_ix][ix])).collect()
+}
+
+/// The bar goes 2 units in a frame of 2 seconds, which are 20 pixels, whether it is moved or deformed.
+#[test]
+fn vectors_of_motion_are_those_of_the_bar() {
+    for deforms in [false, true] {
+        let directory = with_bar(deforms);
+        let path = directory.path();
+        for (integrator, device) in [("whitted", "--cpu"), ("path", "--cpu"), ("path", "--validate")] {
+            let common = ["render", "bar.gltf", "-q", "--size", "40x10", "--denoise", "off", "--spp", "4"];
+            let with = [&common[..], &["--aov", "motion,id", "--integrator", integrator, device]].concat();
+            let render = |more: &[&str]| succeed(path, &[&with[..], more].concat());
+            let check = |name: &str, expected: f32| {
+                let found = vectors(&path.join(name), ["motion.X", "motion.Y"]);
+                let hits: Vec<u32> =
+                    layers(&path.join(name))["id.ID"].values_as_f32().map(|id| u32::from(id < 1e6)).collect();
+                assert!(hits.iter().sum::<u32>() > 80);
+                for (ix, (found, is_hit)) in found.into_iter().zip(hits).enumerate() {
+                    let off = (found[0] - expected * is_hit as f32).abs().max(found[1].abs());
+                    assert!(off < 1e-4, "{name}, {deforms} {integrator} {device}: {found:?} in pixel {ix}");
+                }
+            };
+            render(&["--frames", "0-1", "--fps", "0.5", "-o", "film#.exr"]);
+            check("film0.exr", 20.0);
+            check("film1.exr", 0.0); // the animation has ended
+            render(&["--at", "0.5", "--fps", "2", "-o", "at.exr"]);
+            check("at.exr", 5.0);
+            render(&["-o", "rest.exr"]);
+            check("rest.exr", 0.0);
+            for part in ["1", "2"] {
+                let (tile, name) = (format!("{part}/2"), format!("{part}.exr"));
+                render(&["--at", "0.5", "--fps", "2", "--tile", &tile, "-o", &name]);
+            }
+            succeed(path, &["merge", "1.exr", "2.exr", "-q", "-o", "joined.exr"]);
+            check("joined.exr", 5.0);
+            if integrator == "path" {
+                render(&["--shutter", "0,0.5", "--fps", "2", "-o", "blurred.exr"]);
+                check("blurred.exr", 5.0);
+            }
+        }
+    }
+}
+
+/// A vector leads to the pixel of the next frame that shows where the point is then.
+#[test]
+fn vectors_of_motion_lead_to_the_next_frame() {
+    let directory = with_model(true);
+    let path = directory.path();
+    let (width, height) = (60, 45);
+    for device in ["--cpu", "--validate"] {
+        let common = ["render", "moving.gltf", "-q", "--size", "60x45", "--spp", "1", "--denoise", "off", device];
+        let film = ["--aov", "motion,position,id", "--frames", "0-1", "--fps", "2", "-o", "f#.exr"];
+        succeed(path, &[&common[..], &film].concat());
+        let of = |frame: u32| path.join(format!("f{frame}.exr"));
+        let motion = vectors(&of(0), ["motion.X", "motion.Y"]);
+        let [now, next] = [0, 1].map(|frame| vectors(&of(frame), ["id.ID", "position.X", "position.Y", "position.Z"]));
+        let mut n_of_squares = [0; 2];
+        for (ix, ([x, y], [id, px, py, pz])) in motion.into_iter().zip(now).enumerate() {
+            if id > 3.0 {
+                continue;
+            }
+            // One square goes half a unit to the right, and the other one grows by a quarter around its corner.
+            let square = usize::from(id > 1.0);
+            let expected = [[px + 0.5, py, pz], [0.2 + (px - 0.2) * 1.25, -1.2 + (py + 1.2) * 1.25, pz]][square];
+            // The place in the next frame, from the centre of its first pixel on.
+            let [x, y] = [(ix % width) as f32 + x, (ix / width) as f32 - y];
+            let (left, top) = (x.floor(), y.floor());
+            if left < 0.0 || top < 0.0 || left as usize + 1 >= width || top as usize + 1 >= height {
+                continue;
+            }
+            let corner = top as usize * width + left as usize;
+            let around = [corner, corner + 1, corner + width, corner + width + 1].map(|ix| next[ix]);
+            if around.iter().any(|it| it[0] > 3.0 || usize::from(it[0] > 1.0) != square) {
+                continue;
+            }
+            // Points of a plane before the camera lie in the picture as in the plane.
+            let (u, v) = (x - left, y - top);
+            for axis in 0..3 {
+                let [a, b, c, d] = around.map(|it| it[1 + axis]);
+                let found = (a * (1.0 - u) + b * u) * (1.0 - v) + (c * (1.0 - u) + d * u) * v;
+                assert!((found - expected[axis]).abs() < 1e-3, "{device}: pixel {ix}, {found}, {expected:?}");
+            }
+            n_of_squares[square] += 1;
+        }
+        assert!(n_of_squares.iter().all(|n| *n > 30), "{n_of_squares:?}");
+    }
+}
+
+/// Parts of pictures of other times or shutters are not joined.
+#[test]
+fn parts_have_one_time_and_one_shutter() {
+    let directory = with_bar(false);
+    let path = directory.path();
+    let common = [&["render", "bar.gltf", "--cpu", "--spp", "32", "--instances", "keep"], &BLURRED[..5]].concat();
+    let render = |more: &[&str]| succeed(path, &[&common[..], more].concat());
+    let merge = |parts: [&str; 2]| succeed(path, &["merge", parts[0], parts[1], "-q", "-o", "joined.exr"]);
+    let refused = |parts: [&str; 2], what: &str| {
+        fail(path, &["merge", parts[0], parts[1], "-q", "-o", "joined.exr"], 3, what);
+    };
+    let (early, late) = (["--samples", "0-16"], ["--samples", "16-32"]);
+    render(&[&early[..], &["--fps", "0.5", "--shutter", "0,0.1", "-o", "a.exr"]].concat());
+    render(&[&late[..], &["--fps", "0.5", "--shutter", "0,0.1", "-o", "b.exr"]].concat());
+    render(&[&late[..], &["--fps", "0.5", "--shutter", "0,0.3", "-o", "long.exr"]].concat());
+    render(&[&late[..], &["--shutter", "0,0.1", "--fps", "24", "-o", "fast.exr"]].concat());
+    merge(["a.exr", "b.exr"]);
+    let own = "shutter: \"0,0.1 at 0.5 frames a second\" and ";
+    refused(["a.exr", "long.exr"], &format!("{own}\"0,0.3 at 0.5 frames a second\""));
+    refused(["a.exr", "fast.exr"], &format!("{own}\"0,0.1 at 24 frames a second\""));
+    render(&[&early[..], &["--fps", "0.5", "--frames", "0-1", "-o", "early#.exr"]].concat());
+    render(&[&late[..], &["--fps", "0.5", "--frames", "0-1", "-o", "late#.exr"]].concat());
+    merge(["early1.exr", "late1.exr"]);
+    refused(["early0.exr", "late1.exr"], "time: \"0 s\" and \"2 s\"");
+}
+
+/// The noise of a film is the same in all frames, or that of each frame's number, whichever frames are drawn.
+#[test]
+fn noise_is_fixed_or_new_in_each_frame() {
+    let directory = with_bar(false);
+    let path = directory.path();
+    let key = |frame| format!("[[keyframe]]\nframe = {frame}\neye = [0, 0, 5]\ntarget = [0, 0, 0]\n");
+    fs::write(path.join("path.toml"), key(0) + &key(9)).unwrap();
+    for device in ["--cpu", "--validate"] {
+        // A lens blurs the bar, with noise.
+        let still = ["--animation", "none", "--path", "path.toml", "--spp", "4", "--aperture", "0.9", "--focus", "3"];
+        let common = [&["render", "bar.gltf", device], &BLURRED[..], &still].concat();
+        let render = |more: &[&str]| succeed(path, &[&common[..], more].concat());
+        render(&["--frames", "2-3", "-o", "fixed#.exr"]);
+        render(&["--frames", "2-3", "--seed", "frame", "-o", "new#.exr"]);
+        render(&["--frames", "3", "--seed", "frame", "-o", "alone#.exr"]);
+        render(&["--frames", "2", "--seed", "3", "-o", "three#.exr"]);
+        let row = |name: &str| row(&path.join(name));
+        assert!(row("fixed2.exr") == row("fixed3.exr") && row("new2.exr") != row("new3.exr"), "{device}");
+        assert!(row("new3.exr") == row("alone3.exr") && row("new3.exr") == row("three2.exr"), "{device}");
+        assert!(row("new2.exr") != row("fixed2.exr") && row("new2.exr") != row("alone3.exr"), "{device}");
+    }
+    for word in ["32768", "-1", "frames"] {
+        fail(
+            path,
+            &["render", "bar.gltf", &format!("--seed={word}")],
+            2,
+            "expected a number from 0 to 32767, or frame",
+        );
+    }
 }
 
 #[test]

@@ -76,6 +76,36 @@ fn samples_and_tiles_join_to_the_same_bits() {
     }
 }
 
+/// A seed has samples of its own, of which ranges and tiles are parts, and which are as many as a noise demands.
+#[test]
+fn seeds_are_other_pictures_of_the_same_light() {
+    for device in ["--cpu", "--validate"] {
+        let directory = TempDir::new().unwrap();
+        let path = directory.path();
+        let render = |name: &str, more: &[&str]| render_paths(path, name, &[&["--spp", "64", device], more].concat());
+        render("plain.exr", &[]);
+        render("zero.exr", &["--seed", "0"]);
+        assert_same(path, "plain.exr", "zero.exr");
+        let seed = ["--seed", "32767"];
+        render("whole.exr", &seed);
+        render("b.exr", &[&seed[..], &["--samples", "16-64", "--tile", "1/2"]].concat());
+        render("c.exr", &[&seed[..], &["--samples", "16-64", "--tile", "2/2"]].concat());
+        render("d.exr", &[&seed[..], &["--samples", "0-16", "--tile", "2/2"]].concat());
+        render("e.exr", &[&seed[..], &["--samples", "0-16", "--tile", "1/2"]].concat());
+        merge(path, &["b.exr", "c.exr", "d.exr", "e.exr"], "merged.exr");
+        assert_same(path, "whole.exr", "merged.exr");
+        render("noise.exr", &[&seed[..], &["--noise", "0.0001"]].concat());
+        let light = |name: &str| -> Vec<f32> {
+            let (channels, _) = contents(&path.join(name));
+            channels.iter().flat_map(|(_, bits)| bits.iter().map(|bits| f32::from_bits(*bits))).collect()
+        };
+        let [plain, whole, noise] = ["plain.exr", "whole.exr", "noise.exr"].map(light);
+        assert!(whole == noise && whole != plain, "{device}");
+        let mean = |values: &[f32]| values.iter().sum::<f32>() / values.len() as f32;
+        assert!((mean(&whole) / mean(&plain) - 1.0).abs() < 0.02, "{} {}", mean(&whole), mean(&plain));
+    }
+}
+
 /// The counts of samples add up, and the variance is about that of all samples: the mean over the picture is within a
 /// tenth.
 #[test]
@@ -168,6 +198,8 @@ fn what_is_missing_or_does_not_fit_is_named() {
     refused(&["1.exr", "2.exr", "fewer.exr"], "n_samples: 64 and 32");
     cpu("filter.exr", &["--tile", "2/2", "--pixel-filter", "box"]);
     refused(&["1.exr", "2.exr", "filter.exr"], "paths: {");
+    cpu("seed.exr", &["--tile", "2/2", "--seed", "7"]);
+    refused(&["1.exr", "2.exr", "seed.exr"], "seed: 0 and 7");
     cpu("layers.exr", &["--tile", "2/2", "--aov", "depth"]);
     refused(&["1.exr", "2.exr", "layers.exr"], "the layers are `` and `depth.Z`");
     let text = fs::read_to_string(cornell()).unwrap();

@@ -21,6 +21,7 @@ mod living;
 mod many_lamps;
 mod mean_layers;
 mod mismatch;
+mod motion_vectors;
 mod normal_maps;
 mod orthographic;
 mod parts;

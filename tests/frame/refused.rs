@@ -7,7 +7,8 @@ use glam::Vec3;
 use kdray::{
     accel::kdtree::Traversal,
     buffers::SceneAccess,
-    frame::{Crop, Denoise, FrameRenderer, Picture, Primary, RenderOptions, Tonemap},
+    cpu::{Batching, CpuRenderer},
+    frame::{Crop, Denoise, FrameRenderer, Goal, Integrator, PathOptions, Picture, Primary, RenderOptions, Tonemap},
     gpu::{Context, DeviceOverrides, GpuError},
     render::GpuRenderer,
     scene::{Camera, Projection},
@@ -224,6 +225,30 @@ fn a_sample_that_cannot_begin_leaves_those_before() {
     renderer.draw().expect("a sample");
     assert!(identical(&finish(renderer), &both));
     assert_silent(context);
+}
+
+/// Samples are added in a tree of aligned blocks, so only such a block can be drawn from any place on.
+#[test]
+fn samples_that_are_no_block() {
+    let (context, world) = (device(), world_of(&scenes::mixed_outdoors()));
+    let of = |first_sample| {
+        let paths = PathOptions { first_sample, ..PathOptions::default() };
+        RenderOptions { integrator: Integrator::Path, denoise: Denoise::Off, paths, ..small() }
+    };
+    assert!(GpuRenderer::new(context.clone(), &world, &of(8)).is_err(), "how many samples follow is not known");
+    let mut on_device = GpuRenderer::new(context.clone(), &world, &of(0)).expect("a renderer");
+    let mut on_cpu = CpuRenderer::new(&world, &of(0), Batching::default());
+    on_device.set_options(&of(8)).expect("options");
+    on_cpu.set_first_sample(8);
+    for (n_samples, is_block) in [(1, true), (8, true), (9, false), (32, false), (4, true)] {
+        let goal = Goal::Samples(n_samples);
+        let drawn = [on_device.draw_window(goal, &mut || ()), on_cpu.draw_window(goal, &mut || ())];
+        for error in drawn.into_iter().map(Result::err) {
+            let expected = (!is_block).then(|| "first_sample is 8, not a multiple of 16 up to 2147483648".to_owned());
+            assert_eq!(error.map(|error| error.to_string()), expected, "{n_samples}");
+        }
+    }
+    assert_silent(&context);
 }
 
 #[test]

@@ -252,6 +252,7 @@ fn options(bytes: &mut Bytes) -> RenderOptions {
         surface_layers: bytes.below(8) == 6,
         approximates_ambient: bytes.below(4) == 3,
         paths: PathOptions {
+            seed: if bytes.below(16) == 15 { bytes.word(1 << 15) } else { 0 },
             first_sample: if bytes.below(16) == 15 { bytes.word(16) } else { 0 },
             clamp: bytes.seldom(f32::INFINITY),
             aperture: bytes.seldom(0.0),

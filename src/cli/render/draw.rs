@@ -10,8 +10,11 @@ use std::{
 use kdray::{
     cpu,
     engine::{AnimatedWorld, Engine, LoadError, NoiseGoal, Renderer},
-    frame::{Drawn, Goal, Picture, Profile, RangeSums, RenderOptions, SampleRange, SampleSums, Watcher},
+    frame::{
+        Aov, Drawn, Goal, Integrator, Picture, Profile, RangeSums, RenderOptions, SampleRange, SampleSums, Watcher,
+    },
     gpu::{DeviceInfo, GpuError},
+    layout::PixelAovs,
     output::{FilmFile, Layers, OutputError, Record, WholeRecord},
     scene::Camera,
     world::World,
@@ -68,6 +71,8 @@ impl OneFile {
 pub struct Common<'a> {
     pub args: &'a RenderArgs,
     pub options: &'a RenderOptions,
+    /// The world that was loaded.
+    pub world: &'a World,
     /// The scene's own camera.
     pub camera: Camera,
     /// The animations that play, if any do.
@@ -110,6 +115,8 @@ struct DrawnView {
     picture: Picture,
     camera: Camera,
     drawn: Drawn,
+    /// The vectors of the layer `motion`.
+    motion: Vec<[f32; 2]>,
     sums: RangeSums,
     /// The device that has drawn the picture. None if several have drawn it together, or the CPU.
     device: Option<DeviceInfo>,
@@ -196,30 +203,66 @@ fn draw_frames_apart(
 }
 
 impl Common<'_> {
-    /// Lets a renderer show the world of a view, `later` frames after its own time. Returns the camera.
-    fn show(&self, view: &FrameJob, later: f64, renderer: &mut Renderer) -> Result<Camera, GpuError> {
+    /// Returns the time of a view's animations, seconds.
+    fn seconds_of(&self, view: &FrameJob) -> f64 {
         let load = &self.args.load;
-        let mut camera = view.camera.unwrap_or(self.camera);
-        if let Some(animated) = self.animated {
-            let own = if self.args.is_film() {
-                load.seconds_of(view.frame.into())
-            } else {
-                load.seconds().unwrap_or_default()
-            };
+        if self.args.is_film() { load.seconds_of(view.frame.into()) } else { load.seconds().unwrap_or_default() }
+    }
+
+    /// Returns the world of a view and its camera, `later` frames after its own time.
+    fn moment(&self, view: &FrameJob, later: f64) -> Result<(World, Camera), GpuError> {
+        let load = &self.args.load;
+        let (mut world, mut camera) = (self.world.clone(), view.camera.unwrap_or(self.camera));
+        // A single picture shows the world as it was loaded.
+        if let Some(animated) = self.animated.filter(|_| self.args.moves() || later != 0.0) {
             let mut animated = animated.lock().unwrap_or_else(PoisonError::into_inner);
-            let (world, of_scene) = animated.at(own + load.seconds_of(later)).map_err(|error| match error {
+            let posed = animated.at(self.seconds_of(view) + load.seconds_of(later)).map_err(|error| match error {
                 LoadError::Device(error) => error,
                 other => GpuError::Mismatch(other.to_string()),
             })?;
+            (world, camera) = (posed.0, view.camera.unwrap_or(posed.1));
+        }
+        if let Some(motion) = self.motion.filter(|_| later != 0.0) {
+            let frame = f64::from(view.frame) + later;
+            camera = motion.camera_at(frame).map_err(|error| GpuError::Mismatch(error.to_string()))?;
+        }
+        Ok((world, camera))
+    }
+
+    /// Lets a renderer show a view, `later` frames after its own time. Returns its world and camera.
+    fn show(&self, view: &FrameJob, later: f64, renderer: &mut Renderer) -> Result<(World, Camera), GpuError> {
+        let (world, camera) = self.moment(view, later)?;
+        if self.animated.is_some() && self.args.moves() {
             renderer.set_world(&world)?;
-            camera = view.camera.unwrap_or(of_scene);
         }
-        match self.motion {
-            Some(motion) if later != 0.0 => {
-                motion.camera_at(f64::from(view.frame) + later).map_err(|error| GpuError::Mismatch(error.to_string()))
-            }
-            _ => Ok(camera),
+        Ok((world, camera))
+    }
+
+    /// Returns the vectors of the layer `motion`, none if it is not asked for. `now`: the view at its own time. AOVs
+    /// show the moment of the first sample.
+    fn motion_vectors(
+        &self,
+        view: &FrameJob,
+        mut now: (World, Camera),
+        pixel_aovs: &[PixelAovs],
+    ) -> Result<Vec<[f32; 2]>, GpuError> {
+        if !self.args.aov.contains(&Aov::Motion) {
+            return Ok(Vec::new());
         }
+        let mut later = 1.0;
+        if let Some(shutter) = self.args.shutter {
+            let moment = shutter.moment(self.some_samples.map_or(0, |range| range.first));
+            (now, later) = (self.moment(view, moment)?, moment + 1.0);
+        }
+        let mut next = self.moment(view, later)?;
+        if next.0.scene().n_triangles() != now.0.scene().n_triangles() {
+            let frame = view.frame;
+            tracing::warn!("frame {frame}: meshes are missing one frame later, so motion has the camera's way alone");
+            next.0 = now.0.clone();
+        }
+        let RenderOptions { width, height, .. } = *self.options;
+        let views = [&now, &next].map(|(world, camera)| (world, camera));
+        Ok(cpu::motion_vectors(views, (width, height), &self.record.crop, pixel_aovs))
     }
 
     /// Returns the counter of the samples of all bands of all views.
@@ -246,25 +289,29 @@ fn draw_view(
     renderer: &mut Renderer,
     watcher: &mut dyn Watcher,
 ) -> Result<DrawnView, GpuError> {
+    renderer.set_seed(common.args.seed_of(view.frame))?;
     // What is not blurred, and the record, show the picture's own time.
-    let camera = &common.show(view, 0.0, renderer)?;
+    let now = common.show(view, 0.0, renderer)?;
+    let camera = now.1;
     let device = renderer.device().cloned();
     let mut relay = Relay::new(common, watcher);
     let (mut drawn, mut sums, mut profiles, mut noise) = (Drawn::default(), RangeSums::default(), Vec::new(), None);
     let mut n_samples = common.n_drawn;
     let picture = if let Some(shutter) = common.args.shutter {
         let range = common.some_samples.unwrap_or(SampleRange::whole(common.n_drawn));
-        let show = |renderer: &mut Renderer, sample_ix| common.show(view, shutter.moment(sample_ix), renderer);
+        let show = |renderer: &mut Renderer, sample_ix| {
+            common.show(view, shutter.moment(sample_ix), renderer).map(|(_, camera)| camera)
+        };
         (drawn, sums) = renderer.draw_moments(range, show, &mut relay)?;
         profiles.push(take(&mut drawn.profile));
         n_samples = drawn.n_samples;
         part(common, &sums.picture)
     } else if let Some(range) = common.some_samples {
-        (drawn, sums) = renderer.draw_range(camera, range, &mut relay)?;
+        (drawn, sums) = renderer.draw_range(&camera, range, &mut relay)?;
         profiles.push(take(&mut drawn.profile));
         part(common, &sums.picture)
     } else if let Some(goal) = common.noise_goal {
-        let mut noisy = renderer.draw_until(camera, goal, &mut relay)?;
+        let mut noisy = renderer.draw_until(&camera, goal, &mut relay)?;
         profiles.push(take(&mut noisy.drawn.profile));
         noise = Some(NoiseReached::of(&noisy));
         drawn = noisy.drawn;
@@ -273,7 +320,7 @@ fn draw_view(
         noisy.picture
     } else {
         for _ in 0..common.args.repeat {
-            drawn = renderer.draw(camera, common.goal, &mut relay)?;
+            drawn = renderer.draw(&camera, common.goal, &mut relay)?;
             profiles.push(take(&mut drawn.profile));
         }
         n_samples = drawn.n_samples;
@@ -285,12 +332,13 @@ fn draw_view(
     let (is_cut, overdue) = (is_cut && !is_whole, overdue.filter(|_| !is_whole));
     let written = WrittenView { profiles, n_samples, noise };
     let unwritten = unwritten.unwrap_or_default();
-    Ok(DrawnView { picture, camera: *camera, drawn, sums, device, written, is_cut, overdue, unwritten })
+    let motion = common.motion_vectors(view, now, &drawn.pixel_aovs)?;
+    Ok(DrawnView { picture, camera, drawn, motion, sums, device, written, is_cut, overdue, unwritten })
 }
 
 /// Writes the files of a view.
 fn write_view(common: &Common, view: &FrameJob, of_view: DrawnView) -> Result<WrittenView, CliError> {
-    let DrawnView { picture, camera, drawn, sums, device, written, is_cut, overdue, unwritten } = of_view;
+    let DrawnView { picture, camera, drawn, motion, sums, device, written, is_cut, overdue, unwritten } = of_view;
     if let Some(limit) = overdue {
         if !common.args.may_end_early() {
             return Err(CliError::TimeLimit { limit, present: "drawing" });
@@ -298,7 +346,7 @@ fn write_view(common: &Common, view: &FrameJob, of_view: DrawnView) -> Result<Wr
         let limit = humantime::format_duration(limit);
         tracing::warn!("the picture ends with the samples so far, since --time-limit {limit} is over");
     }
-    let mut record = record_of(common, &camera, written.n_samples);
+    let mut record = record_of(common, view, &camera, written.n_samples);
     if is_cut {
         record.whole.noise = None;
     }
@@ -312,7 +360,9 @@ fn write_view(common: &Common, view: &FrameJob, of_view: DrawnView) -> Result<Wr
     match common.one_file {
         Some(file) => file.lock().unwrap_or_else(PoisonError::into_inner).push(view.ix, picture)?,
         None => {
-            view.files.write(&picture, &Layers { aovs, pixel_aovs, means, sums, mean_sums, record: Some(&record) })?
+            let record = Some(&record);
+            let layers = Layers { aovs, pixel_aovs, motion: &motion, means, sums, mean_sums, record };
+            view.files.write(&picture, &layers)?
         }
     }
     drop(unwritten);
@@ -324,9 +374,15 @@ fn write_view(common: &Common, view: &FrameJob, of_view: DrawnView) -> Result<Wr
 }
 
 /// Returns the record of a picture. `n_samples`: the number that was drawn, if the picture has all samples.
-fn record_of(common: &Common, camera: &Camera, n_samples: u32) -> Record {
+fn record_of(common: &Common, view: &FrameJob, camera: &Camera, n_samples: u32) -> Record {
     let mut record = common.record.clone();
     record.whole.camera = WholeRecord::camera(camera);
+    if common.animated.is_some() || common.args.load.seconds().is_some() {
+        record.whole.time = Some(format!("{} s", common.seconds_of(view)));
+    }
+    if common.options.integrator == Integrator::Path {
+        record.whole.seed = common.args.seed_of(view.frame);
+    }
     if common.some_samples.is_none() {
         record.whole.n_samples = n_samples;
         record.samples = SampleRange::whole(n_samples);

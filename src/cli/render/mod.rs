@@ -7,6 +7,7 @@
 //! views      the pictures of a scene: one, or one for each frame of a path
 //! session    one scene after the other on the same devices: loads, builds, draws
 //! motion     the way of the camera, and the shutter
+//! seed       which random numbers a picture has
 //! draw       draws the pictures of a scene, and writes them
 //! several    several scenes: what fails does not stop the others
 //! ```
@@ -18,6 +19,7 @@ mod inputs;
 mod motion;
 mod names;
 mod noise;
+mod seed;
 mod session;
 mod several;
 mod views;
@@ -26,12 +28,12 @@ use std::path::{Path, PathBuf};
 
 use kdray::{gpu::Device, output};
 
-pub use self::motion::Shutter;
 use self::{
     files::{STDOUT, check_outputs, only_job, roles},
     session::Session,
     views::{NamedPath, views},
 };
+pub use self::{motion::Shutter, seed::Seed};
 use super::{args::RenderArgs, error::CliError, interrupt, print, print_line};
 
 /// Runs `kdray render`.

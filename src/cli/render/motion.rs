@@ -1,6 +1,6 @@
 //! What moves within a frame: the camera of a film, and the moments that the shutter is open.
 
-use std::str::FromStr;
+use std::{fmt, str::FromStr};
 
 use kdray::scene::{Camera, Turntable};
 
@@ -46,6 +46,12 @@ impl Shutter {
     }
 }
 
+impl fmt::Display for Shutter {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{},{}", self.open, self.close)
+    }
+}
+
 impl FromStr for Shutter {
     type Err = String;
 
@@ -81,7 +87,8 @@ mod tests {
 
     #[test]
     fn words() {
-        assert_eq!("0, 0.5".parse(), Ok(Shutter { open: 0.0, close: 0.5 }));
+        let shutter = Shutter { open: 0.0, close: 0.5 };
+        assert_eq!(("0, 0.5".parse(), shutter.to_string()), (Ok(shutter), "0,0.5".to_owned()));
         for word in ["", "0.5", "0.5,0.5", "1,0", "nan,1", "0,inf", "0,1,2"] {
             assert!(word.parse::<Shutter>().is_err(), "{word}");
         }

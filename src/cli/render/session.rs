@@ -12,7 +12,7 @@ use kdray::{
         AnimatedWorld, Engine, LoadRequest, Loaded, NoiseGoal, Opened, Work,
         choices::{Choices, ChosenAccel, Methods},
     },
-    frame::{Goal, Profile, RenderOptions, SampleRange},
+    frame::{Aov, Goal, Profile, RenderOptions, SampleRange},
     gpu::DeviceInfo,
     output::{self, FilmFile, Record, WholeRecord},
     util::progress,
@@ -74,6 +74,8 @@ impl Ready {
         let Self { engine, world, options, accel, samples, noise_goal, .. } = self;
         let mut record = record(engine, world, options, *accel, *samples);
         record.whole.noise = args.noise;
+        let rate = args.load.frames_a_second();
+        record.whole.shutter = args.shutter.map(|shutter| format!("{shutter} at {rate} frames a second"));
         let (n_samples, some_samples) = *samples;
         let n_drawn = some_samples.map_or(n_samples, |range| range.len());
         let goal = args.time.map_or(Goal::Samples(n_drawn), Goal::Time);
@@ -81,6 +83,7 @@ impl Ready {
         Common {
             args,
             options,
+            world,
             camera,
             animated,
             motion: None,
@@ -135,6 +138,8 @@ impl<'a> Session<'a> {
         let may_play = self.args.turntable.is_none() || self.args.load.animation.is_some();
         let time = self.args.is_film().then(|| self.args.load.seconds_of(views[0].frame.into()));
         let time = time.or_else(|| self.args.shutter.map(|_| self.args.load.seconds().unwrap_or_default()));
+        // A single picture shows its time without being told what moves, but the layer of motion needs to know it.
+        let time = time.or(self.args.load.seconds().filter(|_| self.args.aov.contains(&Aov::Motion)));
         let first_time = time.filter(|_| may_play);
         let opened = self.open(scene, first_time, deadline)?;
         let is_animated = first_time.is_some() && self.args.load.plays(&opened.scene.animations);
@@ -238,7 +243,7 @@ impl<'a> Session<'a> {
         };
         let building = engine.builder().describe(n_triangles);
         let asked = args.picture.request();
-        let request = if is_animated { asked.for_motion() } else { asked };
+        let request = if is_animated && args.moves() { asked.for_motion() } else { asked };
         if request != asked {
             progress.note("meshes are kept apart, since some move; --instances flatten stores them as one");
         }

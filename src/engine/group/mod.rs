@@ -119,6 +119,14 @@ impl RendererGroup {
         self.first_sample = first_sample;
     }
 
+    /// Sets the random numbers of the next pictures, as [`BandedRenderer::set_seed`] does.
+    ///
+    /// # Errors
+    /// A Vulkan call fails.
+    pub fn set_seed(&mut self, seed: u32) -> Result<(), GpuError> {
+        self.members.iter_mut().try_for_each(|member| member.renderer.set_seed(seed))
+    }
+
     /// Draws a new picture. The watcher is told of the samples of the whole picture. If a device fails, a warning says
     /// so, the others do its work, and it draws nothing more. Times of passes are sums over all devices. The time of
     /// the frame is the elapsed time.
