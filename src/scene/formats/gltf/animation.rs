@@ -16,6 +16,7 @@ use super::{accessor::Accessor, document::Document};
 use crate::scene::model::{
     AnimationInfo, LoadOptions,
     error::Checked,
+    keys::{KeyTimes, KeyValue, Place},
     load_options::{AnimationChoice, Moment},
 };
 
@@ -42,24 +43,9 @@ pub(super) fn animated_nodes(document: &Document, options: &LoadOptions) -> Chec
         return Ok(driven(document, &all, f64::NEG_INFINITY, |ix| carries_camera(&document.root, ix)));
     };
     let Moment { seconds, animation } = moment;
-    Ok(driven(document, &chosen(animations, animation)?, seconds, |_| true))
-}
-
-/// Returns the indices of the animations that play.
-fn chosen(animations: &[Animation], choice: &AnimationChoice) -> Checked<Vec<usize>> {
-    let name = match choice {
-        AnimationChoice::All => return Ok((0..animations.len()).collect()),
-        AnimationChoice::None => return Ok(Vec::new()),
-        AnimationChoice::Named(name) => name,
-    };
-    let named = animations.iter().position(|animation| animation.name.as_deref() == Some(name));
-    let found = named.or_else(|| name.parse().ok().filter(|ix| *ix < animations.len()));
-    let known = || (0..animations.len()).map(|ix| format!("{ix} `{}`", name_of(animations, ix))).collect::<Vec<_>>();
-    let missing = || match animations.is_empty() {
-        true => format!("there is no animation `{name}`: the file has none"),
-        false => format!("there is no animation `{name}`, but {}", known().join(", ")),
-    };
-    found.map(|ix| vec![ix]).ok_or_else(missing)
+    let names: Vec<String> = (0..animations.len()).map(|ix| name_of(animations, ix)).collect();
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    Ok(driven(document, &animation.among(&names)?, seconds, |_| true))
 }
 
 fn name_of(animations: &[Animation], ix: usize) -> String {
@@ -219,42 +205,28 @@ impl<'a> Keys<'a> {
 
     /// Returns the value at a time: before the first key that of the first, and behind the last that of the last.
     fn at(&self, seconds: f64) -> Checked<Vec<f64>> {
-        let n_begun = self.times.partition_point(|time| *time <= seconds);
-        let from = n_begun.saturating_sub(1);
-        let is_between = n_begun > 0 && n_begun < self.times.len() && self.times[from] < seconds;
+        let place = Place::among(&self.times, |time| *time, seconds);
         let value = match self.interpolation {
-            Interpolation::Linear | Interpolation::CubicSpline if is_between => {
-                let duration = self.times[from + 1] - self.times[from];
-                let share = (seconds - self.times[from]) / duration;
-                match self.interpolation {
-                    Interpolation::Linear => self.linear(from, share)?,
-                    _ => self.cubic(from, share, duration)?,
-                }
-            }
-            _ => self.part(from, Part::Value)?,
+            Interpolation::Linear if place.share > 0.0 => self.linear(place)?,
+            Interpolation::CubicSpline if place.share > 0.0 => self.cubic(place)?,
+            _ => self.part(place.from, Part::Value)?,
         };
         if self.turns { self.unit(&value).map(|unit| unit.to_array().to_vec()) } else { Ok(value) }
     }
 
-    fn linear(&self, from: usize, share: f64) -> Checked<Vec<f64>> {
+    fn linear(&self, Place { from, share, .. }: Place) -> Checked<Vec<f64>> {
         let [a, b] = [self.part(from, Part::Value)?, self.part(from + 1, Part::Value)?];
         if self.turns {
-            // Of the two turns between quaternions, the shorter one.
-            return Ok(self.unit(&a)?.slerp(self.unit(&b)?, share).to_array().to_vec());
+            return Ok(self.unit(&a)?.towards(&self.unit(&b)?, share).to_array().to_vec());
         }
-        Ok(a.iter().zip(&b).map(|(a, b)| a + (b - a) * share).collect())
+        Ok(a.towards(&b, share))
     }
 
-    /// A Hermite spline, whose tangents are those of the file times the time between the keys.
-    fn cubic(&self, from: usize, t: f64, duration: f64) -> Checked<Vec<f64>> {
+    fn cubic(&self, place: Place) -> Checked<Vec<f64>> {
+        let from = place.from;
         let (a, b) = (self.part(from, Part::Value)?, self.part(from + 1, Part::Value)?);
         let (leaving, arriving) = (self.part(from, Part::OutTangent)?, self.part(from + 1, Part::InTangent)?);
-        let (t2, t3) = (t * t, t * t * t);
-        let weights =
-            [2.0 * t3 - 3.0 * t2 + 1.0, duration * (t3 - 2.0 * t2 + t), -2.0 * t3 + 3.0 * t2, duration * (t3 - t2)];
-        let sum =
-            |ix: usize| weights[0] * a[ix] + weights[1] * leaving[ix] + weights[2] * b[ix] + weights[3] * arriving[ix];
-        Ok((0..self.n).map(sum).collect())
+        Ok((0..self.n).map(|ix| place.spline([a[ix], b[ix]], [leaving[ix], arriving[ix]])).collect())
     }
 
     fn unit(&self, value: &[f64]) -> Checked<DQuat> {
@@ -285,7 +257,7 @@ fn times(document: &Document, sampler: &Sampler, path: &str) -> Checked<Vec<f64>
 pub(super) fn infos(document: &Document) -> Vec<AnimationInfo> {
     let animations = &document.root.animations;
     let info = |(ix, animation): (usize, &Animation)| {
-        let (mut begin, mut end, mut shortest) = (f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY);
+        let mut key_times = KeyTimes::default();
         let mut is_read = HashSet::new();
         let (mut moved, mut morphed) = (HashSet::new(), HashSet::new());
         for channel in &animation.channels {
@@ -297,22 +269,13 @@ pub(super) fn infos(document: &Document) -> Vec<AnimationInfo> {
                 continue;
             }
             let Ok(times) = times(document, sampler, "") else { continue };
-            (begin, end) = (begin.min(times[0]), end.max(times[times.len() - 1]));
-            let steps = times.windows(2).map(|pair| pair[1] - pair[0]);
-            shortest = shortest.min(steps.fold(f64::INFINITY, f64::min));
+            key_times.add(&times);
         }
-        let (begin, end) = if begin <= end { (begin, end) } else { (0.0, 0.0) };
+        let ((begin, end), fps) = (key_times.ends(), key_times.fps());
         let (n_moved, n_morphed) = (moved.len(), morphed.len());
-        AnimationInfo { name: name_of(animations, ix), begin, end, fps: fps_of(shortest), n_moved, n_morphed }
+        AnimationInfo { name: name_of(animations, ix), begin, end, fps, n_moved, n_morphed, n_changed: 0 }
     };
     animations.iter().enumerate().map(info).collect()
-}
-
-/// Guesses the frames per second from the shortest time between keys.
-fn fps_of(shortest: f64) -> Option<f64> {
-    let fps = 1.0 / shortest;
-    let whole = fps.round();
-    ((1.0..=240.0).contains(&whole) && (fps - whole).abs() < 0.01 * whole).then_some(whole)
 }
 
 /// Returns whether a node leads to a camera and nothing else.
