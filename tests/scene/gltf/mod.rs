@@ -7,6 +7,7 @@ mod geometry;
 mod materials;
 mod mistakes;
 mod nodes;
+mod pointers;
 mod poses;
 
 use std::fs;

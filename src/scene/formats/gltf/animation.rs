@@ -12,7 +12,7 @@ use gltf::json::{
     validation::Checked::Valid,
 };
 
-use super::{accessor::Accessor, document::Document};
+use super::{accessor::Accessor, document::Document, pointers};
 use crate::scene::model::{
     AnimationInfo, LoadOptions,
     error::Checked,
@@ -21,7 +21,7 @@ use crate::scene::model::{
 };
 
 /// Begins the note that lists what a later animation does not drive, since one before it does.
-const DRIVEN_BEFORE: &str = "parts of animations that an earlier one drives, which counts";
+pub(super) const DRIVEN_BEFORE: &str = "parts of animations that an earlier one drives, which counts";
 /// Begins the note of a document whose animations are not shown.
 const NOT_SHOWN: &str = "animations, which --at SECONDS shows";
 /// Most nodes between an animated node and its camera.
@@ -43,12 +43,17 @@ pub(super) fn animated_nodes(document: &Document, options: &LoadOptions) -> Chec
         return Ok(driven(document, &all, f64::NEG_INFINITY, |ix| carries_camera(&document.root, ix)));
     };
     let Moment { seconds, animation } = moment;
-    let names: Vec<String> = (0..animations.len()).map(|ix| name_of(animations, ix)).collect();
-    let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    Ok(driven(document, &animation.among(&names)?, seconds, |_| true))
+    Ok(driven(document, &playing(document, animation)?, seconds, |_| true))
 }
 
-fn name_of(animations: &[Animation], ix: usize) -> String {
+/// Returns the indices of the animations that play.
+pub(super) fn playing(document: &Document, choice: &AnimationChoice) -> Checked<Vec<usize>> {
+    let animations = &document.root.animations;
+    let names: Vec<String> = (0..animations.len()).map(|ix| name_of(animations, ix)).collect();
+    choice.among(&names.iter().map(String::as_str).collect::<Vec<_>>())
+}
+
+pub(super) fn name_of(animations: &[Animation], ix: usize) -> String {
     animations[ix].name.clone().unwrap_or_else(|| format!("animations[{ix}]"))
 }
 
@@ -131,7 +136,12 @@ fn value_at(
         Property::Rotation => 4,
         Property::MorphTargetWeights => n_targets(&document.root, node),
     };
-    let keys = Keys::new(document, sampler, path, (property, n))?;
+    let type_ = match property {
+        Property::Translation | Property::Scale => Type::Vec3,
+        Property::Rotation => Type::Vec4,
+        Property::MorphTargetWeights => Type::Scalar,
+    };
+    let keys = Keys::new(document, sampler, path, Driven { type_, n, turns: property == Property::Rotation })?;
     let value = keys.at(seconds)?;
     Ok(value.into_iter().map(|number| number as f32).collect())
 }
@@ -142,8 +152,19 @@ fn n_targets(root: &Root, node: &Node) -> usize {
     of_primitives.filter_map(|primitive| Some(primitive.targets.as_ref()?.len())).max().unwrap_or_default()
 }
 
+/// What the keys of a sampler are values of.
+#[derive(Clone, Copy)]
+pub(super) struct Driven {
+    /// The type of the accessor.
+    pub type_: Type,
+    /// Numbers of a value.
+    pub n: usize,
+    /// Whether the values are quaternions.
+    pub turns: bool,
+}
+
 /// The keys of a sampler.
-struct Keys<'a> {
+pub(super) struct Keys<'a> {
     path: &'a str,
     /// The times of the keys, seconds, ascending. There is at least one.
     times: Vec<f64>,
@@ -164,28 +185,23 @@ enum Part {
 }
 
 impl<'a> Keys<'a> {
-    fn new(
+    pub fn new(
         document: &'a Document,
         sampler: &Sampler,
         path: &'a str,
-        (property, n): (Property, usize),
+        Driven { type_, n, turns }: Driven,
     ) -> Checked<Self> {
         let Valid(interpolation) = sampler.interpolation else {
             return Err(format!("{path}: its interpolation is unknown"));
         };
         let times = times(document, sampler, path)?;
-        let type_ = match property {
-            Property::Translation | Property::Scale => Type::Vec3,
-            Property::Rotation => Type::Vec4,
-            Property::MorphTargetWeights => Type::Scalar,
-        };
         let values = Accessor::of_numbers(document, sampler.output, type_, format!("{path}: output"))?;
         let n_parts = if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
         let n_elements = n_parts * if type_ == Type::Scalar { n } else { 1 };
         if values.n < times.len().saturating_mul(n_elements) {
             return Err(format!("{path}: {} keys have {} values", times.len(), values.n / n_elements.max(1)));
         }
-        Ok(Self { path, times, values, interpolation, turns: property == Property::Rotation, n })
+        Ok(Self { path, times, values, interpolation, turns, n })
     }
 
     /// Returns a part of a key.
@@ -204,7 +220,7 @@ impl<'a> Keys<'a> {
     }
 
     /// Returns the value at a time: before the first key that of the first, and behind the last that of the last.
-    fn at(&self, seconds: f64) -> Checked<Vec<f64>> {
+    pub fn at(&self, seconds: f64) -> Checked<Vec<f64>> {
         let place = Place::among(&self.times, |time| *time, seconds);
         let value = match self.interpolation {
             Interpolation::Linear if place.share > 0.0 => self.linear(place)?,
@@ -271,9 +287,16 @@ pub(super) fn infos(document: &Document) -> Vec<AnimationInfo> {
             let Ok(times) = times(document, sampler, "") else { continue };
             key_times.add(&times);
         }
+        let mut changed = HashSet::new();
+        for pointer in pointers::of_animation(document, ix) {
+            let Some(target) = pointer.target() else { continue };
+            let Some(sampler) = animation.samplers.get(pointer.sampler) else { continue };
+            changed.insert((target.list, target.ix));
+            key_times.add(&times(document, sampler, "").unwrap_or_default());
+        }
         let ((begin, end), fps) = (key_times.ends(), key_times.fps());
         let (n_moved, n_morphed) = (moved.len(), morphed.len());
-        AnimationInfo { name: name_of(animations, ix), begin, end, fps, n_moved, n_morphed, n_changed: 0 }
+        AnimationInfo { name: name_of(animations, ix), begin, end, fps, n_moved, n_morphed, n_changed: changed.len() }
     };
     animations.iter().enumerate().map(info).collect()
 }

@@ -22,6 +22,7 @@ mod lights;
 mod materials;
 mod meshopt;
 mod nodes;
+mod pointers;
 mod poser;
 mod textures;
 mod uri;
@@ -47,8 +48,8 @@ use crate::{
         files::outside::Access,
         meshes::coincident,
         model::{
-            AnimationInfo, Camera, Instance, Light, LoadOptions, MaterialChoice, Mesh, Scene, SceneError, Transform,
-            Up,
+            AnimationChoice, AnimationInfo, Camera, Instance, Light, LoadOptions, MaterialChoice, Mesh, Scene,
+            SceneError, Transform, Up,
             error::Checked,
             extent::{self, MeshOrigin},
             lacks::{Lacks, SAMPLES},
@@ -153,14 +154,16 @@ pub(crate) fn load_meshes(
     Ok(Model { scene, warnings: document.warnings(path) })
 }
 
-/// Returns what is known of the animations of a file, without its meshes.
+/// Returns what is known of all animations of a file, without its meshes.
 pub(crate) fn animations(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<Vec<AnimationInfo>, SceneError> {
-    Ok(animation::infos(&read(path, bytes, options)?))
+    let options = LoadOptions { at: None, animation: AnimationChoice::All, ..options.clone() };
+    Ok(animation::infos(&read(path, bytes, &options)?))
 }
 
 fn read(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<Document, SceneError> {
     let mut document = Document::read(path, bytes, Access::of(options)).map_err(|what| SceneError::file(path, what))?;
     document.progress = options.progress.clone();
+    pointers::apply(&mut document, options).map_err(|what| SceneError::file(path, what))?;
     Ok(document)
 }
 
