@@ -158,6 +158,7 @@ mod tests {
             fps: None,
             n_moved: 1,
             n_morphed: 0,
+            n_changed: 0,
         };
         let animations = [info("a", 0.5, 1.0), info("b", -0.5, 0.25), info("c", 0.0, 0.0)];
         let of = |choice: AnimationChoice| moments(&choice, &animations, (5, 2.0), None);

@@ -112,9 +112,9 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N", conflicts_with_all = ["path", "repeat"])]
     #[arg(value_parser = value_parser!(u32).range(1..=100_000))]
     pub turntable: Option<u32>,
-    /// Frames to render, both ends included, for example 0-99, 7, 0-99x4 for every fourth, or all those of the path:
-    /// of the path of --path, or the one in a pack, and of the file's animations, which frame N shows at N / F seconds
-    /// (--fps F) [default with --path: all, from the first keyframe to the last]
+    /// Frames to render, both ends included, for example 0-99, 7, 0-99x4 for every fourth, or all, from the first
+    /// keyframe to the last: of the path of --path, or the one in a pack, or else of the file's animations, which frame
+    /// N shows at N / F seconds (--fps F) [default with --path: all]
     #[arg(long, value_name = "A-BxS|all", conflicts_with = "repeat")]
     pub frames: Option<FrameChoice>,
     /// Expose each picture from OPEN to CLOSE, in frames (1 / F seconds, --fps F) from its own time on, for example

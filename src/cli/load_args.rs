@@ -17,7 +17,7 @@ pub struct LoadArgs {
     /// Scene of a glTF file to load: its name, or its index, counted from 0 [default: the file's default scene]
     #[arg(long = "scene", value_name = "NAME|INDEX")]
     pub scene_name: Option<String>,
-    /// Show the animations of a glTF file at this time [default: things stand as the file has them at rest]
+    /// Show the animations of a glTF or scene file at this time [default: things stand as the file has them at rest]
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     pub at: Option<f64>,
     /// Show the animations at frame N, which is at N / F seconds (--fps F)

@@ -57,7 +57,7 @@ impl AnimatedWorld {
 
     /// Chooses the animations that further moments show.
     pub fn set_animation(&mut self, animation: AnimationChoice) {
-        self.poser.iter_mut().for_each(|poser| poser.set_animation(animation.clone()));
+        self.poser = self.poser.take().and_then(|poser| poser.with_animation(animation.clone()));
         self.request.scene.animation = animation;
     }
 

@@ -21,7 +21,10 @@ use super::{
         preset,
         scene::Scene,
     },
-    scene_file::{assemble, sources::is_scene_file},
+    scene_file::{
+        assemble::{self, Assembled},
+        sources::is_scene_file,
+    },
 };
 
 impl Scene {
@@ -63,7 +66,7 @@ impl Scene {
     /// Those of [`Scene::load`].
     pub fn of_text(name: &str, text: &str) -> Result<Scene, SceneError> {
         let (path, options) = (Path::new(name), LoadOptions::default());
-        let (mut scene, lacks) = assemble::parse_toml(path, text, &options)?;
+        let Assembled { mut scene, lacks, .. } = assemble::parse_toml(path, text, &options)?;
         standard::fill_in(path, &mut scene, lacks, &options).map_err(|what| SceneError::file(path, what))?;
         Ok(scene)
     }
@@ -72,7 +75,8 @@ impl Scene {
     fn load_file(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
         let (mut scene, lacks) = if is_scene_file(path) {
             check_only_scene(path, options)?;
-            assemble::load_toml(path, options)?
+            let Assembled { scene, lacks, .. } = assemble::load_toml(path, options)?;
+            (scene, lacks)
         } else if MeshFormat::of_name(path).is_some() {
             load_mesh_file(path, options)?
         } else {

@@ -18,13 +18,16 @@ mod meshes;
 mod model;
 mod of_mesh;
 #[cfg(feature = "files")]
+mod poser;
+#[cfg(feature = "files")]
 mod scene_file;
 
 #[cfg(feature = "files")]
-pub(crate) use self::{files::pack, formats::gltf::Poser};
+pub(crate) use self::{files::pack, poser::Poser};
 #[cfg(feature = "files")]
 pub use self::{
     files::pack::{ENDING as PACK_ENDING, pack_hash, packed_path},
+    poser::animations_of,
     scene_file::{
         convert::scene_file_of,
         path::CameraPath,

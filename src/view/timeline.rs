@@ -232,7 +232,7 @@ mod tests {
     use super::*;
 
     fn info(name: &str, begin: f64, end: f64) -> AnimationInfo {
-        AnimationInfo { name: name.to_owned(), begin, end, fps: None, n_moved: 1, n_morphed: 0 }
+        AnimationInfo { name: name.to_owned(), begin, end, fps: None, n_moved: 1, n_morphed: 0, n_changed: 0 }
     }
 
     fn timeline(animations: Vec<AnimationInfo>) -> Timeline {

@@ -68,11 +68,82 @@ fn what_does_not_move_is_no_film() {
 fn animations_are_listed() {
     let directory = with_model(true);
     let text = stdout(&succeed(directory.path(), &["inspect", "moving.gltf"]));
-    assert!(text.contains("0          slide   0.000  2.000         ?  2 nodes  1 nodes"), "{text}");
+    assert!(text.contains("0          slide   0.000  2.000         ?      2       1        0"), "{text}");
     let json: Value =
         serde_json::from_str(&stdout(&succeed(directory.path(), &["inspect", "moving.gltf", "--json"]))).unwrap();
     let expected = json!([{ "name": "slide", "begin": 0.0, "end": 2.0, "moved_nodes": 2, "morphed_nodes": 1 }]);
     assert_eq!(json["animations"], expected);
+}
+
+/// A scene file whose mesh and light move by keys, from 0.5 to 2 seconds.
+const KEYED: &str = "\
+[camera]
+eye = [0, 0, 8]
+target = [0, 0, 0]
+
+[[light]]
+kind = 'point'
+intensity = [15, 15, 15]
+keys = [{ time = 0.5, position = [0, 0, 5] }, { time = 2, position = [3, 3, 5] }]
+
+[[mesh]]
+generator = 'box'
+size = [2, 1, 1]
+keys = [
+    { time = 1, translate = [-1, 0, 0], rotate = [0, 0, 0] },
+    { time = 2, translate = [1, 0, 0], rotate = [0, 0, 90] },
+]
+";
+
+/// All frames of an animation, of a scene file or a glTF file. A pack has the same frames.
+#[test]
+fn all_frames_are_those_from_the_first_key_to_the_last() {
+    let directory = with_model(false);
+    let path = directory.path();
+    fs::write(path.join("keyed.toml"), KEYED).unwrap();
+    succeed(path, &["pack", "keyed.toml", "-q"]);
+    let film = |scene: &str, more: &[&str]| {
+        succeed(path, &[&["render", scene, "--cpu", "--frames", "all"], &SMALL[..], more].concat())
+    };
+    film("keyed.toml", &["--fps", "4", "-o", "k#.png"]);
+    film("keyed.kdpack", &["--fps", "4", "-o", "p#.png"]);
+    film("moving.gltf", &["--fps", "2", "-o", "m#.png"]);
+    let made = |first: char| names(path).iter().filter(|it| it.starts_with(first) && it.ends_with("png")).count();
+    assert_eq!((made('k'), made('p'), made('m')), (7, 7, 5));
+    let frame = |name: &str| pixels(&path.join(name));
+    for ix in 2..=8 {
+        let (own, at) = (frame(&format!("k{ix}.png")), format!("{}", f64::from(ix) / 4.0));
+        assert!(own == frame(&format!("p{ix}.png")), "packed frame {ix}");
+        succeed(path, &[&["render", "keyed.toml", "--cpu", "--at", &at, "-o", "at.png"], &SMALL[..]].concat());
+        assert!(own == frame("at.png"), "frame {ix}");
+        assert!(ix == 2 || own != frame(&format!("k{}.png", ix - 1)), "something moves in frame {ix}");
+    }
+    let text = stdout(&succeed(path, &["inspect", "keyed.kdpack"]));
+    assert!(text.contains("0          keys   0.500  2.000         1      1       0        1"), "{text}");
+    fs::write(path.join("still.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    fail(path, &["render", "still.obj", "--cpu", "--frames", "all"], 2, "still.obj: nothing moves");
+    let late = KEYED.replace("time = 2,", "time = 1e9,");
+    fs::write(path.join("late.toml"), late).unwrap();
+    fail(path, &["render", "late.toml", "--cpu", "--frames", "all"], 2, "late.toml: no frames from 0 to 1000000");
+}
+
+/// What moves by keys is blurred as what a glTF file moves is: parts of the samples are joined to the same picture.
+#[test]
+fn keys_are_blurred() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    fs::write(path.join("keyed.toml"), KEYED).unwrap();
+    let common = ["render", "keyed.toml", "--cpu", "--spp", "32", "--at", "1.25", "--fps", "2"];
+    let options = ["-q", "--size", "40x30", "--integrator", "path", "--denoise", "off"];
+    let render = |more: &[&str]| succeed(path, &[&common[..], &options, more].concat());
+    render(&["--shutter", "0,1", "-o", "whole.exr"]);
+    render(&["--shutter", "0,1", "--samples", "0-16", "-o", "a.exr"]);
+    render(&["--shutter", "0,1", "--samples", "16-32", "-o", "b.exr"]);
+    render(&["-o", "sharp.exr"]);
+    succeed(path, &["merge", "a.exr", "b.exr", "-q", "-o", "joined.exr"]);
+    let radiance = |name: &str| image::open(path.join(name)).unwrap().into_rgb32f().into_raw();
+    assert!(radiance("joined.exr") == radiance("whole.exr"));
+    assert!(radiance("sharp.exr") != radiance("whole.exr"));
 }
 
 /// A long box is seen whole from all sides, and fills some of the pictures.

@@ -8,6 +8,7 @@ mod far;
 mod generators;
 mod gltf;
 mod instances;
+mod keys;
 mod lamps;
 mod materials;
 mod mesh_files;

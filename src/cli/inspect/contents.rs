@@ -99,15 +99,23 @@ pub struct AnimationUse {
     /// Frames a second, if the keys have even distances.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fps: Option<f64>,
-    /// Numbers of nodes that it moves, and of those whose morph targets it weighs.
+    /// Numbers of nodes (or meshes of a scene file) that it moves, and of those whose morph targets it weighs.
     pub moved_nodes: usize,
     pub morphed_nodes: usize,
+    /// Number of lights, cameras and materials that it changes.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub changed: usize,
+}
+
+fn is_zero(n: &usize) -> bool {
+    *n == 0
 }
 
 impl From<&AnimationInfo> for AnimationUse {
     fn from(info: &AnimationInfo) -> Self {
-        let &AnimationInfo { begin, end, fps, n_moved, n_morphed, .. } = info;
-        Self { name: info.name.clone(), begin, end, fps, moved_nodes: n_moved, morphed_nodes: n_morphed }
+        let &AnimationInfo { begin, end, fps, n_moved, n_morphed, n_changed, .. } = info;
+        let (moved_nodes, morphed_nodes, changed) = (n_moved, n_morphed, n_changed);
+        Self { name: info.name.clone(), begin, end, fps, moved_nodes, morphed_nodes, changed }
     }
 }
 

@@ -56,7 +56,7 @@ pub fn contents(contents: &Contents, materials: &[MaterialUse], lights: &[LightU
     }
     tables.push(cameras(contents));
     if !contents.animations.is_empty() {
-        let header = ["animation", "name", "from s", "to s", "frames/s", "moves", "morphs"];
+        let header = ["animation", "name", "from s", "to s", "frames/s", "moves", "morphs", "changes"];
         tables.push(cut_table(header, &contents.animations, animation_row));
     }
     tables.extend(contents.sky.iter().map(|sky| table(["sky", ""], &sky_rows(sky))));
@@ -120,16 +120,17 @@ fn listed(map: &Map<String, Value>, item: impl Fn((&String, &Value)) -> String) 
     map.iter().map(item).collect::<Vec<_>>().join(", ")
 }
 
-fn animation_row(ix: usize, animation: &AnimationUse) -> [String; 7] {
-    let &AnimationUse { begin, end, fps, moved_nodes, morphed_nodes, .. } = animation;
+fn animation_row(ix: usize, animation: &AnimationUse) -> [String; 8] {
+    let &AnimationUse { begin, end, fps, moved_nodes, morphed_nodes, changed, .. } = animation;
     [
         ix.to_string(),
         shortened(&animation.name),
         format!("{begin:.3}"),
         format!("{end:.3}"),
         fps.map_or("?".to_owned(), |fps| fps.to_string()),
-        format!("{moved_nodes} nodes"),
-        format!("{morphed_nodes} nodes"),
+        moved_nodes.to_string(),
+        morphed_nodes.to_string(),
+        changed.to_string(),
     ]
 }
 

@@ -63,7 +63,7 @@ fn run_one(args: RenderArgs, scene: PathBuf) -> Result<(), CliError> {
 
     let session = Session::new(args, 1);
     let path = args.path.as_deref().map(NamedPath::load).transpose()?;
-    let views = views(args, &job.output, path.as_ref(), roles, &session.progress)?;
+    let views = views(args, (&job.scene, &job.output), path.as_ref(), roles, &session.progress)?;
     if views.is_empty() {
         return Ok(());
     }

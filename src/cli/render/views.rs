@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use glam::DVec3;
-use kdray::scene::{Camera, CameraPath};
+use kdray::scene::{Camera, CameraPath, animations_of};
 
 use super::{
     draw::FrameJob,
@@ -16,17 +16,22 @@ use crate::cli::{
     progress::Progress,
 };
 
+/// Number of frames by which the time of a key may miss a frame: times in single precision are rounded.
+const ROUNDING: f64 = 1e-3;
+/// Largest number of a frame of `--frames all`.
+const MOST_FRAMES: f64 = 1e6;
+
 /// Returns the scene's own view or, of a film, one view per frame. Leaves out views whose files exist, if the user
 /// wants that. Refuses views whose files cannot be written or have another role.
 pub fn views(
     args: &RenderArgs,
-    output: &Path,
+    (scene, output): (&Path, &Path),
     path: Option<&NamedPath>,
     mut roles: FileRoles,
     progress: &Progress,
 ) -> Result<Vec<FrameJob>, CliError> {
     let mut views = if args.is_film() {
-        let views = views_of_film(path, args, output)?;
+        let views = views_of_film(path, args, (scene, output))?;
         let n_files = if is_one_film(output) { 1 } else { views.len() };
         views[..n_files].iter().try_for_each(|view| view.files.note(&mut roles))?;
         views
@@ -56,7 +61,11 @@ pub fn views(
 
 /// Returns one view per frame. Cameras of a path are set when the scene's origin is known, but a path without a camera
 /// at one of these frames is refused here, before the scene is loaded.
-fn views_of_film(path: Option<&NamedPath>, args: &RenderArgs, output: &Path) -> Result<Vec<FrameJob>, CliError> {
+fn views_of_film(
+    path: Option<&NamedPath>,
+    args: &RenderArgs,
+    (scene, output): (&Path, &Path),
+) -> Result<Vec<FrameJob>, CliError> {
     let Frames { first, last, step } = match (args.frames, path) {
         (Some(FrameChoice::Some(frames)), None) if args.turntable.is_some_and(|n| frames.last >= n) => {
             let (last, n) = (frames.last, args.turntable.unwrap_or_default());
@@ -65,11 +74,7 @@ fn views_of_film(path: Option<&NamedPath>, args: &RenderArgs, output: &Path) -> 
         (Some(FrameChoice::Some(frames)), _) => frames,
         (_, Some(path)) => path.frames()?,
         (_, None) if args.turntable.is_some() => Frames { first: 0, last: args.turntable.unwrap_or(1) - 1, step: 1 },
-        (_, None) => {
-            let what =
-                "--frames all needs --path FILE; of animations, `kdray inspect` tells the times, for --frames A-B";
-            return Err(CliError::Usage(what.to_owned()));
-        }
+        (_, None) => frames_of_animations(args, scene)?,
     };
     let shares_file = is_one_film(output);
     let view = |(ix, frame): (usize, u32)| {
@@ -78,6 +83,27 @@ fn views_of_film(path: Option<&NamedPath>, args: &RenderArgs, output: &Path) -> 
         Ok(FrameJob { camera: None, frame, ix, shares_file, files: Files::of(picture, &args.aov) })
     };
     (first..=last).step_by(step as usize).enumerate().map(view).collect()
+}
+
+/// Returns all whole frames from the first key of the animations that are shown to the last one.
+///
+/// # Errors
+/// The file cannot be read, has no such animation, or no frame lies between its keys.
+fn frames_of_animations(args: &RenderArgs, scene: &Path) -> Result<Frames, CliError> {
+    let animations = animations_of(scene, &args.load.options())?;
+    if animations.is_empty() {
+        args.refuse_to_move(scene)?;
+    }
+    let begin = animations.iter().map(|it| it.begin).fold(f64::INFINITY, f64::min);
+    let end = animations.iter().map(|it| it.end).fold(f64::NEG_INFINITY, f64::max);
+    let fps = args.load.frames_a_second();
+    let (first, last) = ((begin * fps - ROUNDING).ceil().max(0.0), (end * fps + ROUNDING).floor());
+    if !(first <= last && last <= MOST_FRAMES) {
+        let scene = scene.display();
+        let what = format!("{scene}: no frames from 0 to {MOST_FRAMES} lie from {begin} s, its first key, to {end} s");
+        return Err(CliError::Usage(what));
+    }
+    Ok(Frames { first: first as u32, last: last as u32, step: 1 })
 }
 
 /// A camera path and the file that it was read from.

@@ -1,6 +1,6 @@
 //! Options of loading a scene.
 
-use super::Look;
+use super::{Look, error::Checked};
 use crate::{frame::Integrator, util::progress::Progress};
 
 /// Options of loading a scene.
@@ -46,6 +46,28 @@ pub enum AnimationChoice {
     Named(String),
 }
 
+impl AnimationChoice {
+    /// Returns the indices of the animations that are shown, of those with these names.
+    ///
+    /// # Errors
+    /// None has the name or index.
+    pub(crate) fn among(&self, names: &[&str]) -> Checked<Vec<usize>> {
+        let name = match self {
+            Self::All => return Ok((0..names.len()).collect()),
+            Self::None => return Ok(Vec::new()),
+            Self::Named(name) => name,
+        };
+        let named = names.iter().position(|other| other == name);
+        let found = named.or_else(|| name.parse().ok().filter(|ix| *ix < names.len()));
+        let known = || names.iter().enumerate().map(|(ix, name)| format!("{ix} `{name}`")).collect::<Vec<_>>();
+        let missing = || match names.is_empty() {
+            true => format!("there is no animation `{name}`: the file has none"),
+            false => format!("there is no animation `{name}`, but {}", known().join(", ")),
+        };
+        found.map(|ix| vec![ix]).ok_or_else(missing)
+    }
+}
+
 /// A moment of a file's animations.
 pub(crate) struct Moment<'a> {
     pub seconds: f64,
@@ -75,10 +97,12 @@ pub struct AnimationInfo {
     pub end: f64,
     /// Frames per second, if the times of the keys have even distances.
     pub fps: Option<f64>,
-    /// Number of nodes that it moves.
+    /// Number of nodes that it moves, or of meshes of a scene file.
     pub n_moved: usize,
     /// Number of nodes whose morph targets it weighs.
     pub n_morphed: usize,
+    /// Number of lights, cameras and materials that it changes.
+    pub n_changed: usize,
 }
 
 impl AnimationChoice {

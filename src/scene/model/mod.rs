@@ -6,6 +6,7 @@ pub(crate) mod defaults;
 pub(crate) mod environment;
 pub(crate) mod error;
 pub(crate) mod extent;
+pub(crate) mod keys;
 pub(crate) mod lacks;
 pub(crate) mod light;
 pub(crate) mod lighting;

@@ -5,7 +5,10 @@ use std::fmt::Debug;
 use glam::{DMat3, DMat4, DQuat, DVec3, Vec3};
 use serde::Deserialize;
 
-use super::error::Checked;
+use super::{
+    error::Checked,
+    keys::{KeyValue, Track},
+};
 
 /// A transform as a scene file describes it: the mesh is scaled, then rotated, then translated.
 #[derive(Clone, Debug, Default, Deserialize)]
@@ -179,27 +182,103 @@ pub(crate) fn normals_of(linear: DMat3) -> DMat3 {
     if linear.determinant() < 0.0 { -cofactors } else { cofactors }
 }
 
-impl TransformSpec {
-    /// Returns the transform, or an error if a number is not finite or the transform cannot be inverted.
-    pub fn transform(&self) -> Checked<Transform> {
-        let translation = finite("translate", self.translate.unwrap_or_default())?;
-        let scale = match self.scale {
-            None => [1.0; 3],
-            Some(ScaleSpec::Uniform(factor)) => [factor; 3],
-            Some(ScaleSpec::Axes(factors)) => factors,
-        };
-        let scale = finite("scale", scale)?;
-        Transform::new(scale, self.rotation()?, translation)
+/// The parts of a transform that are stated.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Parts {
+    translation: Option<DVec3>,
+    rotation: Option<DQuat>,
+    scale: Option<DVec3>,
+}
+
+impl Parts {
+    fn transform(&self) -> Checked<Transform> {
+        let Self { translation, rotation, scale } = *self;
+        Transform::new(scale.unwrap_or(DVec3::ONE), rotation.unwrap_or_default(), translation.unwrap_or_default())
+    }
+}
+
+/// A transform that changes with time.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct MovingTransform {
+    /// What is stated beside the keys.
+    rest: Parts,
+    translation: Track<DVec3>,
+    rotation: Track<DQuat>,
+    scale: Track<DVec3>,
+    /// The times of the keys, ascending.
+    times: Vec<f64>,
+}
+
+impl MovingTransform {
+    /// Joins keys in the order of their times, seconds. Each may state some parts of the transform. Errors name the
+    /// key.
+    pub fn new(rest: &TransformSpec, keys: &[(f64, TransformSpec)]) -> Checked<Self> {
+        let mut moving = Self { rest: rest.parts()?, ..Self::default() };
+        moving.rest.transform()?;
+        for (number, (time, spec)) in (1..).zip(keys) {
+            let checked = spec.parts().and_then(|parts| parts.transform().map(|_| parts));
+            let parts = checked.map_err(|what| format!("key {number}: {what}"))?;
+            let is_turned = |scale: DVec3, before: DVec3| scale.signum() != before.signum();
+            if parts.scale.zip(moving.scale.0.last()).is_some_and(|(scale, (_, before))| is_turned(scale, *before)) {
+                return Err(format!("key {number}: its scale mirrors the mesh, which would be flat before this key"));
+            }
+            moving.translation.0.extend(parts.translation.map(|it| (*time, it)));
+            moving.rotation.0.extend(parts.rotation.map(|it| (*time, it)));
+            moving.scale.0.extend(parts.scale.map(|it| (*time, it)));
+            moving.times.push(*time);
+        }
+        Ok(moving)
     }
 
+    /// Returns the transform at a moment, seconds: what no key states is as at rest. Without a moment, returns the
+    /// transform at rest: what is not stated there is as the first key has it.
+    ///
+    /// Coordinates between keys are rounded to single precision, as those in a file are.
+    pub fn at(&self, seconds: Option<f64>) -> Checked<Transform> {
+        let single = |vector: DVec3| vector.as_vec3().as_dvec3();
+        let parts = Parts {
+            translation: at(&self.translation, self.rest.translation, seconds).map(single),
+            rotation: at(&self.rotation, self.rest.rotation, seconds),
+            scale: at(&self.scale, self.rest.scale, seconds).map(single),
+        };
+        parts.transform()
+    }
+
+    /// Returns the times of the keys, ascending. A transform without keys does not move.
+    pub fn times(&self) -> &[f64] {
+        &self.times
+    }
+}
+
+fn at<T: KeyValue>(track: &Track<T>, rest: Option<T>, seconds: Option<f64>) -> Option<T> {
+    match seconds {
+        Some(seconds) => track.at(seconds).or(rest),
+        None => rest.or_else(|| track.at(f64::NEG_INFINITY)),
+    }
+}
+
+impl TransformSpec {
+    fn parts(&self) -> Checked<Parts> {
+        let scale = self.scale.as_ref().map(|scale| match *scale {
+            ScaleSpec::Uniform(factor) => [factor; 3],
+            ScaleSpec::Axes(factors) => factors,
+        });
+        Ok(Parts {
+            translation: self.translate.map(|translate| finite("translate", translate)).transpose()?,
+            rotation: self.rotate.as_ref().map(RotationSpec::rotation).transpose()?,
+            scale: scale.map(|scale| finite("scale", scale)).transpose()?,
+        })
+    }
+}
+
+impl RotationSpec {
     fn rotation(&self) -> Checked<DQuat> {
-        match &self.rotate {
-            None => Ok(DQuat::IDENTITY),
-            Some(RotationSpec::Euler(degrees)) => {
+        match self {
+            Self::Euler(degrees) => {
                 let [x, y, z] = finite("rotate", *degrees)?.to_array().map(f64::to_radians);
                 Ok(DQuat::from_rotation_z(z) * DQuat::from_rotation_y(y) * DQuat::from_rotation_x(x))
             }
-            Some(RotationSpec::AxisAngle(AxisAngle { axis, angle })) => {
+            Self::AxisAngle(AxisAngle { axis, angle }) => {
                 let direction = finite("rotate.axis", *axis)?.try_normalize();
                 let direction = direction.ok_or_else(|| format!("rotate.axis = {axis:?} has no direction"))?;
                 let angle = finite("rotate.angle", [*angle, 0.0, 0.0])?.x;

@@ -8,13 +8,15 @@ use std::{
 
 use glam::{DVec3, Vec3};
 use serde::de::DeserializeOwned;
-use toml::Spanned;
+use toml::{Spanned, Table};
 
 use super::{
+    animations::{Animations, Moving, infos_of_files},
     description::{
         AmbientSpec, CameraSpec, Description, EnvironmentSpec, HemispheresSpec, LightSpec, MeshSpec, RenderSpec,
         SceneDenoise, SkySpec,
     },
+    keys::{self, MovingLight},
     overrides::NamedMaterials,
     placed::{MeshTable, Placer},
 };
@@ -32,8 +34,8 @@ use crate::{
             material_spec::MaterialSpec,
         },
         model::{
-            Camera, Environment, Ground, Light, LoadOptions, MaterialChoice, PathDefaults, Projection, RenderDefaults,
-            Scene, SceneError, Sky, Up,
+            AnimationInfo, Camera, Environment, Ground, Light, LoadOptions, MaterialChoice, PathDefaults, Projection,
+            RenderDefaults, Scene, SceneError, Sky, Up,
             camera::{FOV_DEGREES, HEIGHTS},
             error::Checked,
             extent,
@@ -52,13 +54,25 @@ use crate::{
 /// weight (16), the texel (16) and its alias (8), and the words that are uploaded (24).
 const ENVIRONMENT_BYTES: u64 = 76;
 
+/// A scene as its file states it.
+pub(crate) struct Assembled {
+    pub scene: Scene,
+    pub lacks: Lacks,
+    /// The meshes that keys move.
+    pub moving: Vec<Moving>,
+    /// All lights of the file.
+    pub lights: Vec<MovingLight>,
+    /// Whether animations of glTF files are shown.
+    pub plays_files: bool,
+}
+
 /// Loads a scene file and the meshes that it names. Their names are relative to the scene file's folder.
-pub(crate) fn load_toml(path: &Path, options: &LoadOptions) -> Result<(Scene, Lacks), SceneError> {
+pub(crate) fn load_toml(path: &Path, options: &LoadOptions) -> Result<Assembled, SceneError> {
     parse_toml(path, &read_utf8(path)?, options)
 }
 
 /// Makes a scene of the text of the scene file `path`.
-pub(crate) fn parse_toml(path: &Path, text: &str, options: &LoadOptions) -> Result<(Scene, Lacks), SceneError> {
+pub(crate) fn parse_toml(path: &Path, text: &str, options: &LoadOptions) -> Result<Assembled, SceneError> {
     let file = File { path, text, access: Access::of(options) };
     assemble(&file, file.parse()?, options)
 }
@@ -97,7 +111,7 @@ impl File<'_> {
 }
 
 /// `options`: they name the materials that the user replaces beside those that the file does.
-fn assemble(file: &File, description: Description, options: &LoadOptions) -> Result<(Scene, Lacks), SceneError> {
+fn assemble(file: &File, description: Description, options: &LoadOptions) -> Result<Assembled, SceneError> {
     let has_beyond = description.environment.is_some() || description.sky.is_some();
     let render = description.render.as_ref().map(|render| render.as_ref());
     let lacks = Lacks {
@@ -115,7 +129,11 @@ fn assemble(file: &File, description: Description, options: &LoadOptions) -> Res
     let replace = replace.transpose()?.unwrap_or_default();
     let mut images = Images::new([&replace[..], &options.look.materials].concat(), &options.progress);
     let indices = add_materials(file, (&mut scene, &mut images), &description.materials)?;
-    scene.lights = lights(file, &description.light, DVec3::ZERO)?;
+    let lights = lights(file, description.light)?;
+    let tables = mesh_tables(file, description.mesh)?;
+    let own = own_animation(&tables, &lights);
+    let moment = Animations::new(file, (&tables, own), options)?;
+    scene.lights = lights_at(file.path, &lights, (moment.of_keys, DVec3::ZERO))?;
     warn_of_black(file, &scene.lights);
     if let Some(spec) = &description.ambient {
         (scene.ambient, scene.ground) = file.check("ambient", spec, ambient)?;
@@ -138,22 +156,17 @@ fn assemble(file: &File, description: Description, options: &LoadOptions) -> Res
     if let Some(spec) = &description.render {
         scene.defaults = file.check("render", spec, render_defaults)?;
     }
-    let mut tables = Vec::new();
-    for (ix, table) in description.mesh.into_iter().enumerate() {
-        let (number, span) = (ix + 1, table.span());
-        let spec = MeshSpec::new(table.into_inner());
-        let spec = spec.map_err(|what| file.at(&span, format!("mesh {number}: {what}")))?;
-        tables.push(MeshTable { number, span, spec });
-    }
     let materials = NamedMaterials::new(&description.materials, indices);
-    let mut placer = Placer::new(file, (scene, images), materials, (&tables, options.recentre));
+    let mut placer = Placer::new(file, (scene, images), materials, (&tables, options.recentre, moment));
     placer.read_together(&tables);
     for table in &tables {
         placer.add(table)?;
     }
     placer.materials.warn_of_unmatched(file);
     placer.materials.remove_idle(&mut placer.scene);
-    let Placer { mut scene, images, .. } = placer;
+    let Placer { mut scene, images, moving, animations, .. } = placer;
+    let (moment, plays_files) = (animations.of_keys, animations.plays_files());
+    scene.animations = animations.infos;
     scene.images = images.finish();
     if let Some(spec) = &description.replace {
         file.check("replace", spec, |_| preset::replace(&mut scene, &replace))?;
@@ -173,7 +186,7 @@ fn assemble(file: &File, description: Description, options: &LoadOptions) -> Res
     }
     if options.recentre {
         extent::recentre(file.path, &mut scene);
-        scene.lights = lights(file, &description.light, scene.origin)?;
+        scene.lights = lights_at(file.path, &lights, (moment, scene.origin))?;
     }
     extent::check(file.path, scene.bounds())?;
     let origin = scene.origin;
@@ -186,7 +199,32 @@ fn assemble(file: &File, description: Description, options: &LoadOptions) -> Res
         (None, Some((_, first))) => *first,
         (None, None) => scene.camera,
     };
-    Ok((scene, lacks))
+    Ok(Assembled { scene, lacks, moving, lights, plays_files })
+}
+
+/// Returns what is known of the animations of a scene file: its keys, and those of the glTF files that it names.
+pub(crate) fn animations(path: &Path, options: &LoadOptions) -> Result<Vec<AnimationInfo>, SceneError> {
+    let file = File { path, text: &read_utf8(path)?, access: Access::of(options) };
+    let Description { mesh, light, .. } = file.parse()?;
+    let (tables, lights) = (mesh_tables(&file, mesh)?, lights(&file, light)?);
+    let of_files = infos_of_files(&file, &tables, options)?;
+    Ok(own_animation(&tables, &lights).into_iter().chain(of_files.into_iter().flat_map(|(_, infos)| infos)).collect())
+}
+
+/// Returns the animation that the keys of a scene file are, if there are any.
+fn own_animation(tables: &[MeshTable], lights: &[MovingLight]) -> Option<AnimationInfo> {
+    keys::info(tables.iter().map(|table| table.spec.place.times()), lights.iter().map(MovingLight::times))
+}
+
+/// Reads the tables of meshes.
+fn mesh_tables(file: &File, tables: Vec<Spanned<Table>>) -> Result<Vec<MeshTable>, SceneError> {
+    let table = |(number, table): (usize, Spanned<Table>)| {
+        let span = table.span();
+        let spec = MeshSpec::new(table.into_inner());
+        let spec = spec.map_err(|what| file.at(&span, format!("mesh {number}: {what}")))?;
+        Ok(MeshTable { number, span, spec })
+    };
+    (1..).zip(tables).map(table).collect()
 }
 
 /// Adds the materials of a scene file and their images. Returns the indices of the materials by their names.
@@ -236,10 +274,31 @@ fn ambient(spec: &AmbientSpec) -> Checked<(Vec3, Option<Ground>)> {
     }
 }
 
-/// Returns the lights. `origin` is the point of the file that is the origin of world space.
-fn lights(file: &File, specs: &[Spanned<LightSpec>], origin: DVec3) -> Result<Vec<Light>, SceneError> {
-    let light = |(number, spec)| file.check(&format!("light {number}"), spec, |spec| light(spec, origin));
-    (1..).zip(specs).map(light).collect()
+/// Reads the tables of lights, which are checked as they rest and at all keys.
+fn lights(file: &File, tables: Vec<Spanned<Table>>) -> Result<Vec<MovingLight>, SceneError> {
+    let read = |(number, table): (usize, Spanned<Table>)| {
+        let read = |table: &Table| {
+            let moving = MovingLight::new(table.clone())?;
+            moving.check(|spec| light(spec, DVec3::ZERO))?;
+            Ok(moving)
+        };
+        file.check(&format!("light {number}"), &table, read)
+    };
+    (1..).zip(tables).map(read).collect()
+}
+
+/// Returns the lights at a moment, seconds, or at rest. `origin` is the point of the file that is the origin of world
+/// space.
+pub(crate) fn lights_at(
+    path: &Path,
+    lights: &[MovingLight],
+    (seconds, origin): (Option<f64>, DVec3),
+) -> Result<Vec<Light>, SceneError> {
+    let at = |(number, moving): (usize, &MovingLight)| {
+        let light = moving.at(seconds).and_then(|spec| light(&spec, origin));
+        light.map_err(|what| SceneError::file(path, format!("light {number}: {what}")))
+    };
+    (1..).zip(lights).map(at).collect()
 }
 
 fn light(spec: &LightSpec, origin: DVec3) -> Checked<Light> {

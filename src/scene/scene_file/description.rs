@@ -5,10 +5,16 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 use toml::{Spanned, Table};
 
+use super::keys;
 use crate::scene::{
     formats::material_spec::MaterialSpec,
     meshes::generate::Generator,
-    model::{RayKinds, error::Checked, material::within, transform::TransformSpec},
+    model::{
+        RayKinds,
+        error::Checked,
+        material::within,
+        transform::{MovingTransform, TransformSpec},
+    },
 };
 
 /// A scene file. Vectors are arrays of three numbers; colours are linear RGB.
@@ -20,9 +26,10 @@ pub(crate) struct Description {
     /// Cameras with names. Without `camera`, the first one is the scene's.
     #[serde(default)]
     pub cameras: Vec<Spanned<NamedCameraSpec>>,
-    /// Lights; without any and without `ambient`, `standard` chooses lights, `ambient` and, where absent, `background`.
+    /// Lights, as tables that `MovingLight::new` reads; without any and without `ambient`, `standard` chooses lights,
+    /// `ambient` and, where absent, `background`.
     #[serde(default)]
-    pub light: Vec<Spanned<LightSpec>>,
+    pub light: Vec<Spanned<Table>>,
     /// Irradiance that every point receives, weighted by Ka; black where absent.
     pub ambient: Option<Spanned<AmbientSpec>>,
     /// Radiance of rays that leave the scene; black where absent.
@@ -188,6 +195,8 @@ pub(crate) enum SceneDenoise {
 pub(crate) struct MeshSpec {
     pub source: Source,
     pub common: CommonSpec,
+    /// Where the mesh is: `transform`, or what `keys` make of it.
+    pub place: MovingTransform,
 }
 
 /// Source of a mesh's triangles.
@@ -204,7 +213,9 @@ pub(crate) enum Source {
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(crate) struct CommonSpec {
-    pub transform: TransformSpec,
+    transform: TransformSpec,
+    /// What the transform is at some times.
+    keys: Vec<Table>,
     /// A NumPy file of transforms, each of which places the mesh once; relative to the scene file's folder.
     pub instances: Option<String>,
     /// The kinds of rays that meet the mesh; all of them where absent.
@@ -260,15 +271,16 @@ struct FileSpec {
 /// Largest coordinate of an origin. Farther away, double precision is coarse, too.
 const MAX_ORIGIN: f64 = 1e12;
 
-const COMMON_KEYS: [&str; 8] =
-    ["transform", "instances", "rays", "material", "materials", "smooth", "uv_scale", "override"];
+const COMMON_KEYS: [&str; 9] =
+    ["transform", "keys", "instances", "rays", "material", "materials", "smooth", "uv_scale", "override"];
 
 impl MeshSpec {
     /// Splits a mesh's table into the keys that all meshes have and those of its own kind. An unknown key is an
     /// error.
     pub fn new(mut table: Table) -> Checked<Self> {
         let common = COMMON_KEYS.iter().filter_map(|key| table.remove_entry(*key)).collect();
-        let common: CommonSpec = read(common)?;
+        let mut common: CommonSpec = read(common)?;
+        let place = keys::moving(&common.transform, std::mem::take(&mut common.keys))?;
         if common.material.is_some() && !common.materials.is_empty() {
             return Err("has both `material` and `materials`".to_owned());
         }
@@ -291,10 +303,11 @@ impl MeshSpec {
             (true, true) => return Err("has both `file` and `generator`".to_owned()),
             (false, false) => return Err("has neither `file` nor `generator`".to_owned()),
         };
-        Ok(Self { source, common })
+        Ok(Self { source, common, place })
     }
 }
 
-fn read<T: serde::de::DeserializeOwned>(table: Table) -> Checked<T> {
+/// Reads a table.
+pub(crate) fn read<T: serde::de::DeserializeOwned>(table: Table) -> Checked<T> {
     table.try_into().map_err(|e: toml::de::Error| e.message().to_owned())
 }

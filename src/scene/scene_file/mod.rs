@@ -1,11 +1,14 @@
 //! Scene files: TOML text to a scene and back, camera paths, and the list of the files that a scene is made of.
 
+pub(crate) mod animations;
 pub(crate) mod assemble;
 pub(crate) mod convert;
 pub(crate) mod description;
+pub(crate) mod keys;
 pub(crate) mod overrides;
 pub(crate) mod path;
 pub(crate) mod placed;
+pub(crate) mod poser;
 pub(crate) mod sources;
 pub(crate) mod terms;
 pub(crate) mod transforms;

@@ -16,6 +16,7 @@ use crate::scene::{
         Camera, Projection, SceneError,
         camera::{FOV_DEGREES, HEIGHTS},
         error::Checked,
+        keys::Place,
     },
 };
 
@@ -126,24 +127,13 @@ impl CameraPath {
     /// A Class of Local Interpolating Splines, 1974). The curve passes through all keyframes, its speed has no jumps,
     /// and uniform motion stays uniform.
     pub fn camera_at(&self, frame: f64) -> Option<Camera> {
-        let frame = frame.clamp(self.begin(), self.end());
-        let after = self.keyframes.partition_point(|keyframe| keyframe.frame <= frame);
-        let from = after.saturating_sub(1);
-        if from + 1 == self.keyframes.len() {
+        let place = Place::among(&self.keyframes, |keyframe| keyframe.frame, frame);
+        let from = place.from;
+        if place.share == 0.0 {
             return self.camera_of(&self.keyframes[from].pose);
         }
-        let (a, b) = (&self.keyframes[from], &self.keyframes[from + 1]);
-        let span = b.frame - a.frame;
-        let s = (frame - a.frame) / span;
-        // The Hermite basis has a weight for each keyframe and one for each tangent. The weight of `a` is
-        // `1 - b_weight`.
-        let b_weight = s * s * (3.0 - 2.0 * s);
-        let (a_slope, b_slope) = (span * s * (1.0 - s) * (1.0 - s), span * s * s * (s - 1.0));
-        let (a_tangent, b_tangent) = (self.tangent(from), self.tangent(from + 1));
-        self.camera_of(&std::array::from_fn(|i| {
-            let between = a.pose[i] + (b.pose[i] - a.pose[i]) * b_weight;
-            between + a_tangent[i] * a_slope + b_tangent[i] * b_slope
-        }))
+        let [a, b] = [from, from + 1].map(|ix| (self.keyframes[ix].pose, self.tangent(ix)));
+        self.camera_of(&std::array::from_fn(|i| place.spline([a.0[i], b.0[i]], [a.1[i], b.1[i]])))
     }
 
     /// Returns the change per frame at a keyframe: the slope from the keyframe before it to the one after it. At an

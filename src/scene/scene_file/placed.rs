@@ -11,6 +11,7 @@ use glam::{DVec3, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::{
+    animations::{Animations, Moving, places_of},
     assemble::File,
     description::{CommonSpec, MeshSpec, Source},
     overrides::NamedMaterials,
@@ -50,8 +51,8 @@ pub(crate) struct MeshTable {
 
 /// What decides which meshes a mesh file gives.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-struct Reading {
-    path: PathBuf,
+pub(crate) struct Reading {
+    pub path: PathBuf,
     /// Name of the scene of a glTF file.
     scene: Option<String>,
     is_smooth: bool,
@@ -95,6 +96,7 @@ struct Models<'a> {
     allow_outside: bool,
     /// The readings whose materials some table shows.
     with_materials: &'a HashSet<Reading>,
+    animations: &'a Animations,
 }
 
 impl Models<'_> {
@@ -107,7 +109,8 @@ impl Models<'_> {
     ) -> Result<gltf::Model, SceneError> {
         let look = Look { materials: self.replaced.to_vec(), ..Look::default() };
         let (scene, allow_outside, progress) = (reading.scene.clone(), self.allow_outside, progress.clone());
-        let options = LoadOptions { scene, allow_outside, look, progress, ..LoadOptions::default() };
+        let (at, animation) = (self.animations.at, self.animations.of_file(reading));
+        let options = LoadOptions { scene, allow_outside, at, animation, look, progress, ..LoadOptions::default() };
         gltf::load_meshes(&reading.path, bytes, &options, self.with_materials.contains(reading), before)
     }
 }
@@ -130,6 +133,9 @@ pub(crate) struct Placer<'a> {
     with_materials: HashSet<Reading>,
     /// Whether meshes that are far from 0 get an origin of their own.
     recentre: bool,
+    pub animations: Animations,
+    /// The meshes so far that keys move.
+    pub moving: Vec<Moving>,
 }
 
 impl<'a> Placer<'a> {
@@ -138,7 +144,7 @@ impl<'a> Placer<'a> {
         file: &'a File<'a>,
         (scene, images): (Scene, Images),
         materials: NamedMaterials<'a>,
-        (tables, recentre): (&[MeshTable], bool),
+        (tables, recentre, animations): (&[MeshTable], bool, Animations),
     ) -> Self {
         let has_own =
             |table: &&MeshTable| table.spec.common.material.is_none() && table.spec.common.materials.is_empty();
@@ -155,6 +161,8 @@ impl<'a> Placer<'a> {
             shapes: HashMap::new(),
             with_materials,
             recentre,
+            animations,
+            moving: Vec::new(),
         }
     }
 
@@ -196,17 +204,23 @@ impl<'a> Placer<'a> {
             replaced: self.images.replaced(),
             allow_outside: self.file.access.is_anywhere(),
             with_materials: &self.with_materials,
+            animations: &self.animations,
         }
     }
 
     /// Adds the meshes of a table.
     pub fn add(&mut self, table: &MeshTable) -> Result<(), SceneError> {
         let failed = |what: String| self.file.at(&table.span, format!("mesh {}: {what}", table.number));
-        let MeshSpec { source, common } = &table.spec;
-        let places = self.places(common).map_err(failed)?;
+        let MeshSpec { source, common, place } = &table.spec;
+        let array = self.array(common).map_err(failed)?;
+        let places = places_of(place.at(self.animations.of_keys).map_err(failed)?, array.as_deref());
         let named = self.materials.of_mesh(common).map_err(failed)?;
-        match source {
-            Source::Generator(generator) => self.generate(generator, common, (&places, named)).map_err(failed),
+        let first_instance = self.scene.instances.len();
+        let inner = match source {
+            Source::Generator(generator) => {
+                self.generate(generator, common, (&places, named)).map_err(failed)?;
+                vec![Transform::IDENTITY]
+            }
             Source::File { crease, .. } => {
                 let reading =
                     Reading::of(self.file, &table.spec, self.recentre).map_err(failed)?.expect("the source is a file");
@@ -218,17 +232,22 @@ impl<'a> Placer<'a> {
                     let what = "`crease` has no effect: no normals of the file's faces are computed";
                     tracing::warn!("{}", failed(what.to_owned()));
                 }
-                self.place(&reading, common, (&places, named)).map_err(failed)
+                self.place(&reading, common, (&places, named)).map_err(failed)?;
+                self.read[&reading].instances.iter().map(|instance| instance.transform.clone()).collect()
             }
+        };
+        if !place.times().is_empty() {
+            let (number, place) = (table.number, place.clone());
+            self.moving.push(Moving { number, place, array, first_instance, inner });
         }
+        Ok(())
     }
 
-    /// Returns the transforms by which a table places its mesh: its own, followed by each of its array, if it has one.
-    fn places(&self, common: &CommonSpec) -> Checked<Vec<Transform>> {
-        let own = common.transform.transform()?;
-        let Some(name) = &common.instances else { return Ok(vec![own]) };
+    /// Returns the places of a table's array, if it has one.
+    fn array(&self, common: &CommonSpec) -> Checked<Option<Vec<Transform>>> {
+        let Some(name) = &common.instances else { return Ok(None) };
         let path = self.file.access.beside(self.file.path).exact(name)?;
-        transforms::read(&path, &own)
+        transforms::read(&path).map(Some)
     }
 
     /// Adds a generator's mesh.
@@ -286,6 +305,7 @@ impl<'a> Placer<'a> {
         };
         if let Content::Model(model) = content {
             let gltf::Model { scene: mut model, warnings } = (*model)?;
+            self.animations.infos.append(&mut model.animations);
             warnings.iter().for_each(|warning| tracing::warn!("{warning}"));
             for mesh in &mut model.meshes {
                 if !reading.is_smooth {
@@ -387,7 +407,7 @@ fn push_instances(scene: &mut Scene, instance: Instance, places: &[Transform]) -
 
 impl Reading {
     /// Returns how the file of a mesh is read, or `None` for a generator.
-    fn of(file: &File, spec: &MeshSpec, recentre: bool) -> Checked<Option<Self>> {
+    pub fn of(file: &File, spec: &MeshSpec, recentre: bool) -> Checked<Option<Self>> {
         let Source::File { path, crease, scene, origin } = &spec.source else { return Ok(None) };
         Ok(Some(Self {
             path: file.access.beside(file.path).exact(path)?,

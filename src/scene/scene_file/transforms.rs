@@ -16,15 +16,15 @@ use crate::{
 /// What a file of transforms has to hold.
 const RULE: &str = "instances are N x 3 x 4 numbers, the rows of matrices that take the mesh to the scene";
 
-/// Reads a `.npy` file of transforms, each of which follows `own`: N x 3 x 4, or N x 4 x 4 with the last row 0 0 0 1,
-/// float32 or float64. Errors name the file and the index of the transform.
-pub(crate) fn read(path: &Path, own: &Transform) -> Checked<Vec<Transform>> {
+/// Reads a `.npy` file of transforms: N x 3 x 4, or N x 4 x 4 with the last row 0 0 0 1, float32 or float64. Errors
+/// name the file and the index of the transform.
+pub(crate) fn read(path: &Path) -> Checked<Vec<Transform>> {
     store::require_for_bytes(path)?;
     let bytes = read_bytes(path).map_err(|error| error.to_string())?;
-    parse(&bytes, own).map_err(|what| format!("{}: {}", path.display(), short_line(&what)))
+    parse(&bytes).map_err(|what| format!("{}: {}", path.display(), short_line(&what)))
 }
 
-fn parse(mut bytes: &[u8], own: &Transform) -> Checked<Vec<Transform>> {
+fn parse(mut bytes: &[u8]) -> Checked<Vec<Transform>> {
     let header = npy::read_header(&mut bytes, RULE)?;
     let dtype = header.dtype().descr();
     let (n, n_rows) = match *header.shape() {
@@ -55,8 +55,7 @@ fn parse(mut bytes: &[u8], own: &Transform) -> Checked<Vec<Transform>> {
         let mut columns = DMat4::IDENTITY.to_cols_array();
         rows[..12].iter().enumerate().for_each(|(place, x)| columns[4 * (place % 4) + place / 4] = *x);
         let matrix = DMat4::from_cols_array(&columns);
-        let place = Transform::of_affine(matrix).map_err(|what| format!("instance {ix}: {what}"))?;
-        Ok(place.after(own))
+        Transform::of_affine(matrix).map_err(|what| format!("instance {ix}: {what}"))
     };
     numbers.chunks_exact(4 * n_rows).enumerate().map(of_instance).collect()
 }

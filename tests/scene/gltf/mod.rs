@@ -7,6 +7,7 @@ mod geometry;
 mod materials;
 mod mistakes;
 mod nodes;
+mod pointers;
 mod poses;
 
 use std::fs;
@@ -162,6 +163,17 @@ fn triangle() -> Model {
     let normals = model.accessor("VEC3", F32, &[0.0_f32, 0.0, 2.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0]);
     model.show(json!({ "attributes": { "POSITION": positions, "NORMAL": normals } }));
     model
+}
+
+/// Returns a file of a triangle that moves by (1, 2, 12) in 4 seconds.
+pub fn moving_triangle() -> Vec<u8> {
+    let mut model = triangle();
+    let input = model.accessor("SCALAR", F32, &[0.0_f32, 4.0]);
+    let output = model.accessor("VEC3", F32, &[0.0_f32, 0.0, 0.0, 1.0, 2.0, 12.0]);
+    let channel = json!({ "sampler": 0, "target": { "node": 0, "path": "translation" } });
+    let samplers = json!([{ "input": input, "output": output }]);
+    model.push("animations", json!({ "name": "slide", "samplers": samplers, "channels": [channel] }));
+    model.glb()
 }
 
 /// Returns the corners of all triangles.

@@ -12,15 +12,16 @@ use gltf::json::{
     validation::Checked::Valid,
 };
 
-use super::{accessor::Accessor, document::Document};
+use super::{accessor::Accessor, document::Document, pointers};
 use crate::scene::model::{
     AnimationInfo, LoadOptions,
     error::Checked,
+    keys::{KeyTimes, KeyValue, Place},
     load_options::{AnimationChoice, Moment},
 };
 
 /// Begins the note that lists what a later animation does not drive, since one before it does.
-const DRIVEN_BEFORE: &str = "parts of animations that an earlier one drives, which counts";
+pub(super) const DRIVEN_BEFORE: &str = "parts of animations that an earlier one drives, which counts";
 /// Begins the note of a document whose animations are not shown.
 const NOT_SHOWN: &str = "animations, which --at SECONDS shows";
 /// Most nodes between an animated node and its camera.
@@ -42,27 +43,17 @@ pub(super) fn animated_nodes(document: &Document, options: &LoadOptions) -> Chec
         return Ok(driven(document, &all, f64::NEG_INFINITY, |ix| carries_camera(&document.root, ix)));
     };
     let Moment { seconds, animation } = moment;
-    Ok(driven(document, &chosen(animations, animation)?, seconds, |_| true))
+    Ok(driven(document, &playing(document, animation)?, seconds, |_| true))
 }
 
 /// Returns the indices of the animations that play.
-fn chosen(animations: &[Animation], choice: &AnimationChoice) -> Checked<Vec<usize>> {
-    let name = match choice {
-        AnimationChoice::All => return Ok((0..animations.len()).collect()),
-        AnimationChoice::None => return Ok(Vec::new()),
-        AnimationChoice::Named(name) => name,
-    };
-    let named = animations.iter().position(|animation| animation.name.as_deref() == Some(name));
-    let found = named.or_else(|| name.parse().ok().filter(|ix| *ix < animations.len()));
-    let known = || (0..animations.len()).map(|ix| format!("{ix} `{}`", name_of(animations, ix))).collect::<Vec<_>>();
-    let missing = || match animations.is_empty() {
-        true => format!("there is no animation `{name}`: the file has none"),
-        false => format!("there is no animation `{name}`, but {}", known().join(", ")),
-    };
-    found.map(|ix| vec![ix]).ok_or_else(missing)
+pub(super) fn playing(document: &Document, choice: &AnimationChoice) -> Checked<Vec<usize>> {
+    let animations = &document.root.animations;
+    let names: Vec<String> = (0..animations.len()).map(|ix| name_of(animations, ix)).collect();
+    choice.among(&names.iter().map(String::as_str).collect::<Vec<_>>())
 }
 
-fn name_of(animations: &[Animation], ix: usize) -> String {
+pub(super) fn name_of(animations: &[Animation], ix: usize) -> String {
     animations[ix].name.clone().unwrap_or_else(|| format!("animations[{ix}]"))
 }
 
@@ -145,7 +136,12 @@ fn value_at(
         Property::Rotation => 4,
         Property::MorphTargetWeights => n_targets(&document.root, node),
     };
-    let keys = Keys::new(document, sampler, path, (property, n))?;
+    let type_ = match property {
+        Property::Translation | Property::Scale => Type::Vec3,
+        Property::Rotation => Type::Vec4,
+        Property::MorphTargetWeights => Type::Scalar,
+    };
+    let keys = Keys::new(document, sampler, path, Driven { type_, n, turns: property == Property::Rotation })?;
     let value = keys.at(seconds)?;
     Ok(value.into_iter().map(|number| number as f32).collect())
 }
@@ -156,8 +152,19 @@ fn n_targets(root: &Root, node: &Node) -> usize {
     of_primitives.filter_map(|primitive| Some(primitive.targets.as_ref()?.len())).max().unwrap_or_default()
 }
 
+/// What the keys of a sampler are values of.
+#[derive(Clone, Copy)]
+pub(super) struct Driven {
+    /// The type of the accessor.
+    pub type_: Type,
+    /// Numbers of a value.
+    pub n: usize,
+    /// Whether the values are quaternions.
+    pub turns: bool,
+}
+
 /// The keys of a sampler.
-struct Keys<'a> {
+pub(super) struct Keys<'a> {
     path: &'a str,
     /// The times of the keys, seconds, ascending. There is at least one.
     times: Vec<f64>,
@@ -178,28 +185,23 @@ enum Part {
 }
 
 impl<'a> Keys<'a> {
-    fn new(
+    pub fn new(
         document: &'a Document,
         sampler: &Sampler,
         path: &'a str,
-        (property, n): (Property, usize),
+        Driven { type_, n, turns }: Driven,
     ) -> Checked<Self> {
         let Valid(interpolation) = sampler.interpolation else {
             return Err(format!("{path}: its interpolation is unknown"));
         };
         let times = times(document, sampler, path)?;
-        let type_ = match property {
-            Property::Translation | Property::Scale => Type::Vec3,
-            Property::Rotation => Type::Vec4,
-            Property::MorphTargetWeights => Type::Scalar,
-        };
         let values = Accessor::of_numbers(document, sampler.output, type_, format!("{path}: output"))?;
         let n_parts = if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
         let n_elements = n_parts * if type_ == Type::Scalar { n } else { 1 };
         if values.n < times.len().saturating_mul(n_elements) {
             return Err(format!("{path}: {} keys have {} values", times.len(), values.n / n_elements.max(1)));
         }
-        Ok(Self { path, times, values, interpolation, turns: property == Property::Rotation, n })
+        Ok(Self { path, times, values, interpolation, turns, n })
     }
 
     /// Returns a part of a key.
@@ -218,43 +220,29 @@ impl<'a> Keys<'a> {
     }
 
     /// Returns the value at a time: before the first key that of the first, and behind the last that of the last.
-    fn at(&self, seconds: f64) -> Checked<Vec<f64>> {
-        let n_begun = self.times.partition_point(|time| *time <= seconds);
-        let from = n_begun.saturating_sub(1);
-        let is_between = n_begun > 0 && n_begun < self.times.len() && self.times[from] < seconds;
+    pub fn at(&self, seconds: f64) -> Checked<Vec<f64>> {
+        let place = Place::among(&self.times, |time| *time, seconds);
         let value = match self.interpolation {
-            Interpolation::Linear | Interpolation::CubicSpline if is_between => {
-                let duration = self.times[from + 1] - self.times[from];
-                let share = (seconds - self.times[from]) / duration;
-                match self.interpolation {
-                    Interpolation::Linear => self.linear(from, share)?,
-                    _ => self.cubic(from, share, duration)?,
-                }
-            }
-            _ => self.part(from, Part::Value)?,
+            Interpolation::Linear if place.share > 0.0 => self.linear(place)?,
+            Interpolation::CubicSpline if place.share > 0.0 => self.cubic(place)?,
+            _ => self.part(place.from, Part::Value)?,
         };
         if self.turns { self.unit(&value).map(|unit| unit.to_array().to_vec()) } else { Ok(value) }
     }
 
-    fn linear(&self, from: usize, share: f64) -> Checked<Vec<f64>> {
+    fn linear(&self, Place { from, share, .. }: Place) -> Checked<Vec<f64>> {
         let [a, b] = [self.part(from, Part::Value)?, self.part(from + 1, Part::Value)?];
         if self.turns {
-            // Of the two turns between quaternions, the shorter one.
-            return Ok(self.unit(&a)?.slerp(self.unit(&b)?, share).to_array().to_vec());
+            return Ok(self.unit(&a)?.towards(&self.unit(&b)?, share).to_array().to_vec());
         }
-        Ok(a.iter().zip(&b).map(|(a, b)| a + (b - a) * share).collect())
+        Ok(a.towards(&b, share))
     }
 
-    /// A Hermite spline, whose tangents are those of the file times the time between the keys.
-    fn cubic(&self, from: usize, t: f64, duration: f64) -> Checked<Vec<f64>> {
+    fn cubic(&self, place: Place) -> Checked<Vec<f64>> {
+        let from = place.from;
         let (a, b) = (self.part(from, Part::Value)?, self.part(from + 1, Part::Value)?);
         let (leaving, arriving) = (self.part(from, Part::OutTangent)?, self.part(from + 1, Part::InTangent)?);
-        let (t2, t3) = (t * t, t * t * t);
-        let weights =
-            [2.0 * t3 - 3.0 * t2 + 1.0, duration * (t3 - 2.0 * t2 + t), -2.0 * t3 + 3.0 * t2, duration * (t3 - t2)];
-        let sum =
-            |ix: usize| weights[0] * a[ix] + weights[1] * leaving[ix] + weights[2] * b[ix] + weights[3] * arriving[ix];
-        Ok((0..self.n).map(sum).collect())
+        Ok((0..self.n).map(|ix| place.spline([a[ix], b[ix]], [leaving[ix], arriving[ix]])).collect())
     }
 
     fn unit(&self, value: &[f64]) -> Checked<DQuat> {
@@ -285,7 +273,7 @@ fn times(document: &Document, sampler: &Sampler, path: &str) -> Checked<Vec<f64>
 pub(super) fn infos(document: &Document) -> Vec<AnimationInfo> {
     let animations = &document.root.animations;
     let info = |(ix, animation): (usize, &Animation)| {
-        let (mut begin, mut end, mut shortest) = (f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY);
+        let mut key_times = KeyTimes::default();
         let mut is_read = HashSet::new();
         let (mut moved, mut morphed) = (HashSet::new(), HashSet::new());
         for channel in &animation.channels {
@@ -297,22 +285,20 @@ pub(super) fn infos(document: &Document) -> Vec<AnimationInfo> {
                 continue;
             }
             let Ok(times) = times(document, sampler, "") else { continue };
-            (begin, end) = (begin.min(times[0]), end.max(times[times.len() - 1]));
-            let steps = times.windows(2).map(|pair| pair[1] - pair[0]);
-            shortest = shortest.min(steps.fold(f64::INFINITY, f64::min));
+            key_times.add(&times);
         }
-        let (begin, end) = if begin <= end { (begin, end) } else { (0.0, 0.0) };
+        let mut changed = HashSet::new();
+        for pointer in pointers::of_animation(document, ix) {
+            let Some(target) = pointer.target() else { continue };
+            let Some(sampler) = animation.samplers.get(pointer.sampler) else { continue };
+            changed.insert((target.list, target.ix));
+            key_times.add(&times(document, sampler, "").unwrap_or_default());
+        }
+        let ((begin, end), fps) = (key_times.ends(), key_times.fps());
         let (n_moved, n_morphed) = (moved.len(), morphed.len());
-        AnimationInfo { name: name_of(animations, ix), begin, end, fps: fps_of(shortest), n_moved, n_morphed }
+        AnimationInfo { name: name_of(animations, ix), begin, end, fps, n_moved, n_morphed, n_changed: changed.len() }
     };
     animations.iter().enumerate().map(info).collect()
-}
-
-/// Guesses the frames per second from the shortest time between keys.
-fn fps_of(shortest: f64) -> Option<f64> {
-    let fps = 1.0 / shortest;
-    let whole = fps.round();
-    ((1.0..=240.0).contains(&whole) && (fps - whole).abs() < 0.01 * whole).then_some(whole)
 }
 
 /// Returns whether a node leads to a camera and nothing else.

@@ -17,6 +17,7 @@ use super::{
     draco,
     glb::split,
     lenient, meshopt,
+    pointers::Pointer,
     uri::{Uri, is_data},
 };
 use crate::{
@@ -33,10 +34,11 @@ use crate::{
 
 /// Extensions that are read. A file that requires another one is refused, unless the other one changes only how
 /// surfaces look, such as `KHR_materials_…`.
-const SUPPORTED: [&str; 20] = [
+const SUPPORTED: [&str; 21] = [
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",
+    "KHR_animation_pointer",
     "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_clearcoat",
@@ -57,8 +59,7 @@ const SUPPORTED: [&str; 20] = [
 ];
 
 /// Extensions that are not read, but change no picture of a file that does not require them.
-const WITHOUT_EFFECT: [&str; 4] =
-    ["KHR_animation_pointer", "KHR_materials_variants", "KHR_xmp", "MSFT_packing_normalRoughnessMetallic"];
+const WITHOUT_EFFECT: [&str; 3] = ["KHR_materials_variants", "KHR_xmp", "MSFT_packing_normalRoughnessMetallic"];
 
 /// Begins the warning that lists what is left out because it cannot be read.
 pub(super) const LEFT_OUT: &str = "parts that cannot be read, which are left out";
@@ -74,6 +75,8 @@ pub(super) struct Document {
     pub root: Root,
     /// The morph targets of the meshes.
     pub morph_targets: MorphTargets,
+    /// The channels of animations that drive what is no part of a node.
+    pub pointers: Vec<Pointer>,
     path: PathBuf,
     access: Access,
     buffers: Vec<Buffer>,
@@ -130,13 +133,25 @@ impl Document {
     /// Reads a glTF file from its content, and its buffers.
     pub fn read(path: &Path, bytes: Vec<u8>, access: Access) -> Checked<Self> {
         let (json, chunk) = split(&bytes)?;
-        let lenient::Parsed { root, morph_targets, left_out } = lenient::parse(&bytes[json])?;
+        let lenient::Parsed { root, morph_targets, pointers, left_out } = lenient::parse(&bytes[json])?;
         let path = path.to_owned();
         let (buffers, files, replaced) = (Vec::new(), RefCell::default(), RefCell::default());
         let (decoded, notes, progress) = (HashMap::new(), RefCell::default(), Progress::default());
         let draco = draco::Decoded::default();
-        let mut document =
-            Self { root, morph_targets, path, access, buffers, files, replaced, decoded, draco, notes, progress };
+        let mut document = Self {
+            root,
+            morph_targets,
+            pointers,
+            path,
+            access,
+            buffers,
+            files,
+            replaced,
+            decoded,
+            draco,
+            notes,
+            progress,
+        };
         left_out.into_iter().for_each(|what| document.note(LEFT_OUT, what));
         document.check_extensions()?;
         let chunk = chunk.map(|part| Buffer { content: Arc::new(bytes), part });

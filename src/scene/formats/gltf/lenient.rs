@@ -8,7 +8,7 @@ use serde::de::DeserializeOwned;
 use serde_json::{Map, json};
 use serde_path_to_error::{Path, Segment};
 
-use super::deform::MorphTargets;
+use super::{deform::MorphTargets, pointers::Pointer};
 use crate::{scene::model::error::Checked, util::text::short_line};
 
 /// Most values of one element that are left out. An element with more is left out as a whole.
@@ -25,6 +25,8 @@ pub(super) struct Parsed {
     /// No index in it is checked.
     pub root: Root,
     pub morph_targets: MorphTargets,
+    /// The channels of animations that drive what is no part of a node.
+    pub pointers: Vec<Pointer>,
     /// JSON paths of the values that are left out, and why.
     pub left_out: Vec<String>,
 }
@@ -78,7 +80,8 @@ fn parse_strictly(json: &[u8]) -> Option<Parsed> {
         None => MorphTargets::default(),
     };
     let has_known_mode = root.materials.iter().all(|material| matches!(material.alpha_mode, Valid(_)));
-    has_known_mode.then_some(Parsed { root, morph_targets, left_out: Vec::new() })
+    // A channel without a node is not read here, so there are no pointers.
+    has_known_mode.then_some(Parsed { root, morph_targets, pointers: Vec::new(), left_out: Vec::new() })
 }
 
 fn parse_leniently(json: &[u8]) -> Checked<Parsed> {
@@ -104,6 +107,8 @@ fn parse_leniently(json: &[u8]) -> Checked<Parsed> {
     }
     let mut root: Root = repaired(&mut value, "", &mut left_out).map_err(|error| failed(&error))?;
     let mut lists = Lists { lists, left_out };
+    lists.read_pointers_to_nodes();
+    let pointers = Pointer::of_animations(lists.lists.get("animations"));
     lists.drop_channels_without_node();
     lists.read_words_in_any_case();
     lists.repair_primitives()?;
@@ -122,7 +127,7 @@ fn parse_leniently(json: &[u8]) -> Checked<Parsed> {
     root.textures = lists.read("textures")?;
     let Lists { lists, left_out } = lists;
     let morph_targets = serde_json::from_value(Value::Object(lists)).unwrap_or_default();
-    Ok(Parsed { root, morph_targets, left_out: left_out.values })
+    Ok(Parsed { root, morph_targets, pointers, left_out: left_out.values })
 }
 
 /// Returns the names of a document's lists, each with the required members of its elements. Elements keep their
@@ -230,6 +235,20 @@ impl Lists {
             *primitives = kept;
         }
         Ok(())
+    }
+
+    /// Makes channels with pointers to nodes, such as `/nodes/3/rotation`, channels of these nodes.
+    fn read_pointers_to_nodes(&mut self) {
+        let animations = self.lists.get_mut("animations").and_then(Value::as_array_mut);
+        let channels = animations.into_iter().flatten().filter_map(|it| it.get_mut("channels")?.as_array_mut());
+        for target in channels.flatten().filter_map(|channel| channel.get_mut("target")) {
+            let pointer = target.pointer("/extensions/KHR_animation_pointer/pointer").and_then(Value::as_str);
+            let of_node = pointer.and_then(|pointer| pointer.strip_prefix("/nodes/")?.split_once('/'));
+            let Some((Ok(node), path)) = of_node.map(|(node, path)| (node.parse::<u32>(), path)) else { continue };
+            if ["translation", "rotation", "scale", "weights"].contains(&path) {
+                *target = json!({ "node": node, "path": path });
+            }
+        }
     }
 
     /// Drops the channels of animations that move no node but, for example, a material: there can be thousands.

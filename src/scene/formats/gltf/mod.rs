@@ -22,6 +22,7 @@ mod lights;
 mod materials;
 mod meshopt;
 mod nodes;
+mod pointers;
 mod poser;
 mod textures;
 mod uri;
@@ -47,7 +48,8 @@ use crate::{
         files::outside::Access,
         meshes::coincident,
         model::{
-            Camera, Instance, Light, LoadOptions, MaterialChoice, Mesh, Scene, SceneError, Transform, Up,
+            AnimationChoice, AnimationInfo, Camera, Instance, Light, LoadOptions, MaterialChoice, Mesh, Scene,
+            SceneError, Transform, Up,
             error::Checked,
             extent::{self, MeshOrigin},
             lacks::{Lacks, SAMPLES},
@@ -127,7 +129,7 @@ impl LoadedBefore {
 
 /// The meshes of a glTF file.
 pub(crate) struct Model {
-    /// Instances, materials and images, without lights and cameras.
+    /// Instances, materials, images and what is known of animations, without lights and cameras.
     pub scene: Scene,
     /// What the user has to be told of the file.
     pub warnings: Vec<String>,
@@ -147,13 +149,21 @@ pub(crate) fn load_meshes(
     let document = read(path, bytes, options)?;
     let nodes = Nodes::new(&document, options).map_err(failed)?;
     let replaced = has_materials.then_some(&options.look.materials[..]);
-    let scene = Loader::new(&document, &nodes, before, replaced).load(path).map_err(failed)?;
+    let mut scene = Loader::new(&document, &nodes, before, replaced).load(path).map_err(failed)?;
+    scene.animations = animation::infos(&document);
     Ok(Model { scene, warnings: document.warnings(path) })
+}
+
+/// Returns what is known of all animations of a file, without its meshes.
+pub(crate) fn animations(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<Vec<AnimationInfo>, SceneError> {
+    let options = LoadOptions { at: None, animation: AnimationChoice::All, ..options.clone() };
+    Ok(animation::infos(&read(path, bytes, &options)?))
 }
 
 fn read(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<Document, SceneError> {
     let mut document = Document::read(path, bytes, Access::of(options)).map_err(|what| SceneError::file(path, what))?;
     document.progress = options.progress.clone();
+    pointers::apply(&mut document, options).map_err(|what| SceneError::file(path, what))?;
     Ok(document)
 }
 

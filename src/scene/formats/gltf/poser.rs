@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::DVec3;
 use hashbrown::HashMap;
 
-use super::{Document, Known, LoadedBefore, Loader, MeshKey, Nodes, cameras, lights, read};
+use super::{Document, Known, LoadedBefore, Loader, MeshKey, Nodes, cameras, lights, pointers, read};
 use crate::scene::{
     formats::mesh_file::{MeshFormat, read_mesh},
     model::{AnimationChoice, Instance, LoadOptions, Mesh, Scene, SceneError},
@@ -28,14 +28,17 @@ pub(crate) struct Poser {
 }
 
 impl Poser {
-    /// Reads a file, whose scene at the moment of the options is known. Returns `None` if it is no glTF file, or if the
-    /// scene's instances are not the file's.
+    /// Reads a file, whose scene at the moment of the options is known. Returns `None` if it is no glTF file, if its
+    /// animations change materials, or if the scene's instances are not the file's.
     pub fn new(path: &Path, options: &LoadOptions, scene: &Scene) -> Option<Self> {
         let bytes = read_mesh(path).ok()?;
         if MeshFormat::of(path, &bytes) != MeshFormat::Gltf {
             return None;
         }
         let document = read(path, bytes, options).ok()?;
+        if pointers::change_materials(&document) {
+            return None;
+        }
         let nodes = Nodes::new(&document, options).ok()?;
         let mut loader = Loader::new(&document, &nodes, LoadedBefore::default(), None);
         let first = loader.instances().ok()?;
@@ -67,6 +70,7 @@ impl Poser {
     pub fn pose(&mut self, seconds: f64, scene: &mut Scene) -> Result<Option<Vec<usize>>, SceneError> {
         let options = LoadOptions { at: Some(seconds), ..self.options.clone() };
         let failed = |what: String| SceneError::file(Path::new(&scene.name), what);
+        pointers::apply(&mut self.document, &options).map_err(failed)?;
         let nodes = Nodes::new(&self.document, &options).map_err(failed)?;
         let n_known = self.meshes.len();
         let mut loader = Loader::new(&self.document, &nodes, LoadedBefore::default(), None);
