@@ -18,6 +18,7 @@
 //! (k + 1).
 
 use glam::{DMat3, DVec3, Vec3};
+use rayon::prelude::*;
 
 use super::bounds::Bounds;
 use crate::layout::{Instance, TOP_LEAF, TOP_MAX_DEPTH, TopNode};
@@ -32,7 +33,7 @@ pub const MAX_CONDITION: f64 = 4096.0;
 /// Bins along the axis of a split.
 const N_BINS: usize = 16;
 /// Instances below a node from which its children are built by several threads.
-const PARALLEL: usize = 4096;
+const PARALLEL: usize = 512;
 
 /// The hierarchy over the instances of a world.
 #[derive(Clone, Debug, PartialEq)]
@@ -81,7 +82,7 @@ impl TopLevel {
             let bounds = placed(instance, boxes[instance.geometry_ix as usize]);
             (instance.n_triangles > 0).then_some((ix, bounds))
         };
-        let exact: Vec<_> = instances.iter().enumerate().filter_map(of_instance).collect();
+        let exact: Vec<_> = instances.par_iter().enumerate().filter_map(of_instance).collect();
         let largest = exact.iter().flat_map(|(_, corners)| corners).map(|corner| corner.abs().max_element());
         let exact_largest = largest.fold(0.0, f64::max);
         let worst = |m: f64| exact.iter().map(|(ix, _)| margin_of(&instances[*ix], m)).fold(0.0, f64::max);
@@ -92,7 +93,7 @@ impl TopLevel {
             let centre = Vec3::from(bounds.min) / 2.0 + Vec3::from(bounds.max) / 2.0;
             Item { bounds, centre, instance_ix: ix as u32 }
         };
-        let mut items: Vec<Item> = exact.iter().map(item).collect();
+        let mut items: Vec<Item> = exact.par_iter().map(item).collect();
         let bounds = union(&items);
         let mut nodes = vec![TopNode::default(); 2 * items.len()];
         let (root, below) = nodes.split_at_mut(2);

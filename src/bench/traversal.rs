@@ -105,8 +105,13 @@ impl<'a> Tracers<'a> {
     pub fn measure(&mut self, set: &RaySet, n_times: u16) -> Result<SetResult, GpuError> {
         let rays: Vec<_> = set.rays.iter().map(cast_ray).collect();
         let query = query_of(set);
-        let flat = Variant { search: Search::KdTree(Traversal::Mask), kept: None };
-        let expected = self.cast_on_cpu(&flat, &rays, query);
+        // Flattening rounds in other ways, so the instances have hits of their own to be compared with.
+        let search = Search::KdTree(Traversal::Mask);
+        let expected = self.cast_on_cpu(&Variant { search, kept: None }, &rays, query);
+        let kept = self.variants.iter().find_map(|variant| variant.kept.as_ref()).map(|kept| kept.world);
+        let links = TraversalLinks::default();
+        let kept =
+            kept.map(|world| self.cast_on_cpu(&Variant { search, kept: Some(Kept { world, links }) }, &rays, query));
         let mut results = vec![(Some(Vec::new()), Difference::default()); self.variants.len()];
         let n_warm_up = self.n_warm_up(set)?;
         for n_casts in turns(n_times) {
@@ -114,7 +119,8 @@ impl<'a> Tracers<'a> {
                 let n_untimed = n_warm_up[variant_ix];
                 let (hits, ms) = self.cast(variant_ix, &rays, query, n_untimed + n_casts)?;
                 *all_ms = all_ms.take().zip(ms).map(|(all, ms)| [all, ms[usize::from(n_untimed)..].to_vec()].concat());
-                *difference = difference.max(Difference::of(set.kind, &expected, &hits));
+                let of_world = kept.as_ref().filter(|_| self.variants[variant_ix].kept.is_some());
+                *difference = difference.max(Difference::of(set.kind, of_world.unwrap_or(&expected), &hits));
             }
         }
         let result = |(variant_ix, (ms, difference)): (usize, (Option<Vec<f64>>, _))| {
@@ -219,7 +225,8 @@ pub struct VariantResult {
     pub ms: Option<Spread>,
     /// Million rays per second.
     pub mrays_per_s: Option<Spread>,
-    /// Difference from the CPU's hits: the maximum of each number over all turns.
+    /// Difference from the hits that the CPU finds by `mask` in the same world: the maximum of each number over all
+    /// turns.
     #[serde(flatten)]
     pub difference: Difference,
     /// Steps of the same search on the CPU; none for the wide hierarchy, whose steps nobody counts.

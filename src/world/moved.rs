@@ -7,6 +7,7 @@ use std::{
 };
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::{Instances, Mismatch, Parts, World, emissive::is_emissive, instances::flags_of};
 use crate::{
@@ -52,7 +53,9 @@ impl World {
         let mut lists = OwnLists::default();
         let is_emissive: Vec<bool> = scene.materials.iter().map(is_emissive).collect();
         let mut keeps_emitters = true;
-        for update in updates {
+        let at = |update: &InstanceUpdate| update.transform.as_ref().map(Instance::of_transform);
+        let at: Vec<_> = updates.par_iter().map(at).collect();
+        for (update, at) in updates.iter().zip(at) {
             let wrong = |what: String| Mismatch::Instance { instance: update.instance_ix, what };
             match is_updated.get_mut(update.instance_ix) {
                 None => return Err(wrong(format!("there are {} instances", before.list.len()))),
@@ -72,12 +75,12 @@ impl World {
                 keeps_emitters &= !(changes_light && emits(&instances));
             }
             let instance = &mut instances.list[update.instance_ix];
-            if let Some(transform) = &update.transform {
+            if let Some(at) = at {
                 if before.fixed.binary_search(&update.instance_ix).is_ok() {
                     return Err(wrong("its triangles are stored in the world, so it cannot move".to_owned()));
                 }
                 let bounds = two.structures()[instance.geometry_ix as usize].bounds();
-                place(instance, transform, bounds).map_err(wrong)?;
+                place(instance, at, bounds).map_err(wrong)?;
             }
             if let Some(rays) = update.rays {
                 instance.flags = instance.flags & INSTANCE_MIRRORED | flags_of(rays);
@@ -104,9 +107,9 @@ impl World {
     }
 }
 
-/// Puts an instance in another place. `bounds`: those of its geometry.
-fn place(instance: &mut Instance, transform: &Transform, [min, max]: [Vec3; 2]) -> Result<(), String> {
-    let at = Instance::of_transform(transform).ok_or("its transform magnifies rounding too much")?;
+/// Puts an instance in another place. `at`: an instance of its transform. `bounds`: those of its geometry.
+fn place(instance: &mut Instance, at: Option<Instance>, [min, max]: [Vec3; 2]) -> Result<(), String> {
+    let at = at.ok_or("its transform magnifies rounding too much")?;
     let is_near = |p: Vec3| p.is_finite() && p.abs().max_element() <= MAX_COORDINATE;
     if instance.n_triangles > 0 && !box_corners(min, max).into_iter().all(|p| is_near(at.point(p))) {
         return Err(format!("its new place is beyond {MAX_COORDINATE:e}"));
