@@ -42,10 +42,11 @@ def run(kdray, *arguments):
 
 
 def render(arguments, path, out, size, *options):
-    """Renders a file by kdray into `out`, without the noise filter and with traced primary rays."""
+    """Renders a file by kdray into `out`: direct light, without the noise filter and with traced primary rays."""
     options = [*options, "--denoise", "off", "--primary", "trace", "--quiet", *arguments.options]
-    # One sample is at the pixel's centre.
-    run(arguments.kdray, "render", path, "-o", out, "--size", f"{size[0]}x{size[1]}", "--spp", "1", *options)
+    # With this integrator, one sample is at the pixel's centre.
+    sampling = ["--integrator", "whitted", "--spp", "1"]
+    run(arguments.kdray, "render", path, "-o", out, "--size", f"{size[0]}x{size[1]}", *sampling, *options)
 
 
 def triangulate(data):

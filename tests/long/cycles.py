@@ -59,8 +59,10 @@ from in_blender import (
     absorbing_glass,
     absorption_of_gltf,
     camera,
-    empty,
-    encoded,
+    contact_sheet,
+    differences,
+    direct_light,
+    export_glb,
     gltf_output,
     gradient,
     image,
@@ -74,7 +76,6 @@ from in_blender import (
     sphere,
     take,
     texture,
-    write_sheet,
     yup,
 )
 
@@ -82,8 +83,6 @@ from in_blender import (
 from mathutils import Vector
 
 SIZE = (160, 120)
-# Relative difference of a pixel from which on it is an outlier.
-OUTLIER = 0.1
 # Ambient light of the case `occlusion`.
 AMBIENT = np.array([0.5, 0.7, 0.9])
 # Places of lights: beside the camera, and where most lights are.
@@ -91,18 +90,6 @@ FRONT, SIDE = (-0.6, -6.0, 4.0), (-2.5, -3.0, 5.0)
 
 
 # --- Scenes -------------------------------------------------------------------------------------------------------
-
-
-def reset():
-    """Empties Blender and sets Cycles up for direct light, one sample at each pixel's centre."""
-    cycles = empty(SIZE)
-    cycles.samples = 1
-    cycles.max_bounces = 0
-    cycles.transparent_max_bounces = 16
-    # A filter of almost no width: all samples are at the pixel's centre.
-    cycles.pixel_filter_type = "GAUSSIAN"
-    cycles.filter_width = 0.01
-    camera((0.0, -6.0, 3.0), (0.0, 0.0, 0.6))
 
 
 def point_light():
@@ -880,16 +867,8 @@ def export(kind, stem):
         bpy.ops.wm.obj_export(filepath=str(path), path_mode="COPY", export_pbr_extensions=kind == "obj+pbr")
         return scene_file(path)
     path = stem.with_suffix(".glb")
-    bpy.ops.export_scene.gltf(
-        filepath=str(path),
-        export_format="GLB",
-        export_cameras=True,
-        export_lights=True,
-        export_import_convert_lighting_mode="COMPAT",
-        export_tangents=kind == "glb+tangents",
-        # Bones keep their pose.
-        export_rest_position_armature=False,
-    )
+    # Bones keep their pose.
+    export_glb(path, export_tangents=kind == "glb+tangents", export_rest_position_armature=False)
     return scene_file(path, f"ambient = {AMBIENT.tolist()}\n") if kind == "glb+ambient" else path
 
 
@@ -910,28 +889,6 @@ def scene_file(path, keys=""):
     return toml
 
 
-def differences(ours, theirs, share):
-    """Compares the pixels that exceed `share` of the greatest radiance.
-
-    Returns the relative difference of means (positive if ours is greater), p95, the share of outliers, the relative
-    differences of all pixels, and which pixels are compared.
-    """
-    least = share * max(ours.max(), theirs.max())
-    lit = np.maximum(ours, theirs).max(axis=-1) > least
-    greater = np.maximum(np.maximum(ours, theirs), least)
-    relative = (np.abs(ours - theirs) / greater).max(axis=-1)
-    mean = ours[lit].mean() / theirs[lit].mean() - 1.0 if lit.any() and theirs[lit].any() else math.inf
-    if not lit.any():
-        return math.inf, math.inf, 1.0, relative, lit
-    return mean, np.percentile(relative[lit], 95), (relative[lit] > OUTLIER).mean(), relative, lit
-
-
-def contact_sheet(path, ours, theirs, relative):
-    """Writes both pictures and their relative difference side by side."""
-    difference = np.repeat(np.clip(relative / 0.2, 0.0, 1.0)[..., None], 3, axis=-1)
-    write_sheet(path, np.concatenate([*encoded(ours, theirs), difference], axis=1))
-
-
 def compare(name, case, planted, arguments, folder):
     """Renders a case by both programs, prints its differences, and returns whether they are within the bounds, or with
     a planted error whether they are not."""
@@ -940,7 +897,7 @@ def compare(name, case, planted, arguments, folder):
     place = folder / name
     place.mkdir(exist_ok=True)
     os.chdir(place)
-    reset()
+    direct_light(SIZE)
     case.build()
     path = export(case.kind, place / "scene")
     factor = case.change() if case.change else 1.0

@@ -43,8 +43,6 @@ import trimesh
 from mathutils import Matrix
 
 SIZE = (96, 64)
-# What kdray gives meshes without a material.
-DEFAULT_REFLECTANCE = 0.8
 
 
 class Difference(Exception):
@@ -493,13 +491,13 @@ def linear(encoded):
 
 
 def coloured_mesh(path):
-    """Writes colours of points by trimesh as OBJ or PLY. They are sRGB and multiply the default material's colour."""
+    """Writes colours of points by trimesh as OBJ or PLY. They are sRGB, and albedos without a material."""
     shape = trimesh.creation.icosphere(subdivisions=1)
     colours = np.random.default_rng(5).integers(20, 235, (len(shape.vertices), 4)).astype(np.uint8)
     colours[:, 3] = 255
     shape.visual.vertex_colors = colours
     shape.export(path)
-    return shape.triangles, DEFAULT_REFLECTANCE * linear(colours[:, :3] / 255.0)[shape.faces]
+    return shape.triangles, linear(colours[:, :3] / 255.0)[shape.faces]
 
 
 # --- Files by trimesh ---------------------------------------------------------------------------------------------

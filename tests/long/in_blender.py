@@ -1,4 +1,4 @@
-"""What `cycles.py` and `cycles_paths.py` share: scenes that a script makes in Blender, and pictures of Cycles.
+"""What the scripts with Cycles share: scenes that a script makes in Blender, and pictures of Cycles.
 
 Either this module or `blender.py` has to be imported before `bpy`.
 """
@@ -14,6 +14,9 @@ import OpenEXR
 
 # This module exists once `bpy` has been imported.
 from mathutils import Vector
+
+# Relative difference of a pixel from which on it is an outlier.
+OUTLIER = 0.1
 
 
 # --- Scenes -------------------------------------------------------------------------------------------------------
@@ -66,6 +69,18 @@ def camera(eye, target, degrees=40.0):
     thing = add("camera", data)
     look(thing, eye, target)
     bpy.context.scene.camera = thing
+
+
+def direct_light(size):
+    """Empties Blender, sets Cycles up for direct light, one sample at each pixel's centre, and adds a camera."""
+    cycles = empty(size)
+    cycles.samples = 1
+    cycles.max_bounces = 0
+    cycles.transparent_max_bounces = 16
+    # A filter of almost no width: all samples are at the pixel's centre.
+    cycles.pixel_filter_type = "GAUSSIAN"
+    cycles.filter_width = 0.01
+    camera((0.0, -6.0, 3.0), (0.0, 0.0, 0.6))
 
 
 def light(kind, power, eye, target=(0.0, 0.0, 0.0), colour=(1.0, 1.0, 1.0), **values):
@@ -215,6 +230,18 @@ def absorption_of_gltf():
     return 1.0
 
 
+def export_glb(path, **options):
+    """Exports Blender's scene with its camera and its lights, whose watts stay."""
+    bpy.ops.export_scene.gltf(
+        filepath=str(path),
+        export_format="GLB",
+        export_cameras=True,
+        export_lights=True,
+        export_import_convert_lighting_mode="COMPAT",
+        **options,
+    )
+
+
 # --- Pictures -----------------------------------------------------------------------------------------------------
 
 
@@ -254,3 +281,25 @@ def write_sheet(path, shown, scale=2):
     made.filepath_raw, made.file_format = str(path), "PNG"
     made.save()
     bpy.data.images.remove(made)
+
+
+def differences(ours, theirs, share):
+    """Compares the pixels that exceed `share` of the greatest radiance.
+
+    Returns the relative difference of means (positive if ours is greater), p95, the share of outliers, the relative
+    differences of all pixels, and which pixels are compared.
+    """
+    least = share * max(ours.max(), theirs.max())
+    lit = np.maximum(ours, theirs).max(axis=-1) > least
+    greater = np.maximum(np.maximum(ours, theirs), least)
+    relative = (np.abs(ours - theirs) / greater).max(axis=-1)
+    mean = ours[lit].mean() / theirs[lit].mean() - 1.0 if lit.any() and theirs[lit].any() else math.inf
+    if not lit.any():
+        return math.inf, math.inf, 1.0, relative, lit
+    return mean, np.percentile(relative[lit], 95), (relative[lit] > OUTLIER).mean(), relative, lit
+
+
+def contact_sheet(path, ours, theirs, relative):
+    """Writes both pictures and their relative difference side by side."""
+    difference = np.repeat(np.clip(relative / 0.2, 0.0, 1.0)[..., None], 3, axis=-1)
+    write_sheet(path, np.concatenate([*encoded(ours, theirs), difference], axis=1))
