@@ -11,7 +11,7 @@ use std::{
 
 use glam::Vec3;
 use kdray::{
-    accel::{Query, kdtree::BuildOptions},
+    accel::Query,
     cast::{GpuCaster, Hit, Ray, RecordedCast},
     engine::{self, Engine},
     frame::{Goal, Integrator, Picture, RenderOptions},
@@ -22,7 +22,7 @@ use kdray::{
 };
 use support::{
     devices::{assert_silent, device},
-    scenes,
+    scenes, world_of,
 };
 
 const N_THREADS: usize = 3;
@@ -33,7 +33,7 @@ fn options(integrator: Integrator) -> RenderOptions {
 }
 
 fn world() -> World {
-    World::of_flat(scenes::mixed(), &BuildOptions::default()).expect("a world")
+    world_of(&scenes::mixed())
 }
 
 /// Rays from the camera in slightly different directions.

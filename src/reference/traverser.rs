@@ -95,6 +95,7 @@ impl Tracer for Traverser {
                 Self::Grid => search_grid::<ANY_HIT>(inputs, ray, best),
                 Self::Ropes => follow_ropes::<ANY_HIT>(inputs, ray, best),
                 Self::Brute => {
+                    inputs.leaf_triangles.count(inputs.triangles.len());
                     let is_accepted = |hit: &Hit| inputs.is_accepted(&ray.hit_filter.shear, hit, near.alpha_seed);
                     *best = brute::closest_hit_of(inputs.triangles, near, is_accepted);
                 }

@@ -7,14 +7,13 @@ use kdray::{
         kdtree::{BuildOptions, Traversal},
     },
     cast::{CpuCaster, GpuCaster, Hit, NO_TRIANGLE, Ray, cast_on_cpu},
-    gpu::DeviceOverrides,
     layout::{INSTANCE_FOR_OTHERS, Triangle},
     scene::{Scene, Transform},
     world::{FlatScene, World},
 };
 
 use super::{ball, flattened, kept, scene_of, transforms};
-use crate::support::{assert_silent, compare, device, pretended, random::Random};
+use crate::support::{assert_silent, compare, device, random::Random};
 
 fn ray(origin: Vec3, direction: Vec3) -> Ray {
     Ray { origin, t_min: 0.0, direction, t_max: f32::INFINITY }
@@ -173,30 +172,6 @@ fn of_two_instances_at_one_place_the_first_is_hit() {
     let mut caster = GpuCaster::new(device(), world.geometry(), Traversal::OF_GPUS).expect("a caster");
     let on_device = caster.cast(&rays, Query::Closest, 1).expect("hits").hits;
     compare::hits(1, &hits, &on_device).unwrap();
-}
-
-#[test]
-fn suspended_rays_go_on_in_their_instance() {
-    let transforms = transforms(4.0);
-    let world = kept(&scene_of(&ball(), &transforms));
-    let rays = rays_at(&transforms, 600);
-    let expected = cast_on_cpu(world.geometry(), Traversal::Stack, &rays, Query::Closest);
-    // A few iterations a dispatch, room for some of the rays, and drivers with and without a search of their own.
-    for n_lanes in [None, Some(32)] {
-        let overrides = DeviceOverrides {
-            loop_limit: Some(3000),
-            n_suspension_slots: Some(100),
-            n_lanes,
-            ..DeviceOverrides::default()
-        };
-        let context = pretended(overrides);
-        for traversal in [Traversal::Mask, Traversal::Ropes, Traversal::Restart, Traversal::MaskBoxes] {
-            let mut caster = GpuCaster::new(context.clone(), world.geometry(), traversal).expect("a caster");
-            let hits = caster.cast(&rays, Query::Closest, 1).expect("hits").hits;
-            compare::hits(2, &expected, &hits).unwrap_or_else(|what| panic!("{traversal}, {n_lanes:?}: {what}"));
-        }
-        assert_silent(&context);
-    }
 }
 
 #[test]

@@ -6,7 +6,7 @@ use kdray::{
     cast::{CpuCaster, GpuCaster, Hit, NO_TRIANGLE, Ray, cast_on_cpu},
     cpu,
     frame::{Integrator, Primary, RenderOptions},
-    gpu::{Context, DeviceOverrides},
+    gpu::Context,
     scene::{Scene, Transform},
     world::{FlatScene, InstanceUpdate, World},
 };
@@ -18,7 +18,7 @@ use super::{
     pictures::{on_device, options, scene_of_lamps},
     scene_of, transforms,
 };
-use crate::support::{assert_silent, compare, device, meshes, pretended, random::Random};
+use crate::support::{assert_silent, compare, device, meshes, random::Random};
 
 /// A world with a grid for each mesh.
 fn kept_in_grids(scene: &Scene, options: GridOptions) -> World {
@@ -26,12 +26,12 @@ fn kept_in_grids(scene: &Scene, options: GridOptions) -> World {
     World::with_accel(flat, &AccelOptions::Grid(options)).expect("a world")
 }
 
-fn worlds_of_grids(scene: &Scene) -> [World; 2] {
+pub fn worlds_of_grids(scene: &Scene) -> [World; 2] {
     [GridOptions::uniform(), GridOptions::two_level()].map(|options| kept_in_grids(scene, options))
 }
 
 /// Instances of meshes that differ in their sizes and in their grids.
-fn scene() -> Scene {
+pub fn scene() -> Scene {
     let mut scene = scene_of(&ball(), &transforms(4.0));
     let soup = meshes::placed(meshes::soup(300, 5), 0.3, Vec3::ZERO);
     for mesh in [meshes::torus(40, 12), soup, meshes::cube(2, 0.0)] {
@@ -41,7 +41,7 @@ fn scene() -> Scene {
     scene
 }
 
-fn rays() -> Vec<Ray> {
+pub fn rays() -> Vec<Ray> {
     let mut rays = rays_at(&transforms(4.0), 3000);
     let mut random = Random(4);
     let far = |_| {
@@ -101,22 +101,6 @@ fn hits_in_grids_are_those_in_trees_and_of_brute_force() {
         let found = cast_on(&context, &world, Traversal::OF_GPUS, &hidden);
         compare::exact(&expected_on_device.0, &found.0).unwrap_or_else(|what| panic!("{kind}: {what}"));
         assert!(found == expected_on_device, "{kind}");
-    }
-    assert_silent(&context);
-}
-
-#[test]
-fn suspended_rays_go_on_in_the_grid_of_their_instance() {
-    let scene = scene();
-    let rays = &rays()[..600];
-    let expected = cast_on_cpu(kept(&scene).geometry(), Traversal::Stack, rays, Query::Closest);
-    let overrides =
-        DeviceOverrides { loop_limit: Some(3000), n_suspension_slots: Some(100), ..DeviceOverrides::default() };
-    let context = pretended(overrides);
-    for world in worlds_of_grids(&scene) {
-        let mut caster = GpuCaster::new(context.clone(), world.geometry(), Traversal::OF_GPUS).expect("a caster");
-        let hits = caster.cast(rays, Query::Closest, 1).expect("hits").hits;
-        compare::hits(2, &expected, &hits).unwrap_or_else(|what| panic!("{}: {what}", world.accel().kind()));
     }
     assert_silent(&context);
 }

@@ -4,12 +4,15 @@
 mod support;
 
 mod casts;
+mod costs;
 mod grids;
+mod margins;
 mod masks;
 mod memory;
 mod moved;
 mod pictures;
 mod refused;
+mod suspended;
 
 use glam::{DMat4, DQuat, DVec3, DVec4};
 use kdray::{

@@ -17,7 +17,7 @@ use super::{ball, flattened, kept, mesh_of};
 use crate::support::{assert_silent, device, textured};
 
 /// Every kind of texture and material, and more instances of the same meshes: turned, mirrored and stretched.
-fn scene() -> Scene {
+pub fn scene() -> Scene {
     let mut scene = textured::scene_of_every_kind();
     let turn = DQuat::from_rotation_y(0.6) * DQuat::from_rotation_x(0.3);
     let more = [

@@ -3,7 +3,7 @@
 use std::{sync::Arc, thread};
 
 use kdray::{
-    accel::kdtree::{BuildOptions, TraversalLinks},
+    accel::kdtree::TraversalLinks,
     buffers::{Needs, PathQueue, Resources},
     frame::{Denoise, Integrator, RenderOptions},
     gpu::{Commands, Context},
@@ -14,7 +14,7 @@ use kdray::{
 };
 
 use super::stage::FIRST;
-use crate::support::device;
+use crate::support::{device, world_of};
 
 pub struct PathStage {
     pub world: World,
@@ -55,7 +55,7 @@ impl PathStage {
     fn on_with_options(context: Arc<Context>, scene: FlatScene, samples_log2: u32, options: &RenderOptions) -> Self {
         let (integrator, max_depth) = (Integrator::Path, 3);
         let options = RenderOptions { width: 40, height: 30, integrator, max_depth, ..options.clone() };
-        let world = World::of_flat(scene, &BuildOptions::default()).expect("a world");
+        let world = world_of(&scene);
         let mut constants = Frame { queue_capacity: 1200 << samples_log2, ..world.frame_constants(&options) };
         constants.samples_log2 = samples_log2;
         constants.set_view(&world.scene().camera, world.bounds(), 0);

@@ -100,9 +100,8 @@ fn lights_that_are_not_asked_for_could_not_be_seen() {
     assert!(greatest_difference(&instead(LIGHT_UNTESTED)) < 3e-18);
     assert!(greatest_difference(&instead(LIGHT_SHADOWED)) > 0.1);
     // On glossy surfaces, most lights are not tested, but some are.
-    let is_glossy = |hit: &Hit| {
-        hit.triangle_ix != NO_TRIANGLE && stage.inputs().triangle_materials[hit.triangle_ix as usize] % 3 == 1
-    };
+    let is_glossy =
+        |hit: &Hit| hit.triangle_ix != NO_TRIANGLE && stage.inputs().material_ix_of(hit.triangle_ix) % 3 == 1;
     let of_glossy = |state: u32| (0..n).filter(|&i| is_glossy(&hits[i]) && asked_for[i] == state).count();
     assert!(
         of_glossy(LIGHT_UNTESTED) > 3 * of_glossy(LIGHT_LIT) && of_glossy(LIGHT_LIT) + of_glossy(LIGHT_SHADOWED) > 0

@@ -3,7 +3,7 @@
 use std::{cell::Cell, sync::Arc, thread};
 
 use kdray::{
-    accel::kdtree::{BuildOptions, TraversalLinks},
+    accel::kdtree::TraversalLinks,
     buffers::{Needs, Resources},
     frame::{Denoise, RenderOptions},
     gpu::{Commands, Context},
@@ -13,7 +13,7 @@ use kdray::{
     world::{FlatScene, World},
 };
 
-use crate::support::device;
+use crate::support::{device, world_of};
 
 /// Numbers of rays around a workgroup's size.
 pub const RAY_COUNTS: [u32; 7] =
@@ -52,7 +52,7 @@ impl Stage {
     /// Makes a stage with a queue for `capacity` rays.
     pub fn new(scene: FlatScene, options: RenderOptions, capacity: u32) -> Self {
         let context = device();
-        let world = World::of_flat(scene, &BuildOptions::default()).expect("a world");
+        let world = world_of(&scene);
         let constants = Frame { queue_capacity: capacity, ..world.frame_constants(&options) };
         let needs = Needs { constants: &constants, options: &options, n_bounces: constants.max_depth as usize };
         let resources = Resources::new(&context, &world, &needs).expect("resources");

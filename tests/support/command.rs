@@ -10,6 +10,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use super::kept;
+
 /// Time limit of each wait in the tests. It is longer than anything that they wait for takes on a busy machine.
 /// Pictures that take seconds alone have taken more than two minutes beside ten busy programs on two cores.
 pub const PATIENCE: Duration = Duration::from_secs(600);
@@ -26,6 +28,10 @@ pub fn kdray(directory: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_kdray"));
     // Tests do not depend on what a user has measured.
     command.current_dir(directory).args(arguments).env("KDRAY_CACHE", "").stdin(Stdio::null());
+    let has_instances = matches!(arguments.first(), Some(&("render" | "cast"))) && !arguments.contains(&"--instances");
+    if has_instances && kept::is_asked_for() {
+        command.args(["--instances", "keep"]);
+    }
     command
 }
 

@@ -10,6 +10,7 @@ pub mod compare;
 pub mod devices;
 #[cfg(target_os = "linux")]
 pub mod display;
+pub mod kept;
 pub mod meshes;
 pub mod packets;
 pub mod random;
@@ -38,13 +39,14 @@ pub fn world_of(scene: &FlatScene) -> World {
 
 /// Returns the scene with a tree that is built with these options.
 pub fn world_by(scene: &FlatScene, build_options: &BuildOptions) -> World {
-    World::of_flat(scene.clone(), build_options).expect("a material for each triangle")
+    World::of_flat(kept::if_asked_for(scene), build_options).expect("a material for each triangle")
 }
 
 /// Returns the scene with a grid of each kind.
 pub fn grid_worlds(scene: &FlatScene) -> [World; 2] {
     [GridOptions::uniform(), GridOptions::two_level()].map(|options| {
-        World::with_accel(scene.clone(), &AccelOptions::Grid(options)).expect("a material for each triangle")
+        let scene = kept::if_asked_for(scene);
+        World::with_accel(scene, &AccelOptions::Grid(options)).expect("a material for each triangle")
     })
 }
 
@@ -53,6 +55,8 @@ pub struct MeshWithTree {
     pub triangles: Vec<Triangle>,
     pub accel: Accel,
     pub links: TraversalLinks,
+    /// The triangles as an instance, if instances are asked for ([`kept`]) and the triangles are not refused.
+    pub instance: Option<World>,
 }
 
 impl MeshWithTree {
@@ -62,7 +66,8 @@ impl MeshWithTree {
     }
 
     pub fn with_tree(triangles: Vec<Triangle>, tree: KdTree) -> Self {
-        Self { triangles, links: TraversalLinks::all(&tree), accel: Accel::KdTree(tree) }
+        let instance = kept::is_asked_for().then(|| kept::mesh(&triangles)).flatten();
+        Self { triangles, links: TraversalLinks::all(&tree), accel: Accel::KdTree(tree), instance }
     }
 
     pub fn tree(&self) -> &KdTree {
@@ -75,7 +80,10 @@ impl MeshWithTree {
 
     /// Returns the triangles and the tree as a cast takes them.
     pub fn geometry(&self) -> Geometry<'_> {
-        Geometry::new(&self.triangles, &self.accel).expect("a tree of these triangles")
+        match &self.instance {
+            Some(world) => world.geometry(),
+            None => Geometry::new(&self.triangles, &self.accel).expect("a tree of these triangles"),
+        }
     }
 
     /// Returns the closest hit beyond `t_min` among all triangles. The ray's origin is first moved near the scene, as

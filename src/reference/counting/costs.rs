@@ -74,7 +74,7 @@ pub fn count_shadow(
 
 /// Returns the number of nodes and triangles that a ray reads.
 fn steps_of<const ANY: bool>(inputs: &KernelInputs, traverser: &mut Traverser, ray: &SearchRay) -> u32 {
-    if matches!(traverser, Traverser::Brute) {
+    if matches!(traverser, Traverser::Brute) && inputs.instanced.is_none() {
         return inputs.triangles.len() as u32;
     }
     let counts = ReadCounts::default();

@@ -52,7 +52,7 @@ impl From<ReadCounts> for Steps {
 /// Returns the reads of all rays together. The kernels' reads are the same, unless rounding sends a ray another way.
 /// Brute force counts every triangle for both kinds of query.
 pub fn count_steps(inputs: &KernelInputs, traversal: Traversal, query: Query, rays: &[PathRay]) -> Steps {
-    if traversal == Traversal::Brute {
+    if traversal == Traversal::Brute && inputs.instanced.is_none() {
         return Steps { n_triangles: (rays.len() * inputs.triangles.len()) as u64, ..Steps::default() };
     }
     let of_task = |traverser: &mut Traverser, rays: &[PathRay]| {
