@@ -316,7 +316,7 @@ fn grids_are_refused() {
     let refusal = "closest points are found in a kd-tree without instances (--accel kdtree --instances flatten)";
     let of_cpu = CpuCaster::new(geometry, Traversal::Stack).closest_points(&[]).expect_err("a grid");
     assert_eq!(of_cpu.to_string(), refusal);
-    let mut caster = GpuCaster::new(&device(), geometry, Traversal::Stack).expect("a caster");
+    let mut caster = GpuCaster::new(device(), geometry, Traversal::Stack).expect("a caster");
     assert!(caster.closest_points(&[], 1).expect_err("a grid").to_string().contains(refusal));
 }
 
@@ -326,7 +326,8 @@ fn wrong_hits_are_noticed() {
     let points = points_of(&world, 70);
     let hits = on_cpu(&world, &points);
     let (right, _) = (0..70).zip(&hits).find(|(i, hit)| i % 7 == 6 && hit.triangle_ix != NO_TRIANGLE).expect("a hit");
-    let errors: [(&str, fn(&mut Hit)); 5] = [
+    type Plant = fn(&mut Hit);
+    let errors: [(&str, Plant); 5] = [
         ("a miss", |hit| *hit = MISS),
         ("too far", |hit| hit.triangle_ix = (hit.triangle_ix + 200) % 576),
         ("t", |hit| hit.t *= 1.0 + 1e-4),
