@@ -706,6 +706,15 @@ struct Ray {
     float t_max;
 };
 
+// A point whose closest point on the triangles is sought, 16 bytes.
+//
+// - `position`: of the point, world units.
+// - `t_max`: the greatest distance of its closest point, world units. It may be infinite.
+struct QueryPoint {
+    vec3 position;
+    float t_max;
+};
+
 // A path of a picture, 16 bytes: what is known of it beside its ray.
 //
 // - `radiance`: the light that the path has brought to its pixel so far.
@@ -1452,8 +1461,10 @@ struct GridSort {
 
 // One `Ray` for each ray of the cast.
 #define BIND_CAST_RAYS 62u
-// One `Hit` for each ray of the cast.
+// One `Hit` for each ray of the cast, or for each point.
 #define BIND_CAST_HITS 63u
+// One `QueryPoint` for each point, in place of `BIND_CAST_RAYS`.
+#define BIND_CAST_POINTS 61u
 
 // The descriptor set of a grid's build. "Level" is the level that is built. A "scan block" is `GRID_BLOCK_SIZE`
 // consecutive entries. A "block of cells" is the lower cells that an upper cell is cut into.

@@ -13,10 +13,12 @@
 //! resources       all of these, with the frame's descriptor set
 //! grid            the build of a grid
 //! cast            given rays, their hits, and the cast's descriptor set
+//! closest_point   given points, their hits, and the descriptor set of the search
 //! ```
 
 mod accel;
 mod cast;
+mod closest_point;
 mod grid;
 mod pixels;
 mod queue;
@@ -32,6 +34,7 @@ mod vertex_indices;
 pub use self::{
     accel::AccelBuffers,
     cast::CastResources,
+    closest_point::PointResources,
     grid::{GridBuffers, GridCapacities, PairSets},
     pixels::Pixels,
     queue::{PathQueue, Queue},

@@ -1,10 +1,12 @@
-//! Casts the caller's rays on a device or on the CPU, and returns their hits. No frame is involved.
+//! Casts the caller's rays on a device or on the CPU, and returns their hits. Likewise finds the closest points of the
+//! triangles to the caller's points. No frame is involved.
 //!
 //! ```text
 //! RayReader ─> batches ─> GpuCaster (runs the kernel once for each repetition) ─> HitWriter
 //!   .npy                                                                         .npz
 //! ```
 
+mod closest_point;
 mod kernel;
 pub(crate) mod leaving;
 #[cfg(feature = "files")]
@@ -23,20 +25,20 @@ use std::{
     time::Instant,
 };
 
-use bytemuck::Zeroable;
+use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use rayon::prelude::*;
 
-pub use self::recorded::RecordedCast;
 pub(crate) use self::rounds::time_in_turn;
+pub use self::{closest_point::count_invalid_points, recorded::RecordedCast};
 #[doc(hidden)]
 pub use self::{kernel::Kernel, rounds::Contender};
 #[cfg(feature = "files")]
 pub use self::{
-    read::{RayFileError, RayReader},
+    read::{PointReader, RayFileError, RayReader},
     write::HitWriter,
 };
-pub use crate::layout::{Hit, NO_TRIANGLE, Ray};
+pub use crate::layout::{Hit, NO_TRIANGLE, QueryPoint, Ray};
 use crate::{
     accel::{
         Query,
@@ -47,9 +49,12 @@ use crate::{
     buffers::{AccelBuffers, CastResources, ResumePass, hidden_words},
     cpu::{self, CpuSearch},
     frame::{BadOptions, check::check},
-    gpu::{Access, BindingLayout, CommandBuffer, Context, Device, GpuError, Limits, Statistic, Timer},
+    gpu::{
+        Access, BindingLayout, Buffer, CommandBuffer, Commands, Context, Device, GpuError, Limits, Statistic, Timer,
+    },
     layout::{PathRay, RAY_GROUP_SIZE},
-    passes, reference,
+    passes,
+    reference::{self, inputs::KernelInputs},
     world::{Geometry, Mismatch, World},
 };
 
@@ -86,6 +91,10 @@ pub struct GpuCaster {
     /// The kernel for [`Query::Any`], created at its first use.
     any: Option<Arc<passes::Cast>>,
     resources: CastResources,
+    /// The search for closest points, created at its first use.
+    point_search: Option<closest_point::PointSearch>,
+    /// Whether there are neither instances nor a grid.
+    is_flat_tree: bool,
     rays_per_batch: usize,
 }
 
@@ -110,6 +119,8 @@ impl GpuCaster {
             traversal,
             closest: None,
             any: None,
+            point_search: None,
+            is_flat_tree: geometry.accel().as_kdtree().is_some(),
         })
     }
 
@@ -122,7 +133,7 @@ impl GpuCaster {
         self.tree.hide(&self.context, triangles)?;
         self.bindings = CastResources::bindings(&self.context, &self.tree)?;
         self.resources = CastResources::new(&self.context, &self.bindings, &self.tree, 0)?;
-        (self.closest, self.any) = (None, None);
+        (self.closest, self.any, self.point_search) = (None, None, None);
         Ok(self)
     }
 
@@ -154,15 +165,10 @@ impl GpuCaster {
     /// There are more than [`MOST_REPETITIONS`], memory runs out, or a call fails.
     pub fn cast(&mut self, rays: &[Ray], query: Query, n_times: u32) -> Result<CastResult, GpuError> {
         check_repetitions(n_times)?;
-        self.prepare(query, rays.len())?;
-        let mut hits = Vec::with_capacity(rays.len());
-        let mut gpu_ms = Some(vec![0.0; n_times.max(1) as usize]);
-        for batch in rays.chunks(self.rays_per_batch) {
-            self.resources.cast_rays.upload(batch)?;
-            let batch_ms = self.run(query, batch.len() as u32, n_times.max(1))?;
-            gpu_ms = gpu_ms.zip(batch_ms).map(|(sums, batch)| sums.iter().zip(batch).map(|(a, b)| a + b).collect());
-            hits.extend(self.resources.cast_hits.download_first(batch.len())?);
-        }
+        let kernel = self.prepare(query, rays.len())?;
+        let CastResources { cast_rays, cast_hits, set } = &self.resources;
+        let record = |commands: &Commands, n_rays, pass| kernel.record(commands, set, n_rays, pass);
+        let (hits, gpu_ms) = self.run_batches(rays, (cast_rays, cast_hits), n_times.max(1), record)?;
         Ok(CastResult { hits, gpu_ms, n_invalid: count_invalid(rays) })
     }
 
@@ -192,24 +198,40 @@ impl GpuCaster {
         Ok(Arc::clone(kernel.insert(made)))
     }
 
-    /// Creates the query's kernel and buffers for a batch, unless they exist.
-    fn prepare(&mut self, query: Query, n_rays: usize) -> Result<(), GpuError> {
-        self.prepare_kernel(query)?;
+    /// Creates the query's kernel and buffers for a batch, unless they exist. Returns the kernel.
+    fn prepare(&mut self, query: Query, n_rays: usize) -> Result<Arc<passes::Cast>, GpuError> {
+        let kernel = self.prepare_kernel(query)?;
         let len = n_rays.min(self.rays_per_batch);
         if self.resources.cast_rays.len() < len {
             self.resources = CastResources::new(&self.context, &self.bindings, &self.tree, len)?;
         }
-        Ok(())
+        Ok(kernel)
+    }
+
+    /// Runs a kernel for all queries (rays or points), batch by batch. Returns their hits, and the milliseconds of each
+    /// repetition. `buffers`: the queries of a batch, and their hits. `record`: records the kernel for the first
+    /// queries of the buffer.
+    fn run_batches<Q: Pod>(
+        &self,
+        queries: &[Q],
+        buffers: (&Buffer<Q>, &Buffer<Hit>),
+        n_times: u32,
+        record: impl Fn(&Commands, u32, ResumePass),
+    ) -> Result<(Vec<Hit>, Option<Vec<f64>>), GpuError> {
+        let mut hits = Vec::with_capacity(queries.len());
+        let mut gpu_ms = Some(vec![0.0; n_times as usize]);
+        for batch in queries.chunks(self.rays_per_batch) {
+            buffers.0.upload(batch)?;
+            let batch_ms = self.run(n_times, |commands, pass| record(commands, batch.len() as u32, pass))?;
+            gpu_ms = gpu_ms.zip(batch_ms).map(|(sums, batch)| sums.iter().zip(batch).map(|(a, b)| a + b).collect());
+            hits.extend(buffers.1.download_first(batch.len())?);
+        }
+        Ok((hits, gpu_ms))
     }
 
     /// Runs the kernel on the uploaded batch, with one command buffer for each repetition. Returns the milliseconds
     /// of each repetition.
-    fn run(&self, query: Query, n_rays: u32, n_times: u32) -> Result<Option<Vec<f64>>, GpuError> {
-        let kernel = match query {
-            Query::Closest => &self.closest,
-            Query::Any => &self.any,
-        };
-        let kernel = kernel.as_ref().expect("`prepare` has made it");
+    fn run(&self, n_times: u32, record_kernel: impl Fn(&Commands, ResumePass)) -> Result<Option<Vec<f64>>, GpuError> {
         let timer = Timer::new(&self.context, n_times)?;
         let record = |repetition| {
             CommandBuffer::record(&self.context, "cast", Some(&timer), |commands| {
@@ -219,15 +241,13 @@ impl GpuCaster {
                 // This repetition overwrites what the previous one has written: cast_hits.
                 commands.barrier(Access::ComputeWrite, Access::ComputeUpdate);
                 self.tree.suspended_rays.reset(commands);
-                kernel.record(commands, &self.resources.set, n_rays, ResumePass::Begin);
+                record_kernel(commands, ResumePass::Begin);
             })
         };
         let buffers = (0..n_times).map(record).collect::<Result<Vec<_>, _>>()?;
         self.context.wait_for(self.context.submit(buffers)?)?;
         let began_ms = Instant::now();
-        let n_resume_passes = self.tree.suspended_rays.finish(&self.context, |commands, resume_pass| {
-            kernel.record(commands, &self.resources.set, n_rays, resume_pass);
-        })?;
+        let n_resume_passes = self.tree.suspended_rays.finish(&self.context, record_kernel)?;
         // The same rays are suspended in every repetition, but they are resumed only once, after the last repetition.
         // The wall-clock time of resuming them is added to each repetition.
         let suspended_ms = if n_resume_passes > 0 { began_ms.elapsed().as_secs_f64() * 1e3 } else { 0.0 };
@@ -323,14 +343,17 @@ impl<'a> CpuCaster<'a> {
 
     /// Casts rays, and returns one hit for each.
     pub fn cast(&self, rays: &[Ray], query: Query) -> Vec<Hit> {
-        let bindings = reference::inputs::KernelInputs::of_geometry(self.geometry());
-        let bindings = match &self.hidden {
-            Some(words) => bindings.with_hidden(words),
-            None => bindings,
-        };
         let mut hits = vec![Hit::zeroed(); rays.len()];
-        cpu::cast(&bindings.with_links(&self.links), self.search_for(rays), query, rays, &mut hits);
+        cpu::cast(&self.inputs().with_links(&self.links), self.search_for(rays), query, rays, &mut hits);
         hits
+    }
+
+    fn inputs(&self) -> KernelInputs<'_> {
+        let inputs = KernelInputs::of_geometry(self.geometry());
+        match &self.hidden {
+            Some(words) => inputs.with_hidden(words),
+            None => inputs,
+        }
     }
 
     /// Returns how the rays are traced: scattered rays through the wide hierarchy, if it exists or making it pays. The

@@ -213,7 +213,8 @@ pub struct CastArgs {
     #[command(flatten)]
     pub load: LoadArgs,
     /// Rays to cast, a .npy file of float32: K x 8 (origin, direction, t_min, t_max), or K x 6 for t from 0 to
-    /// infinity; directions need not be unit vectors, but a ray whose direction is shorter than 1.2e-38 misses
+    /// infinity; directions need not be unit vectors, but a ray whose direction is shorter than 1.2e-38 misses. With
+    /// --closest, points: K x 4 (x, y, z, t_max), or K x 3 for any distance
     pub rays: PathBuf,
     /// Hits to write, a .npz file of the arrays t_hit, instance_ids, geometry_ids, primitive_ids, primitive_uvs and
     /// primitive_normals, or with --any of a single array, occluded
@@ -222,6 +223,9 @@ pub struct CastArgs {
     /// Find only whether each ray hits anything (occlusion), not the closest hit
     #[arg(long)]
     pub any: bool,
+    /// Find the closest point of the mesh to each of the points in RAYS; t_hit is its distance
+    #[arg(long, conflicts_with_all = ["any", "traversal"])]
+    pub closest: bool,
     /// Whether a mesh that occurs several times is stored once: auto, flatten or keep
     #[arg(long, value_name = "KIND", long_help = instances_help(), default_value_t)]
     pub instances: Instancing,
@@ -534,17 +538,36 @@ impl CastArgs {
     /// Refuses arguments that contradict each other.
     pub fn check(&self) -> Result<(), CliError> {
         check_accel(self.accel, self.traversal, self.build)?;
+        if self.closest && (self.accel != AccelKind::KdTree || self.instances == Instancing::Keep) {
+            let reason = "--closest searches a kd-tree without instances: use --accel kdtree --instances flatten";
+            return Err(CliError::Usage(reason.to_owned()));
+        }
         require_ending(&self.output, "npz", "a file of hits")
     }
 
-    /// Returns the user's choice of structure, build and traversal.
+    /// Returns the user's choice of structure, build and traversal. The search for closest points keeps what is pending
+    /// as the traversal `stack` does.
     pub fn request(&self) -> Request {
         Request {
             accel: self.accel,
             build: self.build,
-            traversal: self.traversal.pinned(),
+            traversal: if self.closest { Some(Traversal::Stack) } else { self.traversal.pinned() },
             primary: None,
             instances: self.instances,
+        }
+    }
+
+    /// Returns what is cast, in the plural.
+    pub fn noun(&self) -> &'static str {
+        if self.closest { "points" } else { "rays" }
+    }
+
+    /// Returns the query as reports name it.
+    pub fn query_name(&self) -> &'static str {
+        match (self.closest, self.any) {
+            (true, _) => "closest_point",
+            (false, true) => "any",
+            (false, false) => "closest",
         }
     }
 

@@ -1,7 +1,9 @@
-//! `kdray cast`: casts rays from a file into a scene and writes their hits to a file.
+//! `kdray cast`: casts rays from a file into a scene and writes their hits to a file, or finds the closest points to
+//! the points of a file.
 
 use kdray::{
-    cast::{CastResult, Hit, HitWriter, NO_TRIANGLE, RAYS_PER_BATCH, RayReader},
+    accel::Query,
+    cast::{CastResult, Hit, HitWriter, NO_TRIANGLE, PointReader, RAYS_PER_BATCH, RayReader},
     engine::{Caster, Engine, Loaded, Opened, Work, choices::Choices},
     gpu::ContextOptions,
     output,
@@ -29,7 +31,7 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
     set_threads(args.threads)?;
     args.check_device()?;
 
-    let rays = RayReader::open(&args.rays)?;
+    let queries = Queries::open(args)?;
     let progress = Progress::new(args.quiet, 3);
     let loading = format!("loading {}", args.mesh.display());
     let (opened, load_ms) = progress.stage(&loading, || Opened::read(&args.mesh, &args.load.rays()));
@@ -40,12 +42,12 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
     let engine = device.clone().map_or_else(Engine::on_cpu, Engine::on_device).with_request(args.request());
     let n_triangles = opened.scene.n_triangles();
     let building = engine.builder().describe(n_triangles);
-    let (built, _) = progress.stage(&building, || engine.build(opened, &Work::Rays(rays.n_rays())));
+    let (built, _) = progress.stage(&building, || engine.build(opened, &Work::Rays(queries.n())));
     let (Loaded { world, accel, build_ms, .. }, methods) = built?;
-    let casting = format!("casting {} rays", rays.n_rays());
+    let casting = format!("casting {} {}", queries.n(), args.noun());
     let traversal = methods.traversal.value;
     let caster = engine.caster(world.geometry(), traversal)?;
-    let (done, cast_ms) = progress.stage(&casting, || cast_all(args, rays, caster, world.scene()));
+    let (done, cast_ms) = progress.stage(&casting, || cast_all(args, queries, caster, world.scene()));
     let totals = done?;
     drop(progress);
 
@@ -53,7 +55,8 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
         scene: world.scene().name.clone(),
         rays: args.rays.clone(),
         hits: args.output.clone(),
-        query: if args.any { "any" } else { "closest" },
+        query: args.query_name(),
+        noun: args.noun(),
         traversal: accel.tree_kind().map(|_| traversal.to_string()),
         choices: Choices::of_rays(accel, methods),
         device: engine.device_name(),
@@ -105,17 +108,47 @@ impl Totals {
     }
 }
 
-/// Reads rays, casts them and writes their hits, one batch at a time.
-fn cast_all(args: &CastArgs, mut rays: RayReader, mut caster: Caster, scene: &FlatScene) -> Result<Totals, CliError> {
+/// The file of rays or points.
+enum Queries {
+    Rays(RayReader),
+    Points(PointReader),
+}
+
+impl Queries {
+    fn open(args: &CastArgs) -> Result<Self, CliError> {
+        Ok(match args.closest {
+            true => Self::Points(PointReader::open(&args.rays)?),
+            false => Self::Rays(RayReader::open(&args.rays)?),
+        })
+    }
+
+    /// Returns the number of rays or points in the whole file.
+    fn n(&self) -> u64 {
+        match self {
+            Self::Rays(rays) => rays.n_rays(),
+            Self::Points(points) => points.n_points(),
+        }
+    }
+
+    /// Reads a batch and casts it. The result has no hits after the last batch.
+    fn cast_next(&mut self, caster: &mut Caster, query: Query, n_times: u32) -> Result<CastResult, CliError> {
+        Ok(match self {
+            Self::Rays(rays) => caster.cast(&rays.next_batch(RAYS_PER_BATCH)?, query, n_times)?,
+            Self::Points(points) => caster.closest_points(&points.next_batch(RAYS_PER_BATCH)?, n_times)?,
+        })
+    }
+}
+
+/// Reads rays or points, casts them and writes their hits, one batch at a time.
+fn cast_all(args: &CastArgs, mut queries: Queries, mut caster: Caster, scene: &FlatScene) -> Result<Totals, CliError> {
     let (query, n_times) = (args.query(), u32::from(args.repeat));
     let mut totals = Totals { n_rays: 0, n_hits: 0, n_invalid: 0, ms: Some(vec![0.0; n_times as usize]) };
     let mut hits = HitWriter::new(&args.output)?;
     loop {
-        let batch = rays.next_batch(RAYS_PER_BATCH)?;
-        if batch.is_empty() {
+        let cast = queries.cast_next(&mut caster, query, n_times)?;
+        if cast.hits.is_empty() {
             break;
         }
-        let cast = caster.cast(&batch, query, n_times)?;
         totals.add(&cast);
         hits.push(&cast.hits)?;
     }

@@ -17,6 +17,9 @@ pub struct CastReport {
     pub rays: PathBuf,
     pub hits: PathBuf,
     pub query: &'static str,
+    /// What was cast: rays or points.
+    #[serde(skip)]
+    pub noun: &'static str,
     /// The traversal of the kd-tree; none for grids.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub traversal: Option<String>,
@@ -32,7 +35,8 @@ pub struct CastReport {
     pub grid_build: Option<DeviceBuild>,
     pub n_rays: u64,
     pub n_hits: u64,
-    /// Number of rays that can only miss: those with a NaN, with an infinite origin or direction, or with a direction
+    /// Number of rays or points that can only miss. Those are points that are not finite or have a `t_max` that is NaN
+    /// or negative, and rays with a NaN, with an infinite origin or direction, or with a direction
     /// whose components are all zero or denormal (less than 2^-126).
     pub n_invalid: u64,
     /// None if the device has no timestamps.
@@ -77,14 +81,14 @@ impl Times {
 impl CastReport {
     /// The report as text that ends with a line break.
     pub fn text(&self) -> String {
-        let Self { scene, choices, triangles, load_ms, build_ms, device, n_rays, n_hits, n_invalid, .. } = self;
+        let Self { scene, choices, triangles, load_ms, build_ms, device, noun, n_rays, n_hits, n_invalid, .. } = self;
         let times = self.times.as_ref().map_or_else(|| "no timestamps".to_owned(), Times::text);
         let invalid = if *n_invalid > 0 { format!(", {n_invalid} invalid") } else { String::new() };
         format!(
             "{scene}: {triangles} triangles, loaded in {load_ms:.0} ms, {} {}\n\
              {choices}\n\
              {device}: {times}\n\
-             {n_rays} rays, {n_hits} hits{invalid}\n\
+             {n_rays} {noun}, {n_hits} hits{invalid}\n\
              wrote {}\n",
             self.accel.kind().name(),
             built_in(*build_ms, self.grid_build.as_ref()),

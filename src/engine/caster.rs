@@ -4,7 +4,8 @@ use std::{sync::Arc, time::Instant};
 
 use crate::{
     accel::{Query, kdtree::Traversal},
-    cast::{self, CastResult, CpuCaster, Ray},
+    cast::{self, CastResult, CpuCaster, Hit, QueryPoint, Ray},
+    frame::BadOptions,
     gpu::{Context, GpuError},
     world::{Geometry, World},
 };
@@ -62,17 +63,38 @@ impl<'a> Caster<'a> {
         cast::check_repetitions(n_times)?;
         match &mut self.0 {
             Backend::Device(caster) => caster.cast(rays, query, n_times),
-            Backend::Cpu(caster) => Ok(cast_on_cpu(caster, rays, query, n_times)),
+            Backend::Cpu(caster) => {
+                let (hits, ms) = timed(n_times, || Ok(caster.cast(rays, query)))?;
+                Ok(CastResult { hits, gpu_ms: Some(ms), n_invalid: cast::count_invalid(rays) })
+            }
+        }
+    }
+
+    /// Finds the point of the triangles that is closest to each of `points`, as
+    /// [`GpuCaster::closest_points`](cast::GpuCaster::closest_points) does.
+    ///
+    /// # Errors
+    /// The triangles are in a grid or are those of instances, there are more than
+    /// [`MOST_REPETITIONS`](cast::MOST_REPETITIONS), memory runs out, or a call fails.
+    pub fn closest_points(&mut self, points: &[QueryPoint], n_times: u32) -> Result<CastResult, GpuError> {
+        cast::check_repetitions(n_times)?;
+        match &mut self.0 {
+            Backend::Device(caster) => caster.closest_points(points, n_times),
+            Backend::Cpu(caster) => {
+                let (hits, ms) = timed(n_times, || caster.closest_points(points))?;
+                Ok(CastResult { hits, gpu_ms: Some(ms), n_invalid: cast::count_invalid_points(points) })
+            }
         }
     }
 }
 
-fn cast_on_cpu(caster: &CpuCaster, rays: &[Ray], query: Query, n_times: u32) -> CastResult {
+/// Runs a cast `n_times`, at least once. Returns the hits and the milliseconds of each repetition.
+fn timed(n_times: u32, cast: impl Fn() -> Result<Vec<Hit>, BadOptions>) -> Result<(Vec<Hit>, Vec<f64>), BadOptions> {
     let (mut hits, mut ms) = (Vec::new(), Vec::new());
     for _ in 0..n_times.max(1) {
         let start = Instant::now();
-        hits = caster.cast(rays, query);
+        hits = cast()?;
         ms.push(start.elapsed().as_secs_f64() * 1e3);
     }
-    CastResult { hits, gpu_ms: Some(ms), n_invalid: cast::count_invalid(rays) }
+    Ok((hits, ms))
 }

@@ -40,6 +40,7 @@ mod tests {
             BIND_BOUNCES => Some("Bounce"),
             BIND_HITS | BIND_CAST_HITS => Some("Hit"),
             BIND_CAST_RAYS => Some("Ray"),
+            BIND_CAST_POINTS => Some("QueryPoint"),
             BIND_PIXEL_AOVS => Some("PixelAovs"),
             BIND_PIXEL_AUX => Some("Auxiliary"),
             BIND_PATH_STATES => Some("PathState"),
@@ -59,6 +60,7 @@ mod tests {
     fn pushed_to(shader: &str) -> &'static str {
         match shader {
             cast if cast.starts_with("cast_") => "CastBatch",
+            "closest_point.comp" => "CastBatch",
             "driver.rgen" => "DriverCast",
             "atrous_filter.comp" => "EdgeStep",
             "false_color.comp" => "FalseColor",

@@ -32,6 +32,7 @@ mod accumulate;
 mod atrous_filter;
 mod auxiliary;
 mod cast;
+mod closest_point;
 mod compact;
 mod demodulate;
 mod denoise;
@@ -65,6 +66,7 @@ pub use self::{
     atrous_filter::AtrousFilter,
     auxiliary::Auxiliary,
     cast::Cast,
+    closest_point::ClosestPoint,
     compact::Compact,
     demodulate::Demodulate,
     denoise::Denoise,

@@ -16,11 +16,11 @@ use crate::{
 };
 
 /// The result of a ray that hits nothing.
-const MISS: Hit = Hit { t: f32::INFINITY, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
+pub(super) const MISS: Hit = Hit { t: f32::INFINITY, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
 
 /// The biased exponent of the longest component, 1 to 254; 0 if it is zero or denormal, 255 if it is infinite or NaN.
 #[inline(always)]
-fn exponent_of(v: Vec3) -> u32 {
+pub(super) fn exponent_of(v: Vec3) -> u32 {
     let [x, y, z] = v.to_array().map(|x| x.to_bits() & 0x7fff_ffff);
     x.max(y).max(z) >> 23
 }

@@ -9,10 +9,11 @@
 //!
 //! ```text
 //! passes      primary_hit, trace, pixel_aovs, compact, shadow, shade, resolve, accumulate, denoise, false_color,
-//!             tonemap, cast; path_* and auxiliary; demodulate and atrous_filter; visibility, for which the device
-//!             rasterizes
+//!             tonemap, cast, closest_point; path_* and auxiliary; demodulate and atrous_filter; visibility, for which
+//!             the device rasterizes
 //! traversal   traverser: one ray by any algorithm
 //!               kdtree, leaf, slab, kd_boxes, ropes, brute and the pending_* of each algorithm; grid; candidate
+//! points      distant_cells: cells of the kd-tree as a point sees them; point_triangle
 //! geometry    triangle, surface, camera; search_ray and traversal_ray: a ray in the form that searches use
 //! light       light, material, microfacet, fresnel, children, display, tone_curves
 //! paths       sampler, path_camera, paths, path_vertex; bsdf: surfaces; emitters: lights; noise: variances;
@@ -34,11 +35,13 @@ pub mod cast;
 #[cfg(test)]
 pub(crate) mod chi_square;
 pub mod children;
+pub mod closest_point;
 pub mod compact;
 pub mod counting;
 pub mod demodulate;
 pub mod denoise;
 pub mod display;
+mod distant_cells;
 pub mod edge;
 pub mod emitters;
 pub mod false_color;
@@ -72,6 +75,7 @@ pub mod pending_restart;
 pub mod pending_short_stack;
 pub mod pending_stack;
 pub mod pixel_aovs;
+pub mod point_triangle;
 pub mod primary_hit;
 pub mod resolve;
 pub mod ropes;

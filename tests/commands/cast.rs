@@ -172,6 +172,60 @@ fn the_report_is_json_too() {
     }
 }
 
+/// Points below the lid and above it; beside the square, with and without a greatest distance; and an invalid one.
+const POINTS: [[f32; 4]; 5] = {
+    let inf = f32::INFINITY;
+    [
+        [0.25, 0.5, 0.5, inf],
+        [0.25, 0.25, 3.0, inf],
+        [3.0, 0.0, 0.0, inf],
+        [3.0, 0.0, 0.0, 1.5],
+        [f32::NAN, 0.0, 0.0, inf],
+    ]
+};
+
+#[test]
+fn closest_points_are_written_as_hits() {
+    let directory = with_mesh();
+    let path = |name: &str| directory.path().join(name);
+    save(&path("points.npy"), &POINTS);
+    save(&path("bare.npy"), &POINTS.map(|[x, y, z, _]| [x, y, z]));
+    for device in ["--validate", "--cpu"] {
+        let arguments = ["cast", "mesh.obj", "points.npy", "-o", "hits.npz", "--closest", "--json", "x.json", device];
+        let output = succeed(directory.path(), &arguments);
+        assert!(stdout(&output).contains("5 points, 3 hits, 1 invalid\n"), "{}", stdout(&output));
+        let json: Value = serde_json::from_slice(&fs::read(path("x.json")).unwrap()).unwrap();
+        assert_eq!(json["query"].as_str(), Some("closest_point"));
+        let inf = f32::INFINITY;
+        assert_eq!(load(&path("hits.npz"), "t_hit"), (vec![5], vec![0.5f32, 1.0, 2.0, inf, inf]));
+        assert_eq!(load(&path("hits.npz"), "primitive_ids"), (vec![5], vec![1, 2, 0, MISS, MISS]));
+        let uvs = vec![0.25f32, 0.25, 0.25, 0.25, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        assert_eq!(load(&path("hits.npz"), "primitive_uvs"), (vec![5, 2], uvs));
+        let normals = load::<f32>(&path("hits.npz"), "primitive_normals").1;
+        assert_eq!(normals.chunks(3).map(|normal| normal[2]).collect::<Vec<_>>(), [1.0, -1.0, 1.0, 0.0, 0.0]);
+        succeed(directory.path(), &["cast", "mesh.obj", "bare.npy", "-o", "hits.npz", "--closest", "-q", device]);
+        assert_eq!(load(&path("hits.npz"), "t_hit"), (vec![5], vec![0.5f32, 1.0, 2.0, 2.0, inf]));
+    }
+    save(&path("rays.npy"), &RAYS);
+    let of_rays = ["cast", "mesh.obj", "rays.npy", "-o", "x.npz", "--cpu", "--closest"];
+    fail(directory.path(), &of_rays, 3, "points are K x 3 or K x 4");
+}
+
+#[test]
+fn closest_points_are_found_on_placed_meshes() {
+    let directory = with_mesh();
+    let path = |name: &str| directory.path().join(name);
+    save(&path("points.npy"), &[[10.25f32, 0.5, 0.5], [21.5, 0.0, 0.0], [-1.0, 0.0, 0.0]]);
+    let placed = |x: u32| format!("[[mesh]]\nfile = 'mesh.obj'\ntransform = {{ translate = [{x}, 0, 0] }}\n");
+    fs::write(path("scene.toml"), [0, 10, 20].map(placed).concat()).expect("a scene");
+    for device in ["--validate", "--cpu"] {
+        succeed(directory.path(), &["cast", "scene.toml", "points.npy", "-o", "hits.npz", "--closest", "-q", device]);
+        assert_eq!(load::<f32>(&path("hits.npz"), "t_hit").1, [0.5, 0.5, 1.0], "{device}");
+        assert_eq!(load::<u32>(&path("hits.npz"), "instance_ids").1, [1, 2, 0], "{device}");
+        assert_eq!(load::<u32>(&path("hits.npz"), "primitive_ids").1, [1, 0, 0], "{device}");
+    }
+}
+
 #[test]
 fn usage_mistakes_are_refused() {
     let directory = TempDir::new().unwrap();
@@ -191,6 +245,10 @@ fn usage_mistakes_are_refused() {
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--accel", "grid", "--traversal", "mask"], "--accel grid"),
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--accel", "grid2", "--build", "fast"], "--accel grid2"),
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--cpu", "--validate"], "--cpu"),
+        (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--closest", "--any"], "--any"),
+        (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--closest", "--traversal", "mask"], "--traversal"),
+        (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--closest", "--accel", "grid"], "--accel kdtree"),
+        (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--closest", "--instances", "keep"], "--instances flatten"),
     ];
     for (arguments, named) in cases {
         fail(directory.path(), arguments, 2, named);

@@ -9,6 +9,7 @@ mod accumulate;
 mod atrous_filter;
 mod auxiliary;
 mod barriers;
+mod closest_point;
 mod compact;
 mod comparers;
 mod demodulate;

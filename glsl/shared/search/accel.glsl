@@ -7,6 +7,7 @@
 // kernel calls to find a hit. Kernels also use `is_suspended` and `runs_in_pass` of suspended_rays.glsl. cast.comp
 // checks its rays by `exponent_of`, `longest_bits` and `magnitude_bits`.
 //
+//   magnitude.glsl       magnitudes of floats as integers
 //   traversal_ray.glsl   the ray, clipped to the structure's box
 //   kdtree/kdtree.glsl   the search through a kd-tree
 //   grid/grid.glsl       the search through a grid
@@ -21,6 +22,7 @@
 #include "search/suspended_rays.glsl"
 #include "search/steps.glsl"
 #include "search/triangle.glsl"
+#include "search/magnitude.glsl"
 
 // Whether the device runs both sides of a branch for all lanes, as software drivers do (kdtree/lockstep.glsl).
 layout(constant_id = CONSTANT_PREDICATES_BRANCHES) const bool PREDICATES_BRANCHES = false;
@@ -35,22 +37,6 @@ layout(constant_id = CONSTANT_PREDICATES_BRANCHES) const bool PREDICATES_BRANCHE
 uint search(TraversalRay ray, bool any_hit, inout Nearest best) {
     if (TRAVERSAL == TRAVERSAL_GRID) return search_grid(ray, any_hit, best);
     return search_kdtree(ray, any_hit, best);
-}
-
-// The bits of a magnitude, which have the order of the magnitudes. Integers are used since a device may flush
-// denormals and need not tell a NaN from a number.
-uint magnitude_bits(float x) {
-    return floatBitsToUint(x) & 0x7fffffffu;
-}
-
-uint longest_bits(vec3 v) {
-    return max(max(magnitude_bits(v.x), magnitude_bits(v.y)), magnitude_bits(v.z));
-}
-
-// The biased exponent of the component of largest magnitude, 1..254. It is 0 if that component is zero or denormal,
-// and 255 if it is infinite or NaN.
-uint exponent_of(vec3 direction) {
-    return longest_bits(direction) >> 23;
 }
 
 #include "instances/hierarchy.glsl"

@@ -1,0 +1,84 @@
+//! The closest points of the triangles to the caller's points, by [`GpuCaster`] and [`CpuCaster`].
+
+use std::sync::Arc;
+
+use bytemuck::Zeroable;
+use rayon::prelude::*;
+
+use super::{CastResult, CpuCaster, GpuCaster, Hit, QueryPoint, check_repetitions};
+use crate::{
+    buffers::PointResources,
+    frame::BadOptions,
+    gpu::{BindingLayout, Commands, GpuError},
+    passes, reference,
+};
+
+/// The kernel that finds closest points, and its buffers.
+pub(super) struct PointSearch {
+    bindings: Arc<BindingLayout>,
+    kernel: passes::ClosestPoint,
+    resources: PointResources,
+}
+
+impl GpuCaster {
+    /// Finds the point of the triangles that is closest to each of `points`, batch by batch. Each batch runs `n_times`
+    /// (at least once). In a hit, `t` is the distance (world units). It is right to 2^-20 of the distance to the
+    /// triangle's farthest corner. If several triangles are equally close by the distance as it is computed, one of
+    /// them is the hit. A point misses if no triangle is within its `t_max`, if its position is not finite, or if its
+    /// `t_max` is NaN or negative. Hidden triangles are not there.
+    ///
+    /// # Errors
+    /// The triangles are in a grid or are those of instances, there are more than
+    /// [`MOST_REPETITIONS`](super::MOST_REPETITIONS), memory runs out, or a call fails.
+    pub fn closest_points(&mut self, points: &[QueryPoint], n_times: u32) -> Result<CastResult, GpuError> {
+        check_repetitions(n_times)?;
+        check_structure(self.is_flat_tree)?;
+        let search = self.prepared_for(points.len())?;
+        let PointResources { cast_points, cast_hits, set } = &search.resources;
+        let record = |commands: &Commands, n_points, pass| search.kernel.record(commands, set, n_points, pass);
+        let found = self.run_batches(points, (cast_points, cast_hits), n_times.max(1), record);
+        self.point_search = Some(search);
+        let (hits, gpu_ms) = found?;
+        Ok(CastResult { hits, gpu_ms, n_invalid: count_invalid_points(points) })
+    }
+
+    /// Takes the search, which has buffers for a batch of the points. Creates what does not exist.
+    fn prepared_for(&mut self, n_points: usize) -> Result<PointSearch, GpuError> {
+        let len = n_points.min(self.rays_per_batch);
+        let new_resources =
+            |bindings: &Arc<BindingLayout>| PointResources::new(&self.context, bindings, &self.tree, len);
+        Ok(match self.point_search.take() {
+            Some(search) if search.resources.cast_points.len() >= len => search,
+            Some(search) => PointSearch { resources: new_resources(&search.bindings)?, ..search },
+            None => {
+                let bindings = PointResources::bindings(&self.context, &self.tree)?;
+                let kernel = passes::ClosestPoint::new(&self.context, &bindings)?;
+                PointSearch { resources: new_resources(&bindings)?, bindings, kernel }
+            }
+        })
+    }
+}
+
+impl CpuCaster<'_> {
+    /// Finds the point of the triangles that is closest to each of `points`, as [`GpuCaster::closest_points`] does, on
+    /// the current rayon pool.
+    ///
+    /// # Errors
+    /// The triangles are in a grid or are those of instances.
+    pub fn closest_points(&self, points: &[QueryPoint]) -> Result<Vec<Hit>, BadOptions> {
+        check_structure(self.geometry().accel().as_kdtree().is_some())?;
+        let mut hits = vec![Hit::zeroed(); points.len()];
+        reference::closest_point::closest_point(&self.inputs(), points, &mut hits);
+        Ok(hits)
+    }
+}
+
+fn check_structure(is_flat_tree: bool) -> Result<(), BadOptions> {
+    let refusal = "closest points are found in a kd-tree without instances (--accel kdtree --instances flatten)";
+    if is_flat_tree { Ok(()) } else { Err(BadOptions(refusal.to_owned())) }
+}
+
+/// Counts the points that can only miss. Their position is not finite, or their `t_max` is NaN or negative.
+pub fn count_invalid_points(points: &[QueryPoint]) -> u64 {
+    points.par_iter().filter(|point| !reference::closest_point::is_point(point)).count() as u64
+}

@@ -1,0 +1,42 @@
+//! Closest point: finds the point of the triangles that is closest to each point of an array, through the kd-tree. It
+//! is not a pass of a frame.
+
+use std::sync::Arc;
+
+use super::{kernel, spirv};
+use crate::{
+    buffers::ResumePass,
+    frame::bounce::lanes_log2,
+    gpu::{BindingLayout, BindingSet, Commands, ComputePipeline, Constants, Context, Dispatch, GpuError},
+    layout::{CastBatch, RAY_GROUP_SIZE},
+};
+
+/// The pipeline of the pass.
+pub struct ClosestPoint {
+    kernel: ComputePipeline,
+    /// Number of lanes of the device, over which the points are spread ([`lanes_log2`]).
+    n_lanes: u32,
+}
+
+impl ClosestPoint {
+    /// Creates the pipeline.
+    ///
+    /// # Errors
+    /// The driver refuses the shader.
+    pub fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>) -> Result<Self, GpuError> {
+        let shader = spirv!("closest_point.comp");
+        let kernel = kernel(context, bindings, "closest_point", shader, &Constants::new())?;
+        Ok(Self { kernel, n_lanes: context.n_lanes()? })
+    }
+
+    /// Needs the first `n_points` elements of `cast_points`. Leaves the first `n_points` elements of `cast_hits`; a
+    /// search that was suspended leaves a mark in place of its hit. `pass`: which points are searched for, all or those
+    /// whose search was suspended.
+    pub fn record(&self, commands: &Commands, set: &BindingSet, n_points: u32, pass: ResumePass) {
+        commands.bind(set);
+        let lanes_log2 = lanes_log2(n_points, self.n_lanes);
+        let dispatch = Dispatch::Threads([n_points << lanes_log2, 1, 1], [RAY_GROUP_SIZE, 1, 1]);
+        let batch = CastBatch { n_rays: n_points, lanes_log2, resume_pass: pass.constant() };
+        commands.dispatch(&self.kernel, None, &batch, dispatch);
+    }
+}

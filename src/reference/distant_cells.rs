@@ -1,0 +1,45 @@
+//! Cells of the kd-tree with their distance from a point. Twin of `kdtree/distant_cells.glsl`.
+
+use glam::Vec3;
+
+use super::inputs::KernelInputs;
+use crate::layout::{KD_AXIS_MASK, KD_PAIR_SHIFT, KdNode};
+
+/// A point in units of 1 / `scale`, a power of two that brings all coordinates below 4.
+#[derive(Clone, Copy)]
+pub(super) struct Query {
+    pub position: Vec3,
+    pub scale: f32,
+}
+
+/// A node, and the distance from the point to the node's cell on each axis, which is 0 within the cell's extent.
+#[derive(Clone, Copy)]
+pub(super) struct DistantCell {
+    pub node_ix: u32,
+    pub gap: Vec3,
+}
+
+impl DistantCell {
+    pub fn root(inputs: &KernelInputs, Query { position, scale }: Query) -> Self {
+        let outside = (inputs.box_min * scale - position).max(position - inputs.box_max * scale);
+        Self { node_ix: 0, gap: outside.max(Vec3::ZERO) }
+    }
+
+    /// Returns whether the cell may hold a point that is as close as the best one. The kernel's file derives the share.
+    pub fn may_be_closer(&self, best_squared: f32) -> bool {
+        const SHARE: f32 = 0.999_999_05; // 1 - 2^-20
+        SHARE * self.gap.dot(self.gap) <= best_squared
+    }
+
+    /// Returns the children of a split: the one on the point's side of the plane, which is as close as the split's
+    /// cell, and the other one, which is as far away as the plane on its axis.
+    pub fn split(&self, query: Query, node: KdNode) -> [Self; 2] {
+        let axis = (node.axis_and_child & KD_AXIS_MASK) as usize;
+        let to_plane = f32::from_bits(node.split_or_first) * query.scale - query.position[axis];
+        let lower_ix = 2 * (node.axis_and_child >> KD_PAIR_SHIFT);
+        let near = Self { node_ix: if to_plane > 0.0 { lower_ix } else { lower_ix ^ 1 }, gap: self.gap };
+        let mut far = Self { node_ix: near.node_ix ^ 1, gap: self.gap };
+        far.gap[axis] = to_plane.abs();
+        [near, far]
+    }
+}

@@ -1,0 +1,346 @@
+//! Tests the search for closest points: the twin against brute force in double precision, and the kernel against both.
+
+use std::sync::Arc;
+
+use crate::{
+    stage::RAY_COUNTS,
+    support::{MeshWithTree, assert_silent, device, meshes, pretended, random::Random},
+};
+use glam::{DVec3, Vec3, vec3};
+use kdray::{
+    accel::{Accel, AccelOptions, grid::GridOptions, kdtree::Traversal},
+    cast::{CpuCaster, GpuCaster, Hit, NO_TRIANGLE, QueryPoint},
+    gpu::{Context, DeviceOverrides},
+    layout::Triangle,
+    world::Geometry,
+};
+use rayon::prelude::*;
+
+const MISS: Hit = Hit { t: f32::INFINITY, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
+/// The greatest error of a distance, as a share of the distance to the triangle's farthest corner.
+const TOLERANCE: f64 = 1.0 / (1 << 20) as f64;
+const N_POINTS: usize = 420;
+
+fn corners(triangle: &Triangle) -> [DVec3; 3] {
+    [triangle.v0, triangle.v1, triangle.v2].map(|v| v.as_dvec3())
+}
+
+/// The distance from a point to a triangle, and by how much a computed distance may differ.
+#[derive(Clone, Copy)]
+struct Exact {
+    distance: f64,
+    tolerance: f64,
+}
+
+impl Exact {
+    /// The distance to the plane if the foot is inside, or else to the nearest edge.
+    fn of(point: DVec3, triangle: &Triangle) -> Self {
+        let corners = corners(triangle);
+        let [a, b, c] = corners;
+        let normal = (b - a).cross(c - a);
+        let to_edge = |from: DVec3, to: DVec3| {
+            let edge = to - from;
+            let share = (point - from).dot(edge) / edge.length_squared();
+            point.distance(from + if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) } * edge)
+        };
+        let edges = [(a, b), (b, c), (c, a)];
+        let is_inside = edges.iter().all(|(from, to)| normal.dot((to - from).cross(point - from)) > 0.0);
+        let of_edges = edges.iter().map(|(from, to)| to_edge(*from, *to)).fold(f64::INFINITY, f64::min);
+        let of_plane = if is_inside { (point - a).dot(normal).abs() / normal.length() } else { f64::INFINITY };
+        let reach = corners.iter().map(|corner| corner.distance(point)).fold(0.0, f64::max);
+        Self { distance: of_edges.min(of_plane), tolerance: TOLERANCE * reach }
+    }
+}
+
+/// Checks a hit by a look at all triangles that are not hidden.
+fn check_hit(triangles: &[Triangle], hidden: &[u32], point: &QueryPoint, hit: &Hit) -> Result<(), String> {
+    let position = point.position.as_dvec3();
+    let t_max = f64::from(point.t_max);
+    let seen = (0..).zip(triangles).filter(|(ix, _)| !hidden.contains(ix));
+    let nearest =
+        seen.map(|(_, triangle)| Exact::of(position, triangle)).min_by(|a, b| a.distance.total_cmp(&b.distance));
+    let wrong = |what: &str| Err(format!("{what}: {hit:?} of {point:?}"));
+    let Some(nearest) = nearest else { return if *hit == MISS { Ok(()) } else { wrong("a hit of nothing") } };
+    if hit.triangle_ix == NO_TRIANGLE {
+        let is_right = *hit == MISS && nearest.distance > t_max - nearest.tolerance;
+        return if is_right { Ok(()) } else { wrong("a miss") };
+    }
+    let triangle = &triangles[hit.triangle_ix as usize];
+    let found = Exact::of(position, triangle);
+    let t = f64::from(hit.t);
+    let [a, b, c] = corners(triangle);
+    let [u, v] = [hit.u, hit.v].map(f64::from);
+    let at = (1.0 - u - v) * a + u * b + v * c;
+    let checks = [
+        ("too far", found.distance <= nearest.distance + nearest.tolerance + found.tolerance),
+        ("t", (t - found.distance).abs() <= found.tolerance && hit.t <= point.t_max),
+        ("hidden", !hidden.contains(&hit.triangle_ix)),
+        ("weights", u.min(v) >= 0.0 && u + v <= 1.0 + TOLERANCE),
+        ("point", (at.distance(position) - t).abs() <= found.tolerance),
+    ];
+    checks.iter().find(|(_, is_right)| !is_right).map_or(Ok(()), |(what, _)| wrong(what))
+}
+
+fn check(triangles: &[Triangle], hidden: &[u32], points: &[QueryPoint], hits: &[Hit]) -> Result<(), String> {
+    assert_eq!(points.len(), hits.len());
+    points.par_iter().zip(hits).try_for_each(|(point, hit)| check_hit(triangles, hidden, point, hit))
+}
+
+/// Succeeds if the kernel and its twin have the same hits, but for distances that are equal up to rounding.
+fn agree(triangles: &[Triangle], points: &[QueryPoint], twin: &[Hit], kernel: &[Hit]) -> Result<(), String> {
+    assert_eq!(twin.len(), kernel.len());
+    let is_close = |(point, (a, b)): (&QueryPoint, (&Hit, &Hit))| {
+        let exact = |hit: &Hit| Exact::of(point.position.as_dvec3(), &triangles[hit.triangle_ix as usize]);
+        let is_miss = [a, b].map(|hit| hit.triangle_ix == NO_TRIANGLE);
+        let is_same = a == b
+            || is_miss == [false; 2] && f64::from((a.t - b.t).abs()) <= exact(a).tolerance.min(exact(b).tolerance);
+        if is_same { Ok(()) } else { Err(format!("{b:?}, not {a:?} of {point:?}")) }
+    };
+    points.iter().zip(twin.iter().zip(kernel)).try_for_each(is_close)
+}
+
+/// Long triangles of widths down to 1e-7 of their length.
+fn needles(n: usize) -> Vec<Triangle> {
+    let mut random = Random(11);
+    let needle = |i: usize| {
+        let from = random.in_box(Vec3::splat(-1.0), Vec3::ONE);
+        let along = random.direction();
+        let across = along.cross(random.direction()) * 10f32.powi(-((i % 8) as i32));
+        meshes::triangle(from, from + along, from + random.unit() * along + across)
+    };
+    (0..n).map(needle).collect()
+}
+
+/// Meshes of all shapes, sizes and places.
+fn worlds() -> Vec<MeshWithTree> {
+    let torus = || meshes::torus(24, 12);
+    let worlds = [
+        vec![meshes::triangle(Vec3::ZERO, Vec3::X, Vec3::Y)],
+        torus(),
+        meshes::cube(6, 0.0),
+        meshes::cube(6, 1.0),
+        meshes::soup(500, 3),
+        needles(400),
+        meshes::threefold(meshes::cube(3, 0.5)),
+        meshes::placed(torus(), 1e-6, Vec3::ZERO),
+        meshes::placed(torus(), 1e6, Vec3::splat(2e6)),
+        meshes::placed(meshes::soup(300, 5), 1.0, vec3(1e3, -1e3, 10.0)),
+        meshes::placed(torus(), 1e-15, Vec3::ZERO),
+        meshes::placed(torus(), 1e15, Vec3::ZERO),
+    ];
+    worlds.into_iter().map(MeshWithTree::new).collect()
+}
+
+/// Points in the box and around it, on faces, edges and corners, near faces and far away. Every fifth has a greatest
+/// distance.
+fn points_of(world: &MeshWithTree, n: usize) -> Vec<QueryPoint> {
+    let (centre, radius) = (world.centre(), world.radius());
+    let mut random = Random(7);
+    let mut point = |i: usize| {
+        let triangle = random.of(&world.triangles);
+        let (u, v) = (random.unit(), random.unit());
+        let on_edge = triangle.v0.lerp(triangle.v1, u);
+        let on_face = on_edge.lerp(triangle.v2, v);
+        let aside = random.direction();
+        let position = match i % 7 {
+            0 => centre + 1.5 * radius * random.in_box(Vec3::NEG_ONE, Vec3::ONE),
+            1 => on_face,
+            2 => on_edge,
+            3 => *random.of(&[triangle.v0, triangle.v1, triangle.v2]),
+            4 => centre + 1e5 * radius * aside,
+            5 => on_face + 1e-4 * radius * aside,
+            _ => centre + 0.01 * radius * aside,
+        };
+        let t_max = if i % 5 == 4 { 0.3 * radius * random.unit() } else { f32::INFINITY };
+        QueryPoint { position, t_max }
+    };
+    (0..n).map(&mut point).collect()
+}
+
+fn on_cpu(world: &MeshWithTree, points: &[QueryPoint]) -> Vec<Hit> {
+    CpuCaster::new(world.geometry(), Traversal::Stack).closest_points(points).expect("a kd-tree")
+}
+
+fn caster(context: &Arc<Context>, world: &MeshWithTree) -> GpuCaster {
+    GpuCaster::new(context, world.geometry(), Traversal::Stack).expect("a caster")
+}
+
+fn on_device(context: &Arc<Context>, world: &MeshWithTree, points: &[QueryPoint]) -> Vec<Hit> {
+    caster(context, world).closest_points(points, 1).expect("hits").hits
+}
+
+#[test]
+fn twin_finds_what_brute_force_finds() {
+    for (i, world) in worlds().iter().enumerate() {
+        let points = points_of(world, N_POINTS);
+        let hits = on_cpu(world, &points);
+        check(&world.triangles, &[], &points, &hits).unwrap_or_else(|what| panic!("world {i}: {what}"));
+        let n_hits = hits.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count();
+        assert!(n_hits * 10 > 8 * N_POINTS && n_hits < N_POINTS, "world {i}: {n_hits} hits");
+    }
+}
+
+#[test]
+fn kernel_finds_what_its_twin_finds() {
+    let context = device();
+    for (i, world) in worlds().iter().enumerate() {
+        let points = points_of(world, N_POINTS);
+        let hits = on_device(&context, world, &points);
+        let twin = on_cpu(world, &points);
+        agree(&world.triangles, &points, &twin, &hits).unwrap_or_else(|what| panic!("world {i}: {what}"));
+        check(&world.triangles, &[], &points, &hits).unwrap_or_else(|what| panic!("world {i}: {what}"));
+    }
+    assert_silent(&context);
+}
+
+/// One caster gets more and more points, in one batch and in batches of 50.
+#[test]
+fn any_number_of_points_is_searched_for() {
+    let context = device();
+    let world = MeshWithTree::new(meshes::torus(24, 12));
+    let points = points_of(&world, 2000);
+    let twin = on_cpu(&world, &points);
+    let mut casters = [caster(&context, &world), caster(&context, &world).with_batches_of(50)];
+    for n in RAY_COUNTS.map(|n| n as usize) {
+        for caster in &mut casters {
+            let found = caster.closest_points(&points[..n], 2).expect("hits");
+            agree(&world.triangles, &points[..n], &twin[..n], &found.hits).unwrap();
+            assert_eq!(found.gpu_ms.expect("timestamps").len(), 2);
+        }
+    }
+    assert_silent(&context);
+}
+
+/// The distance is exactly 0 there, and of the triangles that share a corner, the one of the lowest index counts.
+#[test]
+fn corners_are_at_no_distance() {
+    let context = device();
+    for world in worlds() {
+        let of_corner = |corner: Vec3| {
+            let has_it = |triangle: &Triangle| [triangle.v0, triangle.v1, triangle.v2].contains(&corner);
+            let first = world.triangles.iter().position(has_it).expect("its triangle");
+            (QueryPoint { position: corner, t_max: 0.0 }, first as u32)
+        };
+        let triangles = world.triangles.iter().step_by(5);
+        let (points, first): (Vec<_>, Vec<_>) =
+            triangles.flat_map(|triangle| [triangle.v0, triangle.v1, triangle.v2]).map(of_corner).unzip();
+        for hits in [on_cpu(&world, &points), on_device(&context, &world, &points)] {
+            for (hit, first) in hits.iter().zip(&first) {
+                // In the soup, another triangle may go through the corner.
+                assert!(hit.t == 0.0 && hit.triangle_ix <= *first, "{hit:?}, not {first}");
+            }
+        }
+    }
+    assert_silent(&context);
+}
+
+/// A corner is found up to a greatest distance that is exactly its distance, and not up to the next lower number.
+#[test]
+fn the_greatest_distance_counts() {
+    let world = MeshWithTree::new(meshes::cube(6, 0.0));
+    let context = device();
+    let at = |t_max: f32| QueryPoint { position: vec3(2.0, 3.0, 3.0), t_max };
+    let points = [at(3.0), at(3f32.next_down()), at(0.0), at(1e30), at(f32::INFINITY)];
+    for hits in [on_cpu(&world, &points), on_device(&context, &world, &points)] {
+        assert_eq!([0, 3, 4].map(|i| hits[i].t), [3.0; 3]);
+        assert_eq!([1, 2].map(|i| hits[i]), [MISS; 2]);
+    }
+}
+
+#[test]
+fn points_that_are_none_miss() {
+    let context = device();
+    let world = MeshWithTree::new(meshes::torus(24, 12));
+    let at = |position, t_max| QueryPoint { position, t_max };
+    let (nan, inf) = (f32::NAN, f32::INFINITY);
+    let points = [
+        at(vec3(nan, 0.0, 0.0), inf),
+        at(vec3(0.0, inf, 0.0), inf),
+        at(vec3(0.0, 0.0, -inf), 1.0),
+        at(Vec3::ZERO, nan),
+        at(Vec3::ZERO, -1.0),
+        at(Vec3::ZERO, -inf),
+        at(Vec3::splat(f32::MAX), inf),
+        at(Vec3::ZERO, inf),
+    ];
+    let found = caster(&context, &world).closest_points(&points, 1).expect("hits");
+    assert_eq!(found.n_invalid, 6);
+    for hits in [found.hits, on_cpu(&world, &points)] {
+        assert_eq!(hits[..6], [MISS; 6]);
+        assert!(hits[6..].iter().all(|hit| hit.triangle_ix != NO_TRIANGLE), "{hits:?}");
+    }
+    let nothing = MeshWithTree::new(Vec::new());
+    for hits in [on_cpu(&nothing, &points), on_device(&context, &nothing, &points)] {
+        assert_eq!(hits, [MISS; 8]);
+    }
+    assert_silent(&context);
+}
+
+#[test]
+fn hidden_triangles_are_not_there() {
+    let context = device();
+    let world = MeshWithTree::new(meshes::torus(24, 12));
+    let hidden: Vec<u32> = (0..world.triangles.len() as u32).filter(|ix| ix % 3 != 0).collect();
+    let points = points_of(&world, N_POINTS);
+    let mut on_device = caster(&context, &world).hiding(&hidden).expect("triangles");
+    let hits = on_device.closest_points(&points, 1).expect("hits").hits;
+    check(&world.triangles, &hidden, &points, &hits).unwrap();
+    let on_cpu = CpuCaster::new(world.geometry(), Traversal::Stack).hiding(&hidden).expect("triangles");
+    check(&world.triangles, &hidden, &points, &on_cpu.closest_points(&points).expect("hits")).unwrap();
+    assert!(check(&world.triangles, &[], &points, &hits).is_err(), "hiding makes a difference");
+    assert_silent(&context);
+}
+
+/// From the middle of a sphere, all triangles are equally close, so that the search spends its iterations many times.
+#[test]
+fn suspended_searches_end_as_others_do() {
+    let world = MeshWithTree::new(meshes::cube(12, 1.0));
+    let mut points = points_of(&world, 300);
+    points.extend((0..100).map(|_| QueryPoint { position: Vec3::ZERO, t_max: f32::INFINITY }));
+    let twin = on_cpu(&world, &points);
+    for n_suspension_slots in [None, Some(10)] {
+        let context =
+            pretended(DeviceOverrides { loop_limit: Some(2000), n_suspension_slots, ..DeviceOverrides::default() });
+        let hits = on_device(&context, &world, &points);
+        agree(&world.triangles, &points, &twin, &hits).unwrap();
+        check(&world.triangles, &[], &points, &hits).unwrap();
+        assert_silent(&context);
+    }
+}
+
+#[test]
+fn grids_are_refused() {
+    let triangles = meshes::torus(24, 12);
+    let grid = Accel::new(&triangles, &AccelOptions::Grid(GridOptions::uniform()));
+    let geometry = Geometry::new(&triangles, &grid).expect("a grid of these triangles");
+    let refusal = "closest points are found in a kd-tree without instances (--accel kdtree --instances flatten)";
+    let of_cpu = CpuCaster::new(geometry, Traversal::Stack).closest_points(&[]).expect_err("a grid");
+    assert_eq!(of_cpu.to_string(), refusal);
+    let mut caster = GpuCaster::new(device(), geometry, Traversal::Stack).expect("a caster");
+    assert!(caster.closest_points(&[], 1).expect_err("a grid").to_string().contains(refusal));
+}
+
+#[test]
+fn wrong_hits_are_noticed() {
+    let world = MeshWithTree::new(meshes::torus(24, 12));
+    let points = points_of(&world, 70);
+    let hits = on_cpu(&world, &points);
+    let (right, _) = (0..70).zip(&hits).find(|(i, hit)| i % 7 == 6 && hit.triangle_ix != NO_TRIANGLE).expect("a hit");
+    type Plant = fn(&mut Hit);
+    let errors: [(&str, Plant); 5] = [
+        ("a miss", |hit| *hit = MISS),
+        ("too far", |hit| hit.triangle_ix = (hit.triangle_ix + 200) % 576),
+        ("t", |hit| hit.t *= 1.0 + 1e-4),
+        ("weights", |hit| hit.u = -0.01),
+        ("point", |hit| (hit.u, hit.v) = (0.4 - 0.4 * hit.u, 0.4 - 0.4 * hit.v)),
+    ];
+    for (what, plant) in errors {
+        let mut wrong = hits.clone();
+        plant(&mut wrong[right]);
+        let found = check(&world.triangles, &[], &points, &wrong).expect_err(what);
+        assert!(found.starts_with(what), "{found}, not {what}");
+    }
+    let mut wrong = hits.clone();
+    wrong[right].t *= 1.0 + 1e-4;
+    agree(&world.triangles, &points, &hits, &wrong).expect_err("another distance");
+}
