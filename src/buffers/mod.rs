@@ -13,9 +13,11 @@
 //! resources       all of these, with the frame's descriptor set
 //! grid            the build of a grid
 //! cast            given rays, their hits, and the cast's descriptor set
+//! all_hits        given rays, all of their hits, and the descriptor set over them
 //! ```
 
 mod accel;
+mod all_hits;
 mod cast;
 mod grid;
 mod pixels;
@@ -31,6 +33,7 @@ mod vertex_indices;
 
 pub use self::{
     accel::AccelBuffers,
+    all_hits::AllHitsResources,
     cast::CastResources,
     grid::{GridBuffers, GridCapacities, PairSets},
     pixels::Pixels,

@@ -5,6 +5,7 @@
 //!   .npy                                                                         .npz
 //! ```
 
+mod all_hits;
 mod kernel;
 pub(crate) mod leaving;
 #[cfg(feature = "files")]
@@ -13,6 +14,8 @@ mod recorded;
 mod rounds;
 #[cfg(feature = "files")]
 mod write;
+#[cfg(feature = "files")]
+mod write_lists;
 
 use std::{
     mem,
@@ -27,14 +30,15 @@ use bytemuck::Zeroable;
 use glam::Vec3;
 use rayon::prelude::*;
 
-pub use self::recorded::RecordedCast;
 pub(crate) use self::rounds::time_in_turn;
+pub use self::{all_hits::AllHits, recorded::RecordedCast};
 #[doc(hidden)]
 pub use self::{kernel::Kernel, rounds::Contender};
 #[cfg(feature = "files")]
 pub use self::{
     read::{RayFileError, RayReader},
     write::HitWriter,
+    write_lists::HitListWriter,
 };
 pub use crate::layout::{Hit, NO_TRIANGLE, Ray};
 use crate::{
@@ -49,7 +53,8 @@ use crate::{
     frame::{BadOptions, check::check},
     gpu::{Access, BindingLayout, CommandBuffer, Context, Device, GpuError, Limits, Statistic, Timer},
     layout::{PathRay, RAY_GROUP_SIZE},
-    passes, reference,
+    passes,
+    reference::{self, inputs::KernelInputs},
     world::{Geometry, Mismatch, World},
 };
 
@@ -323,14 +328,19 @@ impl<'a> CpuCaster<'a> {
 
     /// Casts rays, and returns one hit for each.
     pub fn cast(&self, rays: &[Ray], query: Query) -> Vec<Hit> {
-        let bindings = reference::inputs::KernelInputs::of_geometry(self.geometry());
-        let bindings = match &self.hidden {
-            Some(words) => bindings.with_hidden(words),
-            None => bindings,
-        };
         let mut hits = vec![Hit::zeroed(); rays.len()];
-        cpu::cast(&bindings.with_links(&self.links), self.search_for(rays), query, rays, &mut hits);
+        cpu::cast(&self.inputs(), self.search_for(rays), query, rays, &mut hits);
         hits
+    }
+
+    /// Returns what the searches read.
+    fn inputs(&self) -> KernelInputs<'_> {
+        let inputs = KernelInputs::of_geometry(self.geometry());
+        let inputs = match &self.hidden {
+            Some(words) => inputs.with_hidden(words),
+            None => inputs,
+        };
+        inputs.with_links(&self.links)
     }
 
     /// Returns how the rays are traced: scattered rays through the wide hierarchy, if it exists or making it pays. The

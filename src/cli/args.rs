@@ -222,6 +222,14 @@ pub struct CastArgs {
     /// Find only whether each ray hits anything (occlusion), not the closest hit
     #[arg(long)]
     pub any: bool,
+    /// Count all triangles that each ray meets: the array hit_counts
+    #[arg(long, conflicts_with_all = ["any", "repeat"])]
+    pub count: bool,
+    /// List all hits of each ray in the order of t, or the K nearest ones: ray_splits, and the arrays of the closest
+    /// hits with a row for each hit
+    #[arg(long, value_name = "K", num_args = 0..=1, conflicts_with_all = ["any", "count", "repeat"])]
+    #[arg(value_parser = value_parser!(u32).range(1..))]
+    pub all: Option<Option<u32>>,
     /// Whether a mesh that occurs several times is stored once: auto, flatten or keep
     #[arg(long, value_name = "KIND", long_help = instances_help(), default_value_t)]
     pub instances: Instancing,
@@ -558,6 +566,29 @@ impl CastArgs {
     pub fn query(&self) -> Query {
         if self.any { Query::Any } else { Query::Closest }
     }
+
+    /// Returns what to do with all hits of a ray; none if only one is to be found.
+    pub fn list(&self) -> Option<ListArgs> {
+        if self.count { Some(ListArgs::Count) } else { self.all.map(ListArgs::All) }
+    }
+
+    /// Returns the query as a word of reports.
+    pub fn query_word(&self) -> &'static str {
+        match (self.list(), self.query()) {
+            (Some(ListArgs::Count), _) => "count",
+            (Some(ListArgs::All(_)), _) => "all",
+            (None, Query::Any) => "any",
+            (None, Query::Closest) => "closest",
+        }
+    }
+}
+
+/// What is done with all hits of a ray.
+#[derive(Clone, Copy)]
+pub enum ListArgs {
+    Count,
+    /// List them, or as many of the nearest ones.
+    All(Option<u32>),
 }
 
 /// Size of a picture in pixels.
