@@ -10,6 +10,7 @@ const bool COUNT_COSTS = false;
 const bool TESTS_BLENDED = false;
 const bool FROM_CAMERA = false;
 #include "search/accel.glsl"
+#include "rays/cast_rays.glsl"
 #include "rays/lanes.glsl"
 
 layout(constant_id = CONSTANT_ANY_HIT) const bool ANY_HIT = false;
@@ -19,26 +20,14 @@ layout(push_constant) uniform CastBatchBlock { CastBatch batch; };
 layout(std430, set = 0, binding = BIND_CAST_RAYS) readonly buffer CastRaysBlock { Ray cast_rays[]; };
 layout(std430, set = 0, binding = BIND_CAST_HITS) buffer CastHitsBlock { Hit cast_hits[]; };
 
-const uint INFINITY_BITS = 0x7f800000u;
-const float GREATEST = 3.40282347e38;
-
 // The result of a ray that hits nothing.
 Hit miss() {
     return Hit(uintBitsToFloat(INFINITY_BITS), NO_TRIANGLE, 0.0, 0.0);
 }
 
-// Whether a ray can hit anything: it has no NaN, a finite origin, and a direction that is finite and neither zero nor
-// denormal.
-bool is_ray(Ray ray) {
-    uint exponent = exponent_of(ray.direction);
-    return exponent > 0u && exponent < 255u && longest_bits(ray.origin) < INFINITY_BITS
-        && magnitude_bits(ray.t_min) <= INFINITY_BITS && magnitude_bits(ray.t_max) <= INFINITY_BITS;
-}
-
-// Finds the hit of a valid ray. Clamps t_max to the greatest finite number, so a hit with an infinite t is a miss.
+// Finds the hit of a valid ray.
 Hit cast_ray(Ray ray) {
-    PathRay bounded = PathRay(ray.origin, 0u, ray.direction, NO_TRIANGLE, vec3(0.0), min(ray.t_max, GREATEST));
-    Hit hit = traverse_any_length(bounded, ray.t_min, ANY_HIT);
+    Hit hit = traverse_any_length(bounded_ray(ray), ray.t_min, ANY_HIT);
     if (hit.triangle_ix == NO_TRIANGLE) return miss();
     return hit;
 }

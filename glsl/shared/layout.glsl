@@ -1082,6 +1082,8 @@ struct AccelConstants {
 #define CONSTANT_ORTHOGRAPHIC 6u
 // Whether a search may end at any hit, instead of finding the closest one.
 #define CONSTANT_ANY_HIT 7u
+// Whether the hits of rays are listed, and not only counted.
+#define CONSTANT_LISTS_HITS 33u
 // The curve that maps radiance to the display's range: `TONEMAP_LINEAR` and its like.
 #define CONSTANT_CURVE 8u
 // Whether compute kernels, and not the graphics pipeline, found the triangle that each pixel shows.
@@ -1241,7 +1243,7 @@ struct RasterPush {
     uint block_log2;
 };
 
-// Push constants of a cast.
+// Push constants of a cast, and of a search for all hits.
 //
 // - `n_rays`: rays of the cast.
 // - `lanes_log2`: each ray has `2^lanes_log2` lanes, of which the first works.
@@ -1250,6 +1252,21 @@ struct CastBatch {
     uint n_rays;
     uint lanes_log2;
     uint resume_pass;
+};
+
+// How far a ray is on its way from hit to hit, 20 bytes (all_hits.comp).
+//
+// - `t`, `triangle_ix`: the last hit, `NO_TRIANGLE` before the first one. `t` is counted from the ray's origin as the
+//   search has moved it.
+// - `next_ix`: where the next hit belongs. If hits are only counted, it is their number.
+// - `end_ix`: the value of `next_ix` at which the ray ends.
+// - `mark`: that of a suspended ray, or `NO_TRIANGLE`.
+struct HitCursor {
+    float t;
+    uint triangle_ix;
+    uint next_ix;
+    uint end_ix;
+    uint mark;
 };
 
 // Push constants of a cast by the driver's own ray tracing: the device address of its acceleration structure.
@@ -1464,7 +1481,12 @@ struct GridSort {
 // One `Hit` for each ray of the cast, or for each point.
 #define BIND_CAST_HITS 63u
 // One `QueryPoint` for each point, in place of `BIND_CAST_RAYS`.
-#define BIND_CAST_POINTS 61u
+#define BIND_CAST_POINTS 59u
+
+// One `HitCursor` for each ray whose hits are counted or listed.
+#define BIND_HIT_CURSORS 60u
+// One `Hit` for each hit that is listed, those of a ray after those of the ray before.
+#define BIND_LISTED_HITS 61u
 
 // The descriptor set of a grid's build. "Level" is the level that is built. A "scan block" is `GRID_BLOCK_SIZE`
 // consecutive entries. A "block of cells" is the lower cells that an upper cell is cut into.

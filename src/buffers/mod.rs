@@ -14,9 +14,11 @@
 //! grid            the build of a grid
 //! cast            given rays, their hits, and the cast's descriptor set
 //! closest_point   given points, their hits, and the descriptor set of the search
+//! all_hits        given rays, all of their hits, and the descriptor set over them
 //! ```
 
 mod accel;
+mod all_hits;
 mod cast;
 mod closest_point;
 mod grid;
@@ -33,6 +35,7 @@ mod vertex_indices;
 
 pub use self::{
     accel::AccelBuffers,
+    all_hits::AllHitsResources,
     cast::CastResources,
     closest_point::PointResources,
     grid::{GridBuffers, GridCapacities, PairSets},

@@ -6,6 +6,7 @@
 //!   .npy                                                                         .npz
 //! ```
 
+mod all_hits;
 mod closest_point;
 mod kernel;
 pub(crate) mod leaving;
@@ -15,6 +16,8 @@ mod recorded;
 mod rounds;
 #[cfg(feature = "files")]
 mod write;
+#[cfg(feature = "files")]
+mod write_lists;
 
 use std::{
     mem,
@@ -30,13 +33,14 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 pub(crate) use self::rounds::time_in_turn;
-pub use self::{closest_point::count_invalid_points, recorded::RecordedCast};
+pub use self::{all_hits::AllHits, closest_point::count_invalid_points, recorded::RecordedCast};
 #[doc(hidden)]
 pub use self::{kernel::Kernel, rounds::Contender};
 #[cfg(feature = "files")]
 pub use self::{
     read::{PointReader, RayFileError, RayReader},
     write::HitWriter,
+    write_lists::HitListWriter,
 };
 pub use crate::layout::{Hit, NO_TRIANGLE, QueryPoint, Ray};
 use crate::{
@@ -344,16 +348,18 @@ impl<'a> CpuCaster<'a> {
     /// Casts rays, and returns one hit for each.
     pub fn cast(&self, rays: &[Ray], query: Query) -> Vec<Hit> {
         let mut hits = vec![Hit::zeroed(); rays.len()];
-        cpu::cast(&self.inputs().with_links(&self.links), self.search_for(rays), query, rays, &mut hits);
+        cpu::cast(&self.inputs(), self.search_for(rays), query, rays, &mut hits);
         hits
     }
 
+    /// Returns what the searches read.
     fn inputs(&self) -> KernelInputs<'_> {
         let inputs = KernelInputs::of_geometry(self.geometry());
-        match &self.hidden {
+        let inputs = match &self.hidden {
             Some(words) => inputs.with_hidden(words),
             None => inputs,
-        }
+        };
+        inputs.with_links(&self.links)
     }
 
     /// Returns how the rays are traced: scattered rays through the wide hierarchy, if it exists or making it pays. The

@@ -6,10 +6,12 @@
 use std::{
     fs::File,
     io::{self, BufWriter, Read, Seek, SeekFrom, Write},
+    iter,
+    marker::PhantomData,
     path::{Path, PathBuf},
 };
 
-use bytemuck::Zeroable;
+use bytemuck::Pod;
 use npyz::{AutoSerialize, WriteOptions, WriterBuilder};
 use tempfile::SpooledTempFile;
 use zip::{CompressionMethod, ZipWriter, write::SimpleFileOptions};
@@ -21,8 +23,8 @@ use crate::{
     world::{FlatScene, TriangleOrigin},
 };
 
-/// Number of hits that are read from the spool at a time: 1 MiB.
-const HITS_AT_A_TIME: usize = 1 << 16;
+/// Number of elements that are read from a spool at a time: of hits, 1 MiB.
+const ELEMENTS_AT_A_TIME: usize = 1 << 16;
 
 /// Writes a `.npz` file. Until [`HitWriter::finish`], no file is created at its path, and an earlier file stays.
 ///
@@ -33,8 +35,7 @@ const HITS_AT_A_TIME: usize = 1 << 16;
 /// The array for [`Query::Any`] is `occluded` (bool K).
 pub struct HitWriter {
     path: PathBuf,
-    spool: SpooledTempFile,
-    n_hits: u64,
+    hits: Spool<Hit>,
 }
 
 impl HitWriter {
@@ -43,7 +44,7 @@ impl HitWriter {
     /// # Errors
     /// No file can be written at this path.
     pub fn new(path: &Path) -> Result<Self, OutputError> {
-        Ok(Self { path: path.to_owned(), spool: output::spool(path)?, n_hits: 0 })
+        Ok(Self { path: path.to_owned(), hits: Spool::new(path)? })
     }
 
     /// Appends the hits of the next rays.
@@ -51,9 +52,7 @@ impl HitWriter {
     /// # Errors
     /// The disk is full, or a write fails.
     pub fn push(&mut self, hits: &[Hit]) -> Result<(), OutputError> {
-        self.n_hits += hits.len() as u64;
-        let written = self.spool.write_all(bytemuck::cast_slice(hits));
-        written.map_err(|source| OutputError::Write { path: self.path.clone(), source })
+        self.hits.push(&self.path, hits)
     }
 
     /// Writes the whole file or nothing, as [`output::write`] does. The hits are of triangles of the
@@ -62,24 +61,38 @@ impl HitWriter {
     /// # Errors
     /// The disk is full, or a write fails.
     pub fn finish(self, scene: &FlatScene, query: Query) -> Result<(), OutputError> {
-        let mut hits = Hits { spool: self.spool, n: self.n_hits };
-        output::write_with(&self.path, |file| {
-            let mut archive = ZipWriter::new(FailsOnce { file, failed: false });
-            match query {
-                Query::Closest => {
-                    hits.write(&mut archive, "t_hit", |hit| [hit.t])?;
-                    hits.write(&mut archive, "instance_ids", |hit| id_of(scene, hit, |it| it.instance_ix))?;
-                    hits.write(&mut archive, "geometry_ids", |hit| id_of(scene, hit, |it| it.mesh_ix))?;
-                    hits.write(&mut archive, "primitive_ids", |hit| id_of(scene, hit, |it| it.face_ix))?;
-                    hits.write(&mut archive, "primitive_uvs", |hit| [hit.u, hit.v])?;
-                    hits.write(&mut archive, "primitive_normals", |hit| normal_at(scene, hit))?;
-                }
-                Query::Any => hits.write(&mut archive, "occluded", |hit| [hit.triangle_ix != NO_TRIANGLE])?,
-            }
-            archive.finish()?;
-            Ok(())
+        let mut hits = self.hits;
+        write_archive(&self.path, |archive| match query {
+            Query::Closest => write_hits(archive, &mut hits, scene),
+            Query::Any => hits.write(archive, "occluded", |hit| [hit.triangle_ix != NO_TRIANGLE]),
         })
     }
+}
+
+/// An archive that is written.
+pub(super) type Archive<'a> = ZipWriter<FailsOnce<'a>>;
+
+/// Writes a whole archive or nothing, as [`output::write`] does. `write`: writes its arrays.
+pub(super) fn write_archive(
+    path: &Path,
+    write: impl FnOnce(&mut Archive) -> io::Result<()>,
+) -> Result<(), OutputError> {
+    output::write_with(path, |file| {
+        let mut archive = ZipWriter::new(FailsOnce { file, failed: false });
+        write(&mut archive)?;
+        archive.finish()?;
+        Ok(())
+    })
+}
+
+/// Writes the arrays of hits.
+pub(super) fn write_hits(archive: &mut Archive, hits: &mut Spool<Hit>, scene: &FlatScene) -> io::Result<()> {
+    hits.write(archive, "t_hit", |hit| [hit.t])?;
+    hits.write(archive, "instance_ids", |hit| id_of(scene, hit, |it| it.instance_ix))?;
+    hits.write(archive, "geometry_ids", |hit| id_of(scene, hit, |it| it.mesh_ix))?;
+    hits.write(archive, "primitive_ids", |hit| id_of(scene, hit, |it| it.face_ix))?;
+    hits.write(archive, "primitive_uvs", |hit| [hit.u, hit.v])?;
+    hits.write(archive, "primitive_normals", |hit| normal_at(scene, hit))
 }
 
 /// Returns an index that names the hit triangle, or that of no triangle on a miss.
@@ -98,42 +111,68 @@ fn normal_at(scene: &FlatScene, hit: &Hit) -> [f32; 3] {
     (v1 - v0).cross(v2 - v0).normalize_or_zero().as_vec3().to_array()
 }
 
-/// The spooled hits.
-struct Hits {
-    spool: SpooledTempFile,
+/// Elements in a temporary file.
+pub(super) struct Spool<E> {
+    file: SpooledTempFile,
     n: u64,
+    elements: PhantomData<E>,
 }
 
-impl Hits {
+impl<E: Pod> Spool<E> {
+    /// Creates an empty spool. `path`: that of the file that will be written.
+    pub(super) fn new(path: &Path) -> Result<Self, OutputError> {
+        Ok(Self { file: output::spool(path)?, n: 0, elements: PhantomData })
+    }
+
+    /// Appends elements.
+    pub(super) fn push(&mut self, path: &Path, elements: &[E]) -> Result<(), OutputError> {
+        self.n += elements.len() as u64;
+        let written = self.file.write_all(bytemuck::cast_slice(elements));
+        written.map_err(|source| OutputError::Write { path: path.to_owned(), source })
+    }
+
     /// Writes an array of `N` columns, one-dimensional if `N` is 1.
-    fn write<T: AutoSerialize + npyz::Serialize, const N: usize>(
+    pub(super) fn write<T: AutoSerialize + npyz::Serialize, const N: usize>(
         &mut self,
-        archive: &mut ZipWriter<FailsOnce>,
+        archive: &mut Archive,
         name: &str,
-        columns: impl Fn(&Hit) -> [T; N],
+        columns: impl FnMut(&E) -> [T; N],
     ) -> io::Result<()> {
-        let n_bytes = self.n * (N * size_of::<T>()) as u64;
+        self.write_after(archive, name, None, columns)
+    }
+
+    /// Writes an array as [`Self::write`] does, after a row of its own.
+    pub(super) fn write_after<T: AutoSerialize + npyz::Serialize, const N: usize>(
+        &mut self,
+        archive: &mut Archive,
+        name: &str,
+        first: Option<[T; N]>,
+        mut columns: impl FnMut(&E) -> [T; N],
+    ) -> io::Result<()> {
+        let n_rows = self.n + u64::from(first.is_some());
+        let n_bytes = n_rows * (N * size_of::<T>()) as u64;
         let options = SimpleFileOptions::default()
             .compression_method(CompressionMethod::Stored)
             .large_file(n_bytes >= u64::from(u32::MAX) - 1024); // 1024 bytes for the array's header
         archive.start_file(npyz::npz::file_name_from_array_name(name), options)?;
         let mut file = BufWriter::with_capacity(1 << 16, archive);
-        let shape = [self.n, N as u64];
+        let shape = [n_rows, N as u64];
         let shape = if N == 1 { &shape[..1] } else { &shape[..] };
         let mut array = WriteOptions::new().default_dtype().shape(shape).writer(&mut file).begin_nd()?;
-        self.for_each(|hit| columns(hit).iter().try_for_each(|number| array.push(number)))?;
+        first.iter().flatten().try_for_each(|number| array.push(number))?;
+        self.for_each(|element| columns(element).iter().try_for_each(|number| array.push(number)))?;
         array.finish()?;
         file.flush()
     }
 
-    fn for_each(&mut self, mut visit: impl FnMut(&Hit) -> io::Result<()>) -> io::Result<()> {
-        self.spool.rewind()?;
-        let mut hits = vec![Hit::zeroed(); HITS_AT_A_TIME];
+    fn for_each(&mut self, mut visit: impl FnMut(&E) -> io::Result<()>) -> io::Result<()> {
+        self.file.rewind()?;
+        let mut elements: Vec<E> = iter::repeat_n(E::zeroed(), ELEMENTS_AT_A_TIME).collect();
         let mut n_left = self.n;
         while n_left > 0 {
-            let n = n_left.min(HITS_AT_A_TIME as u64) as usize;
-            self.spool.read_exact(bytemuck::cast_slice_mut(&mut hits[..n]))?;
-            hits[..n].iter().try_for_each(&mut visit)?;
+            let n = n_left.min(ELEMENTS_AT_A_TIME as u64) as usize;
+            self.file.read_exact(bytemuck::cast_slice_mut(&mut elements[..n]))?;
+            elements[..n].iter().try_for_each(&mut visit)?;
             n_left -= n as u64;
         }
         Ok(())
@@ -142,7 +181,7 @@ impl Hits {
 
 /// A file that reports only its first error and discards all later writes. An archive's writer that is dropped after
 /// an error writes again, and would print the error of that second write.
-struct FailsOnce<'a> {
+pub(super) struct FailsOnce<'a> {
     file: &'a mut File,
     failed: bool,
 }

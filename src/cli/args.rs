@@ -224,8 +224,16 @@ pub struct CastArgs {
     #[arg(long)]
     pub any: bool,
     /// Find the closest point of the mesh to each of the points in RAYS; t_hit is its distance
-    #[arg(long, conflicts_with_all = ["any", "traversal"])]
+    #[arg(long, conflicts_with_all = ["any", "traversal", "count", "all"])]
     pub closest: bool,
+    /// Count all triangles that each ray meets: the array hit_counts
+    #[arg(long, conflicts_with_all = ["any", "repeat"])]
+    pub count: bool,
+    /// List all hits of each ray in the order of t, or the K nearest ones: ray_splits, and the arrays of the closest
+    /// hits with a row for each hit
+    #[arg(long, value_name = "K", num_args = 0..=1, conflicts_with_all = ["any", "count", "repeat"])]
+    #[arg(value_parser = value_parser!(u32).range(1..))]
+    pub all: Option<Option<u32>>,
     /// Whether a mesh that occurs several times is stored once: auto, flatten or keep
     #[arg(long, value_name = "KIND", long_help = instances_help(), default_value_t)]
     pub instances: Instancing,
@@ -562,15 +570,6 @@ impl CastArgs {
         if self.closest { "points" } else { "rays" }
     }
 
-    /// Returns the query as reports name it.
-    pub fn query_name(&self) -> &'static str {
-        match (self.closest, self.any) {
-            (true, _) => "closest_point",
-            (false, true) => "any",
-            (false, false) => "closest",
-        }
-    }
-
     /// Refuses a device that is not of the kind that the user requires.
     pub fn check_device(&self) -> Result<(), CliError> {
         let list = self.device.clone().map(|device| DeviceList::Named(vec![device]));
@@ -581,6 +580,30 @@ impl CastArgs {
     pub fn query(&self) -> Query {
         if self.any { Query::Any } else { Query::Closest }
     }
+
+    /// Returns what to do with all hits of a ray; none if only one is to be found.
+    pub fn list(&self) -> Option<ListArgs> {
+        if self.count { Some(ListArgs::Count) } else { self.all.map(ListArgs::All) }
+    }
+
+    /// Returns the query as a word of reports.
+    pub fn query_word(&self) -> &'static str {
+        match (self.list(), self.query()) {
+            (Some(ListArgs::Count), _) => "count",
+            (Some(ListArgs::All(_)), _) => "all",
+            (None, _) if self.closest => "closest_point",
+            (None, Query::Any) => "any",
+            (None, Query::Closest) => "closest",
+        }
+    }
+}
+
+/// What is done with all hits of a ray.
+#[derive(Clone, Copy)]
+pub enum ListArgs {
+    Count,
+    /// List them, or as many of the nearest ones.
+    All(Option<u32>),
 }
 
 /// Size of a picture in pixels.

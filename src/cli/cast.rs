@@ -1,9 +1,13 @@
 //! `kdray cast`: casts rays from a file into a scene and writes their hits to a file, or finds the closest points to
 //! the points of a file.
 
+use std::time::Instant;
+
 use kdray::{
     accel::Query,
-    cast::{CastResult, Hit, HitWriter, NO_TRIANGLE, PointReader, RAYS_PER_BATCH, RayReader},
+    cast::{
+        CastResult, Hit, HitListWriter, HitWriter, NO_TRIANGLE, PointReader, RAYS_PER_BATCH, RayReader, count_invalid,
+    },
     engine::{Caster, Engine, Loaded, Opened, Work, choices::Choices},
     gpu::ContextOptions,
     output,
@@ -11,7 +15,7 @@ use kdray::{
 };
 
 use super::{
-    args::CastArgs,
+    args::{CastArgs, ListArgs},
     cast_report::{CastReport, Times},
     device_args::open_device,
     error::CliError,
@@ -47,7 +51,10 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
     let casting = format!("casting {} {}", queries.n(), args.noun());
     let traversal = methods.traversal.value;
     let caster = engine.caster(world.geometry(), traversal)?;
-    let (done, cast_ms) = progress.stage(&casting, || cast_all(args, queries, caster, world.scene()));
+    let (done, cast_ms) = progress.stage(&casting, || match (args.list(), queries) {
+        (Some(list), Queries::Rays(rays)) => list_all(args, list, rays, caster, world.scene()),
+        (_, queries) => cast_all(args, queries, caster, world.scene()),
+    });
     let totals = done?;
     drop(progress);
 
@@ -55,7 +62,7 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
         scene: world.scene().name.clone(),
         rays: args.rays.clone(),
         hits: args.output.clone(),
-        query: args.query_name(),
+        query: args.query_word(),
         noun: args.noun(),
         traversal: accel.tree_kind().map(|_| traversal.to_string()),
         choices: Choices::of_rays(accel, methods),
@@ -153,5 +160,47 @@ fn cast_all(args: &CastArgs, mut queries: Queries, mut caster: Caster, scene: &F
         hits.push(&cast.hits)?;
     }
     hits.finish(scene, query)?;
+    Ok(totals)
+}
+
+/// Reads rays, counts or lists all of their hits and writes them, one batch at a time. The time is wall-clock time.
+fn list_all(
+    args: &CastArgs,
+    list: ListArgs,
+    mut rays: RayReader,
+    mut caster: Caster,
+    scene: &FlatScene,
+) -> Result<Totals, CliError> {
+    let mut totals = Totals { n_rays: 0, n_hits: 0, n_invalid: 0, ms: None };
+    let mut writer = HitListWriter::new(&args.output)?;
+    let mut ms = 0.0;
+    loop {
+        let batch = rays.next_batch(RAYS_PER_BATCH)?;
+        if batch.is_empty() {
+            break;
+        }
+        let start = Instant::now();
+        match list {
+            ListArgs::Count => {
+                let counts = caster.count_hits(&batch)?;
+                ms += start.elapsed().as_secs_f64() * 1e3;
+                totals.n_hits += counts.iter().map(|count| u64::from(*count)).sum::<u64>();
+                writer.push_counts(&counts)?;
+            }
+            ListArgs::All(most_per_ray) => {
+                let lists = caster.all_hits(&batch, most_per_ray)?;
+                ms += start.elapsed().as_secs_f64() * 1e3;
+                totals.n_hits += lists.hits.len() as u64;
+                writer.push_lists(&lists)?;
+            }
+        }
+        totals.n_rays += batch.len() as u64;
+        totals.n_invalid += count_invalid(&batch);
+    }
+    match list {
+        ListArgs::Count => writer.finish_counts()?,
+        ListArgs::All(_) => writer.finish_lists(scene)?,
+    }
+    totals.ms = Some(vec![ms]);
     Ok(totals)
 }

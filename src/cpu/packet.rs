@@ -14,7 +14,7 @@ use super::{
     soa::{HitsSoa, RaysSoa},
 };
 use crate::{
-    layout::{Hit, KD_LEAST_COMPONENT, KD_PLANE_EPSILON, KdNode, Slab},
+    layout::{Hit, KD_LEAST_COMPONENT, KD_PLANE_EPSILON, KdNode, NO_TRIANGLE, Slab},
     reference::{
         candidate::HitFilter,
         counting::table::ReadCounter,
@@ -281,6 +281,7 @@ impl<S: Simd> Packet<S> {
                 t_min: self.t_min.as_array()[lane],
                 source_triangle: self.source_triangle.as_array()[lane],
                 alpha_seed: self.alpha_seed[lane],
+                last_triangle: NO_TRIANGLE,
             },
             origin: Vec3A::from_vec4(Vec4::from_array(row(&self.origin, lane))),
             direction: Vec3A::from_vec4(Vec4::from_array(row(&self.direction, lane))),

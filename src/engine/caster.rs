@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Instant};
 
 use crate::{
     accel::{Query, kdtree::Traversal},
-    cast::{self, CastResult, CpuCaster, Hit, QueryPoint, Ray},
+    cast::{self, AllHits, CastResult, CpuCaster, Hit, QueryPoint, Ray},
     frame::BadOptions,
     gpu::{Context, GpuError},
     world::{Geometry, World},
@@ -84,6 +84,30 @@ impl<'a> Caster<'a> {
                 let (hits, ms) = timed(n_times, || caster.closest_points(points))?;
                 Ok(CastResult { hits, gpu_ms: Some(ms), n_invalid: cast::count_invalid_points(points) })
             }
+        }
+    }
+
+    /// Counts the triangles that each ray meets in (`t_min`, `t_max`]. Each counts once, also if it coincides with
+    /// others.
+    ///
+    /// # Errors
+    /// The world has instances, memory runs out, or a call fails.
+    pub fn count_hits(&mut self, rays: &[Ray]) -> Result<Vec<u32>, GpuError> {
+        match &mut self.0 {
+            Backend::Device(caster) => caster.count_hits(rays),
+            Backend::Cpu(caster) => Ok(caster.count_hits(rays)?),
+        }
+    }
+
+    /// Lists the hits that [`Self::count_hits`] counts, or of each ray the `most_per_ray` nearest ones.
+    ///
+    /// # Errors
+    /// The world has instances, a ray has more hits than a buffer of the device holds, memory runs out, or a call
+    /// fails.
+    pub fn all_hits(&mut self, rays: &[Ray], most_per_ray: Option<u32>) -> Result<AllHits, GpuError> {
+        match &mut self.0 {
+            Backend::Device(caster) => caster.all_hits(rays, most_per_ray),
+            Backend::Cpu(caster) => Ok(caster.all_hits(rays, most_per_ray)?),
         }
     }
 }

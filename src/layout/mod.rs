@@ -38,7 +38,8 @@ mod tests {
             BIND_LIGHTS => Some("Light"),
             BIND_RAYS => Some("PathRay"),
             BIND_BOUNCES => Some("Bounce"),
-            BIND_HITS | BIND_CAST_HITS => Some("Hit"),
+            BIND_HITS | BIND_CAST_HITS | BIND_LISTED_HITS => Some("Hit"),
+            BIND_HIT_CURSORS => Some("HitCursor"),
             BIND_CAST_RAYS => Some("Ray"),
             BIND_CAST_POINTS => Some("QueryPoint"),
             BIND_PIXEL_AOVS => Some("PixelAovs"),
@@ -59,7 +60,7 @@ mod tests {
     /// Returns the name of the struct of a shader's push constants.
     fn pushed_to(shader: &str) -> &'static str {
         match shader {
-            cast if cast.starts_with("cast_") => "CastBatch",
+            cast if cast.starts_with("cast_") || cast.starts_with("all_hits_") => "CastBatch",
             "closest_point.comp" => "CastBatch",
             "driver.rgen" => "DriverCast",
             "atrous_filter.comp" => "EdgeStep",

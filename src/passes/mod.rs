@@ -29,6 +29,7 @@ use crate::{
 };
 
 mod accumulate;
+mod all_hits;
 mod atrous_filter;
 mod auxiliary;
 mod cast;
@@ -63,6 +64,7 @@ mod visibility;
 
 pub use self::{
     accumulate::Accumulate,
+    all_hits::AllHits,
     atrous_filter::AtrousFilter,
     auxiliary::Auxiliary,
     cast::Cast,
@@ -308,10 +310,10 @@ mod tests {
 
     #[test]
     fn every_traversal_has_its_modules() {
-        for (kernel, n_of_each) in [("cast", 1), ("path_trace", 2), ("shadow", 2), ("trace", 2)] {
+        for (kernel, n_of_each) in [("all_hits", 1), ("cast", 2), ("path_trace", 3), ("shadow", 3), ("trace", 3)] {
             let modules: Vec<_> = modules_of(kernel).map(|module| module.file).collect();
-            let n_modules = (n_of_each + 1) * (Traversal::ALL.len() + 1);
-            assert_eq!(modules.len(), n_modules, "{kernel}: those of the grid, too, and of instances");
+            let n_modules = n_of_each * (Traversal::ALL.len() + 1);
+            assert_eq!(modules.len(), n_modules, "{kernel}: those of the grid, too");
             for search in Search::all(false) {
                 let file = format!("{kernel}_{}.comp", search.module().unwrap());
                 assert!(modules.contains(&&*file), "{file}");

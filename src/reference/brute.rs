@@ -7,11 +7,6 @@ use crate::layout::{Hit, NO_TRIANGLE, Triangle};
 /// Returns the hit of smallest t in (t_min, t_max]. Of several at the same t, it is the one with the lowest triangle
 /// index. A miss has t = t_max.
 pub fn closest_hit(triangles: &[Triangle], ray: &SearchRay) -> Hit {
-    closest_hit_of(triangles, ray, |_| true)
-}
-
-/// Does what [`closest_hit`] does, over the hits that `is_accepted` accepts.
-pub fn closest_hit_of(triangles: &[Triangle], ray: &SearchRay, is_accepted: impl Fn(&Hit) -> bool) -> Hit {
     let shear = Shear::of(ray.origin.to_array(), ray.direction.to_array());
     let mut best = ray.miss();
     for (triangle_ix, triangle) in (0..).zip(triangles) {
@@ -19,7 +14,7 @@ pub fn closest_hit_of(triangles: &[Triangle], ray: &SearchRay, is_accepted: impl
         let is_nearer =
             |hit: &Hit| hit.t > ray.t_min && (hit.t < best.t || hit.t == best.t && best.triangle_ix == NO_TRIANGLE);
         let is_target = triangle_ix != ray.source_triangle;
-        if let Some(hit) = hit.filter(|hit| is_target && is_nearer(hit) && is_accepted(hit)) {
+        if let Some(hit) = hit.filter(|hit| is_target && is_nearer(hit)) {
             best = hit;
         }
     }

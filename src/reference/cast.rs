@@ -39,7 +39,7 @@ pub fn is_ray(ray: &Ray) -> bool {
 /// The factor that scales a direction to about unit length, which the traversal needs, and the factor's inverse. Both
 /// are powers of two, so scaling rounds neither the direction nor t.
 #[inline(always)]
-fn scales_of(direction: Vec3) -> [f32; 2] {
+pub(super) fn scales_of(direction: Vec3) -> [f32; 2] {
     let exponent = exponent_of(direction).min(253);
     [254 - exponent, exponent].map(|exponent| f32::from_bits(exponent << 23))
 }
@@ -47,7 +47,7 @@ fn scales_of(direction: Vec3) -> [f32; 2] {
 /// The ray with a direction of about unit length. A ray that can only miss gets an empty interval of t, so it is in
 /// no cell.
 #[inline(always)]
-fn scaled(ray: &Ray) -> SearchRay {
+pub(super) fn scaled(ray: &Ray) -> SearchRay {
     let [scale, inv_scale] = scales_of(ray.direction);
     let nowhere = SearchRay {
         origin: Vec3::ZERO,

@@ -24,6 +24,7 @@
 //! ```
 
 pub mod accumulate;
+pub mod all_hits;
 pub mod alpha_test;
 pub mod atrous_filter;
 pub mod auxiliary;

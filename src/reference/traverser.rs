@@ -2,7 +2,7 @@
 //! traced one after the other.
 
 use super::{
-    brute,
+    candidate::intersect,
     counting::table::ReadCounter,
     grid::search_grid,
     inputs::KernelInputs,
@@ -70,6 +70,31 @@ impl Traverser {
             Traversal::Brute => Self::Brute,
         }
     }
+
+    /// Searches the structure, which has no instances. Keeps the nearest hit in `best`.
+    #[inline(always)]
+    pub(super) fn search<const ANY_HIT: bool>(
+        &mut self,
+        inputs: &KernelInputs<impl ReadCounter>,
+        ray: &TraversalRay,
+        best: &mut Hit,
+    ) {
+        match self {
+            Self::Mask(pending) => search::<_, ANY_HIT>(inputs, ray, pending, best),
+            Self::MaskBoxes(pending) => search::<_, ANY_HIT>(inputs, ray, pending, best),
+            Self::Restart(pending) => search::<_, ANY_HIT>(inputs, ray, pending, best),
+            Self::Backtrack(pending) => search::<_, ANY_HIT>(inputs, ray, pending, best),
+            Self::ShortStack(pending) => search::<_, ANY_HIT>(inputs, ray, pending, best),
+            Self::Stack(pending) => search::<_, ANY_HIT>(inputs, ray, pending, best),
+            Self::Grid => search_grid::<ANY_HIT>(inputs, ray, best),
+            Self::Ropes => follow_ropes::<ANY_HIT>(inputs, ray, best),
+            Self::Brute => {
+                inputs.leaf_triangles.count(inputs.triangles.len());
+                let triangles = 0..inputs.triangles.len() as u32;
+                triangles.for_each(|triangle_ix| intersect(inputs, &ray.hit_filter, triangle_ix, best));
+            }
+        }
+    }
 }
 
 impl Tracer for Traverser {
@@ -84,22 +109,7 @@ impl Tracer for Traverser {
             return search_instances::<_, ANY_HIT>(inputs, instanced, search_ray, search);
         }
         hit_from_near(inputs, search_ray, |near, best| {
-            let ray = &TraversalRay::new(inputs, near);
-            match self {
-                Self::Mask(pending) => search::<_, ANY_HIT>(inputs, ray, pending, best),
-                Self::MaskBoxes(pending) => search::<_, ANY_HIT>(inputs, ray, pending, best),
-                Self::Restart(pending) => search::<_, ANY_HIT>(inputs, ray, pending, best),
-                Self::Backtrack(pending) => search::<_, ANY_HIT>(inputs, ray, pending, best),
-                Self::ShortStack(pending) => search::<_, ANY_HIT>(inputs, ray, pending, best),
-                Self::Stack(pending) => search::<_, ANY_HIT>(inputs, ray, pending, best),
-                Self::Grid => search_grid::<ANY_HIT>(inputs, ray, best),
-                Self::Ropes => follow_ropes::<ANY_HIT>(inputs, ray, best),
-                Self::Brute => {
-                    inputs.leaf_triangles.count(inputs.triangles.len());
-                    let is_accepted = |hit: &Hit| inputs.is_accepted(&ray.hit_filter.shear, hit, near.alpha_seed);
-                    *best = brute::closest_hit_of(inputs.triangles, near, is_accepted);
-                }
-            }
+            self.search::<ANY_HIT>(inputs, &TraversalRay::new(inputs, near), best);
         })
     }
 }

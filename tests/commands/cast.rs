@@ -132,6 +132,38 @@ fn any_says_what_is_occluded() {
     }
 }
 
+/// The first and the sixth ray go through the edge that the square's triangles share, and so meet both.
+#[test]
+fn all_hits_are_counted_and_listed() {
+    let directory = with_mesh();
+    let path = |name: &str| directory.path().join(name);
+    save(&path("rays.npy"), &RAYS);
+    let cast = |args: &[&str]| {
+        succeed(directory.path(), &[&["cast", "mesh.obj", "rays.npy", "-o", "hits.npz"], args].concat())
+    };
+    for device in [&["--validate"][..], &["--cpu"], &["--accel", "grid"]] {
+        let output = cast(&[&["--count"], device].concat());
+        assert!(stdout(&output).contains("7 rays, 7 hits, 1 invalid\n"), "{}", stdout(&output));
+        assert_eq!(arrays(&path("hits.npz")), ["hit_counts.npy"]);
+        assert_eq!(load(&path("hits.npz"), "hit_counts"), (vec![7], vec![3u32, 1, 0, 1, 0, 2, 0]));
+        cast(&[&["--all", "-q"], device].concat());
+        assert_eq!(load(&path("hits.npz"), "ray_splits"), (vec![8], vec![0u64, 3, 4, 4, 5, 5, 7, 7]));
+        assert_eq!(load(&path("hits.npz"), "t_hit"), (vec![7], vec![1f32, 3.0, 3.0, 1.0, 0.5, 3.0, 3.0]));
+        assert_eq!(load(&path("hits.npz"), "primitive_ids"), (vec![7], vec![2u32, 0, 1, 1, 0, 0, 1]));
+        assert_eq!(load::<f32>(&path("hits.npz"), "primitive_uvs").0, [7, 2]);
+        cast(&[&["--all", "1", "-q"], device].concat());
+        assert_eq!(load(&path("hits.npz"), "ray_splits"), (vec![8], vec![0u64, 1, 2, 2, 3, 3, 4, 4]));
+        assert_eq!(load(&path("hits.npz"), "primitive_ids"), (vec![4], vec![2u32, 1, 0, 0]));
+    }
+    let placed = |x: u32| format!("[[mesh]]\nfile = 'mesh.obj'\ntransform = {{ translate = [{x}, 0, 0] }}\n");
+    std::fs::write(path("scene.toml"), [0, 10].map(placed).concat()).expect("a scene");
+    for device in ["--validate", "--cpu"] {
+        let args = ["cast", "scene.toml", "rays.npy", "-o", "x.npz", "--count", "--instances", "keep", device];
+        fail(directory.path(), &args, 4, "--instances flatten");
+        assert!(!path("x.npz").exists());
+    }
+}
+
 /// Six columns mean t from 0 to infinity. The mesh may be a scene file. The file of rays may be empty.
 #[test]
 fn rays_of_six_columns_and_none() {
@@ -240,6 +272,9 @@ fn usage_mistakes_are_refused() {
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--json", "m.obj"], "MESH"),
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--json", "x.npz"], "same file"),
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--repeat", "0"], "--repeat"),
+        (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--all", "0"], "--all"),
+        (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--all", "--count"], "--count"),
+        (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--count", "--repeat", "2"], "--repeat"),
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--traversal", "bvh"], "mask"),
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--accel", "bvh"], "kdtree, grid, grid2"),
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--accel", "grid", "--traversal", "mask"], "--accel grid"),

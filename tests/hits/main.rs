@@ -3,6 +3,7 @@
 #[path = "../support/mod.rs"]
 mod support;
 
+mod all_hits;
 mod grid;
 mod hidden;
 mod huge_ground;

@@ -3,9 +3,11 @@
 // Needs the macros TRAVERSAL and, for rays that pass through parts of triangles or back faces, WITH_ALPHA_TEST, and in
 // worlds of instances WITH_INSTANCES (build.rs); and the constants `bool COUNT_COSTS` (steps.glsl), `bool
 // TESTS_BLENDED` (shading/alpha_test.glsl) and `bool FROM_CAMERA` (shading/back_faces.glsl), which the kernel declares
-// before this file. Provides `traverse`, and `traverse_any_length` for directions of any length, which are all that a
-// kernel calls to find a hit. Kernels also use `is_suspended` and `runs_in_pass` of suspended_rays.glsl. cast.comp
-// checks its rays by `exponent_of`, `longest_bits` and `magnitude_bits`.
+// before this file. With the macro NEXT_HITS, which all_hits.comp defines, only hits behind `last_hit` count, which
+// each search sets to the hit that it finds (candidate.glsl). Provides `traverse`, and `traverse_any_length` for
+// directions of any length, which are all that a kernel calls to find a hit. Kernels also use `is_suspended` and
+// `runs_in_pass` of suspended_rays.glsl. rays/cast_rays.glsl checks rays by `exponent_of`, `longest_bits` and
+// `magnitude_bits`.
 //
 //   magnitude.glsl       magnitudes of floats as integers
 //   traversal_ray.glsl   the ray, clipped to the structure's box
@@ -126,6 +128,10 @@ Hit traverse(PathRay ray_in, float t_min, bool any_hit) {
         }
         float t_start;
         PathRay ray_near = near_scene(ray, least_t, t_start);
+#ifdef NEXT_HITS
+        // The origin is moved as in the search for the last hit, so each t has the same bits.
+        if (last_hit.triangle_ix != NO_TRIANGLE) least_t = last_hit.t;
+#endif
         TraversalRay prepared = traversal_ray(ray_near, least_t);
         spill_pair(LENGTHS_SLOT, t_start, INSTANCED ? spilled_pair(LENGTHS_SLOT).y : ray_in.t_max);
         Nearest found = Nearest(0.5 * ray_near.t_max, best.triangle_ix);
@@ -157,6 +163,9 @@ Hit traverse(PathRay ray_in, float t_min, bool any_hit) {
     if (INSTANCED) lengths.x = 0.0;
     if (best.triangle_ix == NO_TRIANGLE) return Hit(lengths.y, NO_TRIANGLE, 0.0, 0.0);
     vec2 weights = spilled_pair(WEIGHTS_SLOT);
+#ifdef NEXT_HITS
+    last_hit = Nearest(2.0 * best.t, best.triangle_ix);
+#endif
     // The sum could round to more than t_max.
     return Hit(min(2.0 * best.t + lengths.x, lengths.y), best.triangle_ix, weights.x, weights.y);
 }

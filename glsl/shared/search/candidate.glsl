@@ -17,11 +17,21 @@ struct Nearest {
     uint triangle_ix;
 };
 
+#ifdef NEXT_HITS
+// The hit that the search goes on from, or NO_TRIANGLE: only hits behind it count, in the order of t and then of the
+// triangles' indices. Its t is that of the ray in traversal_ray.glsl, but not halved (all_hits.comp).
+Nearest last_hit = Nearest(0.0, NO_TRIANGLE);
+#endif
+
 // Whether a hit is in the ray's interval, not on its source triangle, and nearer than the best one. Of two hits at
 // the same t, the one with the lower triangle index wins, so the order of tests does not matter. The first `best` is
 // at the ray's t_max with NO_TRIANGLE, the highest index, so a hit at t_max counts.
 bool is_better(TraversalRay ray, float t, uint triangle_ix, Nearest best) {
     bool nearer = t < best.t || (t == best.t && triangle_ix < best.triangle_ix);
+#ifdef NEXT_HITS
+    // With a last hit, its t is the ray's t_min.
+    if (t == ray.t_min && triangle_ix > last_hit.triangle_ix) return nearer;
+#endif
     return t > ray.t_min && nearer && triangle_ix != ray.source_triangle;
 }
 

@@ -1,0 +1,208 @@
+//! All hits of the caller's rays, on a device or on the CPU.
+//!
+//! A device first counts the hits of a batch. The host sums the counts up, which gives each ray a place in the list,
+//! and the device then finds the hits again and writes them.
+
+use std::{ops::Range, sync::Arc};
+
+use super::{CpuCaster, GpuCaster, Hit, NO_TRIANGLE, Ray};
+use crate::{
+    buffers::{AllHitsResources, ResumePass},
+    frame::BadOptions,
+    gpu::{BindingLayout, GpuError},
+    layout::HitCursor,
+    passes, reference,
+    world::Geometry,
+};
+
+/// All hits of rays.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AllHits {
+    /// One number for each ray, and one more: the hits of ray i are those from `ray_splits[i]` up to, but not
+    /// including, `ray_splits[i + 1]`.
+    pub ray_splits: Vec<u64>,
+    /// The hits of each ray, in the order of t, and of the triangles' indices where t are the same.
+    pub hits: Vec<Hit>,
+}
+
+impl AllHits {
+    /// `ends`: where each ray's hits end.
+    fn new(ends: impl IntoIterator<Item = u64>, mut hits: Vec<Hit>) -> Self {
+        let ray_splits: Vec<u64> = std::iter::once(0).chain(ends).collect();
+        // Rays from afar were searched from a nearer origin. There t can differ that are the same when they are counted
+        // from the ray's own origin.
+        for ends in ray_splits.windows(2) {
+            hits[ends[0] as usize..ends[1] as usize]
+                .sort_by(|a, b| a.t.total_cmp(&b.t).then(a.triangle_ix.cmp(&b.triangle_ix)));
+        }
+        Self { ray_splits, hits }
+    }
+}
+
+/// Refuses worlds of instances.
+fn check_flat(geometry_is_flat: bool) -> Result<(), BadOptions> {
+    let why = "all hits of a ray are not found in kept instances: flatten them (`--instances flatten`)";
+    if geometry_is_flat { Ok(()) } else { Err(BadOptions(why.to_owned())) }
+}
+
+impl CpuCaster<'_> {
+    /// Counts the triangles that each ray meets in (`t_min`, `t_max`]. Each counts once, also if it coincides with
+    /// others.
+    ///
+    /// # Errors
+    /// The world has instances.
+    pub fn count_hits(&self, rays: &[Ray]) -> Result<Vec<u32>, BadOptions> {
+        check_flat(is_flat(self.geometry()))?;
+        Ok(reference::all_hits::count_hits(&self.inputs(), self.traversal, rays))
+    }
+
+    /// Lists the hits that [`Self::count_hits`] counts, or of each ray the `most_per_ray` nearest ones, before
+    /// t of rays from afar are rounded.
+    ///
+    /// # Errors
+    /// The world has instances.
+    pub fn all_hits(&self, rays: &[Ray], most_per_ray: Option<u32>) -> Result<AllHits, BadOptions> {
+        check_flat(is_flat(self.geometry()))?;
+        let most = most_per_ray.map_or(usize::MAX, |most| most as usize);
+        let (ends, hits) = reference::all_hits::list_hits(&self.inputs(), self.traversal, rays, most);
+        Ok(AllHits::new(ends.into_iter().map(|end| end as u64), hits))
+    }
+}
+
+fn is_flat(geometry: Geometry) -> bool {
+    geometry.accel().structures_id().is_none()
+}
+
+/// The kernels of a [`GpuCaster`], and what they bind.
+struct Kernels {
+    bindings: Arc<BindingLayout>,
+    count: passes::AllHits,
+    list: passes::AllHits,
+}
+
+impl GpuCaster {
+    /// Counts the triangles that each ray meets in (`t_min`, `t_max`], batch by batch. Each counts once, also if it
+    /// coincides with others.
+    ///
+    /// # Errors
+    /// The world has instances, memory runs out, or a call fails.
+    pub fn count_hits(&mut self, rays: &[Ray]) -> Result<Vec<u32>, GpuError> {
+        let kernels = self.hit_kernels()?;
+        let mut counts = Vec::with_capacity(rays.len());
+        for batch in rays.chunks(self.rays_per_batch) {
+            counts.extend(self.count_batch(&kernels, batch, u32::MAX)?);
+        }
+        Ok(counts)
+    }
+
+    /// Lists the hits that [`Self::count_hits`] counts, or of each ray the `most_per_ray` nearest ones, before
+    /// t of rays from afar are rounded.
+    ///
+    /// # Errors
+    /// The world has instances, a ray has more hits than a buffer of the device holds, memory runs out, or a call
+    /// fails.
+    pub fn all_hits(&mut self, rays: &[Ray], most_per_ray: Option<u32>) -> Result<AllHits, GpuError> {
+        let kernels = self.hit_kernels()?;
+        let (mut ends, mut hits) = (Vec::with_capacity(rays.len()), Vec::new());
+        for batch in rays.chunks(self.rays_per_batch) {
+            let counts = self.count_batch(&kernels, batch, most_per_ray.unwrap_or(u32::MAX))?;
+            let mut end = hits.len() as u64;
+            ends.extend(counts.iter().map(|count| {
+                end += u64::from(*count);
+                end
+            }));
+            for part in parts(&counts, HITS_PER_RAY * self.rays_per_batch as u64) {
+                hits.extend(self.list_part(&kernels, &batch[part.clone()], &counts[part])?);
+            }
+        }
+        Ok(AllHits::new(ends, hits))
+    }
+
+    fn hit_kernels(&self) -> Result<Kernels, GpuError> {
+        check_flat(self.structures_id.is_none())?;
+        let bindings = AllHitsResources::bindings(&self.context, &self.tree)?;
+        let kernel = |lists| passes::AllHits::new(&self.context, &bindings, self.traversal, lists);
+        Ok(Kernels { count: kernel(false)?, list: kernel(true)?, bindings })
+    }
+
+    fn count_batch(&self, kernels: &Kernels, rays: &[Ray], most: u32) -> Result<Vec<u32>, GpuError> {
+        let resources = AllHitsResources::new(&self.context, &kernels.bindings, &self.tree, [rays.len(), 0])?;
+        let cursor = HitCursor { t: 0.0, triangle_ix: NO_TRIANGLE, next_ix: 0, end_ix: most, mark: NO_TRIANGLE };
+        self.find_hits(&kernels.count, &resources, rays, &vec![cursor; rays.len()])?;
+        let cursors = resources.hit_cursors.download_first(rays.len())?;
+        Ok(cursors.iter().map(|cursor| cursor.next_ix).collect())
+    }
+
+    /// Returns the hits of rays, as many of each as `counts` says.
+    fn list_part(&self, kernels: &Kernels, rays: &[Ray], counts: &[u32]) -> Result<Vec<Hit>, GpuError> {
+        let n_hits: u64 = counts.iter().map(|count| u64::from(*count)).sum();
+        let limit = (self.context.limits().storage_range / size_of::<Hit>() as u64).min(u64::from(u32::MAX));
+        if n_hits > limit {
+            return Err(GpuError::Limit { what: "hits of a ray", value: n_hits, limit });
+        }
+        if n_hits == 0 {
+            return Ok(Vec::new());
+        }
+        let resources =
+            AllHitsResources::new(&self.context, &kernels.bindings, &self.tree, [rays.len(), n_hits as usize])?;
+        let mut end_ix = 0;
+        let cursor = |count: &u32| {
+            let next_ix = end_ix;
+            end_ix += count;
+            HitCursor { t: 0.0, triangle_ix: NO_TRIANGLE, next_ix, end_ix, mark: NO_TRIANGLE }
+        };
+        let cursors: Vec<_> = counts.iter().map(cursor).collect();
+        self.find_hits(&kernels.list, &resources, rays, &cursors)?;
+        resources.listed_hits.download_first(n_hits as usize)
+    }
+
+    /// Runs a kernel until every ray has come to its end.
+    fn find_hits(
+        &self,
+        kernel: &passes::AllHits,
+        resources: &AllHitsResources,
+        rays: &[Ray],
+        cursors: &[HitCursor],
+    ) -> Result<(), GpuError> {
+        resources.cast_rays.upload(rays)?;
+        resources.hit_cursors.upload(cursors)?;
+        let n_rays = rays.len() as u32;
+        self.context.run("all_hits", |commands| {
+            self.tree.suspended_rays.reset(commands);
+            kernel.record(commands, &resources.set, n_rays, ResumePass::Begin);
+        })?;
+        self.tree.suspended_rays.finish(&self.context, |commands, resume_pass| {
+            kernel.record(commands, &resources.set, n_rays, resume_pass);
+        })?;
+        Ok(())
+    }
+}
+
+/// The hits that are listed at a time, as a multiple of a batch's rays. Their buffer is then as large as that of rays.
+const HITS_PER_RAY: u64 = 2;
+
+/// Cuts rays with these counts of hits into ranges that have at most `most` hits each, or a single ray.
+fn parts(counts: &[u32], most: u64) -> Vec<Range<usize>> {
+    let (mut parts, mut first, mut n_hits) = (Vec::new(), 0, 0);
+    for (ray_ix, count) in counts.iter().enumerate() {
+        n_hits += u64::from(*count);
+        if n_hits > most && ray_ix > first {
+            parts.push(first..ray_ix);
+            (first, n_hits) = (ray_ix, u64::from(*count));
+        }
+    }
+    parts.push(first..counts.len());
+    parts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_have_few_hits_or_one_ray() {
+        assert_eq!(parts(&[1, 2, 3, 9, 0, 4], 4), [0..2, 2..3, 3..4, 4..6]);
+        assert_eq!(parts(&[9], 4), vec![0..1]);
+        assert_eq!(parts(&[0, 0], 4), vec![0..2]);
+    }
+}

@@ -1,0 +1,52 @@
+//! All hits: counts or lists the hits of each ray of an array, through the acceleration structure. It is not a pass of
+//! a frame.
+
+use std::sync::Arc;
+
+use super::{kernel, search_constants, searching};
+use crate::{
+    accel::kdtree::Traversal,
+    buffers::ResumePass,
+    frame::bounce::lanes_log2,
+    gpu::{BindingLayout, BindingSet, Commands, ComputePipeline, Context, Dispatch, GpuError},
+    layout::{CastBatch, RAY_GROUP_SIZE, constants},
+};
+
+/// The pipeline of the pass.
+pub struct AllHits {
+    kernel: ComputePipeline,
+    /// Number of lanes of the device, over which the rays are spread ([`lanes_log2`]).
+    n_lanes: u32,
+}
+
+impl AllHits {
+    /// Creates the pipeline. `lists`: whether hits are listed, and not only counted.
+    ///
+    /// # Errors
+    /// The driver refuses the shader.
+    ///
+    /// # Panics
+    /// The bindings are those of a world of instances.
+    pub fn new(
+        context: &Arc<Context>,
+        bindings: &Arc<BindingLayout>,
+        traversal: Traversal,
+        lists: bool,
+    ) -> Result<Self, GpuError> {
+        let shader = searching("all_hits", bindings, traversal, []);
+        let constants = search_constants(context)?.set(constants::LISTS_HITS, lists);
+        let n_lanes = context.n_lanes()?;
+        Ok(Self { kernel: kernel(context, bindings, "all_hits", shader, &constants)?, n_lanes })
+    }
+
+    /// Needs the first `n_rays` elements of `cast_rays` and `hit_cursors`. Leaves in the cursors where each ray's list
+    /// ends, and if hits are listed, the lists in `listed_hits`; a ray that was suspended leaves a mark in its cursor.
+    /// `pass`: which rays are traced, all or those that were suspended.
+    pub fn record(&self, commands: &Commands, set: &BindingSet, n_rays: u32, pass: ResumePass) {
+        commands.bind(set);
+        let lanes_log2 = lanes_log2(n_rays, self.n_lanes);
+        let dispatch = Dispatch::Threads([n_rays << lanes_log2, 1, 1], [RAY_GROUP_SIZE, 1, 1]);
+        let batch = CastBatch { n_rays, lanes_log2, resume_pass: pass.constant() };
+        commands.dispatch(&self.kernel, None, &batch, dispatch);
+    }
+}
