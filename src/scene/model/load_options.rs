@@ -105,6 +105,7 @@ pub struct AnimationInfo {
     pub n_changed: usize,
 }
 
+#[cfg(any(feature = "bench", feature = "view"))]
 impl AnimationChoice {
     /// Returns the index of the animation that is shown alone, if one is and the file has it.
     pub(crate) fn index_in(&self, animations: &[AnimationInfo]) -> Option<usize> {
@@ -114,6 +115,7 @@ impl AnimationChoice {
     }
 }
 
+#[cfg(any(feature = "bench", feature = "view"))]
 impl AnimationInfo {
     /// Returns the first and the last moment of animations that are shown together, seconds. The first is 0 or, if a
     /// key is before that, the first key's.
