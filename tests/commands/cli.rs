@@ -45,7 +45,7 @@ fn usage_mistakes_are_refused_before_the_scene_is_read() {
         (&["render", "none.toml", "--crop", "1,2,3"], "x0,y0,x1,y1"),
         (&["render", "none.toml", "--crop", "5,2,5,9"], "x0 must be less than x1"),
         (&["render", "none.toml", "--aov", "depth,colour"], "depth, normal, position"),
-        (&["render", "none.toml", "--frames", "all"], "--path"),
+        (&["render", "none.toml", "--frames", "some"], "expected all"),
         (&["render", "none.toml", "--turntable", "4", "--frames", "2-4"], "a turn of 4 frames has no frame 4"),
         (&["render", "none.toml", "--turntable", "0"], "--turntable"),
         (&["render", "none.toml", "--at", "nan"], "expected a number of seconds"),
