@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use super::{AccelBuffers, accel, binding};
+use super::{AccelBuffers, cast::layout_of};
 use crate::{
     gpu::{Binding, BindingLayout, BindingSet, Buffer, BufferUse, Context, GpuError},
-    layout::{BIND_CAST_RAYS, BIND_HIT_CURSORS, BIND_LISTED_HITS, CastBatch, Hit, HitCursor, Ray},
+    layout::{BIND_CAST_RAYS, BIND_HIT_CURSORS, BIND_LISTED_HITS, Hit, HitCursor, Ray},
 };
 
 /// Buffers of a batch of rays, and the descriptor set over them and the acceleration structure.
@@ -25,9 +25,7 @@ impl AllHitsResources {
     /// # Errors
     /// Memory runs out.
     pub fn bindings(context: &Arc<Context>, accel: &AccelBuffers) -> Result<Arc<BindingLayout>, GpuError> {
-        let own = [BIND_CAST_RAYS, BIND_HIT_CURSORS, BIND_LISTED_HITS];
-        let kinds: Vec<_> = accel::bindings().chain(own).map(binding).collect();
-        BindingLayout::with_constants(context, &kinds, size_of::<CastBatch>() as u32, accel.constants(false))
+        layout_of(context, accel, &[BIND_CAST_RAYS, BIND_HIT_CURSORS, BIND_LISTED_HITS])
     }
 
     /// Makes buffers for `n_rays` rays and a list of `n_hits` hits, and the set over them.

@@ -8,6 +8,16 @@ use crate::{
     layout::{BIND_CAST_HITS, BIND_CAST_RAYS, CastBatch, Hit, Ray},
 };
 
+/// Makes the layout of a set of the acceleration structure and the bindings `own`, for kernels of a [`CastBatch`].
+pub(super) fn layout_of(
+    context: &Arc<Context>,
+    accel: &AccelBuffers,
+    own: &[u32],
+) -> Result<Arc<BindingLayout>, GpuError> {
+    let kinds: Vec<_> = accel::bindings().chain(own.iter().copied()).map(binding).collect();
+    BindingLayout::with_constants(context, &kinds, size_of::<CastBatch>() as u32, accel.constants(false))
+}
+
 /// Buffers of a batch of rays, and the descriptor set over them and the acceleration structure.
 pub struct CastResources {
     /// The rays of a batch.
@@ -23,8 +33,7 @@ impl CastResources {
     /// # Errors
     /// Memory runs out.
     pub fn bindings(context: &Arc<Context>, accel: &AccelBuffers) -> Result<Arc<BindingLayout>, GpuError> {
-        let kinds: Vec<_> = accel::bindings().chain([BIND_CAST_RAYS, BIND_CAST_HITS]).map(binding).collect();
-        BindingLayout::with_constants(context, &kinds, size_of::<CastBatch>() as u32, accel.constants(false))
+        layout_of(context, accel, &[BIND_CAST_RAYS, BIND_CAST_HITS])
     }
 
     /// Makes the set over buffers of rays and hits that the caller gives.

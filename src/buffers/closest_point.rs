@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use super::{AccelBuffers, accel, binding};
+use super::{AccelBuffers, cast::layout_of};
 use crate::{
     gpu::{Binding, BindingLayout, BindingSet, Buffer, BufferUse, Context, GpuError},
-    layout::{BIND_CAST_HITS, BIND_CAST_POINTS, CastBatch, Hit, QueryPoint},
+    layout::{BIND_CAST_HITS, BIND_CAST_POINTS, Hit, QueryPoint},
 };
 
 /// Buffers of a batch of points, and the descriptor set over them and the acceleration structure.
@@ -23,8 +23,7 @@ impl PointResources {
     /// # Errors
     /// Memory runs out.
     pub fn bindings(context: &Arc<Context>, accel: &AccelBuffers) -> Result<Arc<BindingLayout>, GpuError> {
-        let kinds: Vec<_> = accel::bindings().chain([BIND_CAST_POINTS, BIND_CAST_HITS]).map(binding).collect();
-        BindingLayout::with_constants(context, &kinds, size_of::<CastBatch>() as u32, accel.constants(false))
+        layout_of(context, accel, &[BIND_CAST_POINTS, BIND_CAST_HITS])
     }
 
     /// Makes buffers for `len` points, and the set over them.

@@ -56,8 +56,8 @@ impl CpuCaster<'_> {
         Ok(reference::all_hits::count_hits(&self.inputs(), self.traversal, rays))
     }
 
-    /// Lists the hits that [`Self::count_hits`] counts, or of each ray the `most_per_ray` nearest ones, before
-    /// t of rays from afar are rounded.
+    /// Lists the hits that [`Self::count_hits`] counts, or of each ray the `most_per_ray` nearest ones. The
+    /// t that decide are those of the search, which are not rounded to the far origin of a ray from afar.
     ///
     /// # Errors
     /// The world has instances.
@@ -95,8 +95,8 @@ impl GpuCaster {
         Ok(counts)
     }
 
-    /// Lists the hits that [`Self::count_hits`] counts, or of each ray the `most_per_ray` nearest ones, before
-    /// t of rays from afar are rounded.
+    /// Lists the hits that [`Self::count_hits`] counts, or of each ray the `most_per_ray` nearest ones. The
+    /// t that decide are those of the search, which are not rounded to the far origin of a ray from afar.
     ///
     /// # Errors
     /// The world has instances, a ray has more hits than a buffer of the device holds, memory runs out, or a call

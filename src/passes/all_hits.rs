@@ -3,19 +3,18 @@
 
 use std::sync::Arc;
 
-use super::{kernel, search_constants, searching};
+use super::{cast::record_batch, kernel, search_constants, searching};
 use crate::{
     accel::kdtree::Traversal,
     buffers::ResumePass,
-    frame::bounce::lanes_log2,
-    gpu::{BindingLayout, BindingSet, Commands, ComputePipeline, Context, Dispatch, GpuError},
-    layout::{CastBatch, RAY_GROUP_SIZE, constants},
+    gpu::{BindingLayout, BindingSet, Commands, ComputePipeline, Context, GpuError},
+    layout::constants,
 };
 
 /// The pipeline of the pass.
 pub struct AllHits {
     kernel: ComputePipeline,
-    /// Number of lanes of the device, over which the rays are spread ([`lanes_log2`]).
+    /// Number of lanes of the device, over which the rays are spread (`frame::bounce::lanes_log2`).
     n_lanes: u32,
 }
 
@@ -44,9 +43,6 @@ impl AllHits {
     /// `pass`: which rays are traced, all or those that were suspended.
     pub fn record(&self, commands: &Commands, set: &BindingSet, n_rays: u32, pass: ResumePass) {
         commands.bind(set);
-        let lanes_log2 = lanes_log2(n_rays, self.n_lanes);
-        let dispatch = Dispatch::Threads([n_rays << lanes_log2, 1, 1], [RAY_GROUP_SIZE, 1, 1]);
-        let batch = CastBatch { n_rays, lanes_log2, resume_pass: pass.constant() };
-        commands.dispatch(&self.kernel, None, &batch, dispatch);
+        record_batch(commands, &self.kernel, (n_rays, self.n_lanes), pass);
     }
 }

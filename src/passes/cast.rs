@@ -50,13 +50,18 @@ impl Cast {
     /// suspended.
     pub fn record(&self, commands: &Commands, set: &BindingSet, n_rays: u32, pass: ResumePass) {
         commands.bind(set);
-        let lanes_log2 = lanes_log2(n_rays, self.n_lanes);
-        let dispatch = Dispatch::Threads([n_rays << lanes_log2, 1, 1], [RAY_GROUP_SIZE, 1, 1]);
-        commands.dispatch(
-            &self.kernel,
-            None,
-            &CastBatch { n_rays, lanes_log2, resume_pass: pass.constant() },
-            dispatch,
-        );
+        record_batch(commands, &self.kernel, (n_rays, self.n_lanes), pass);
     }
+}
+
+/// Records a kernel of a [`CastBatch`] of so many rays or points, on a device with so many lanes.
+pub(super) fn record_batch(
+    commands: &Commands,
+    kernel: &ComputePipeline,
+    (n_rays, n_lanes): (u32, u32),
+    pass: ResumePass,
+) {
+    let lanes_log2 = lanes_log2(n_rays, n_lanes);
+    let dispatch = Dispatch::Threads([n_rays << lanes_log2, 1, 1], [RAY_GROUP_SIZE, 1, 1]);
+    commands.dispatch(kernel, None, &CastBatch { n_rays, lanes_log2, resume_pass: pass.constant() }, dispatch);
 }

@@ -3,18 +3,16 @@
 
 use std::sync::Arc;
 
-use super::{kernel, spirv};
+use super::{cast::record_batch, kernel, spirv};
 use crate::{
     buffers::ResumePass,
-    frame::bounce::lanes_log2,
-    gpu::{BindingLayout, BindingSet, Commands, ComputePipeline, Constants, Context, Dispatch, GpuError},
-    layout::{CastBatch, RAY_GROUP_SIZE},
+    gpu::{BindingLayout, BindingSet, Commands, ComputePipeline, Constants, Context, GpuError},
 };
 
 /// The pipeline of the pass.
 pub struct ClosestPoint {
     kernel: ComputePipeline,
-    /// Number of lanes of the device, over which the points are spread ([`lanes_log2`]).
+    /// Number of lanes of the device, over which the points are spread (`frame::bounce::lanes_log2`).
     n_lanes: u32,
 }
 
@@ -34,9 +32,6 @@ impl ClosestPoint {
     /// whose search was suspended.
     pub fn record(&self, commands: &Commands, set: &BindingSet, n_points: u32, pass: ResumePass) {
         commands.bind(set);
-        let lanes_log2 = lanes_log2(n_points, self.n_lanes);
-        let dispatch = Dispatch::Threads([n_points << lanes_log2, 1, 1], [RAY_GROUP_SIZE, 1, 1]);
-        let batch = CastBatch { n_rays: n_points, lanes_log2, resume_pass: pass.constant() };
-        commands.dispatch(&self.kernel, None, &batch, dispatch);
+        record_batch(commands, &self.kernel, (n_points, self.n_lanes), pass);
     }
 }

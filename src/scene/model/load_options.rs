@@ -109,9 +109,9 @@ pub struct AnimationInfo {
 impl AnimationChoice {
     /// Returns the index of the animation that is shown alone, if one is and the file has it.
     pub(crate) fn index_in(&self, animations: &[AnimationInfo]) -> Option<usize> {
-        let Self::Named(name) = self else { return None };
-        let named = animations.iter().position(|animation| animation.name == *name);
-        named.or_else(|| name.parse().ok().filter(|ix| *ix < animations.len()))
+        let names: Vec<_> = animations.iter().map(|animation| animation.name.as_str()).collect();
+        let Self::Named(_) = self else { return None };
+        self.among(&names).ok()?.first().copied()
     }
 }
 

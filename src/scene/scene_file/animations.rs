@@ -62,13 +62,13 @@ pub(crate) struct Animations {
     pub infos: Vec<AnimationInfo>,
     /// Whether the first one is that of the keys.
     has_own: bool,
-    /// The moment at which the keys are shown, if they are.
+    /// The moment of the keys; none if they are not shown.
     pub of_keys: Option<f64>,
     /// The moment of the glTF files.
     pub at: Option<f64>,
-    /// What they show, if not all.
+    /// The animations that are shown.
     choice: AnimationChoice,
-    /// The one file whose animation is shown, if not all are.
+    /// The file whose animation is shown alone, if one is chosen.
     only: Option<Reading>,
 }
 
