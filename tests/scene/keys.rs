@@ -1,4 +1,4 @@
-//! Keys of scene files: meshes and lights at a time, against closed forms and scenes that do not move.
+//! Keys of scene files: meshes, lights and cameras at a time, against closed forms and scenes that do not move.
 
 use std::{fs, path::Path};
 
@@ -130,11 +130,55 @@ fn lights_change_by_their_keys() {
     assert_eq!(position, vec3(1.5, 2.0, 2.5));
 }
 
+const DISC: &str = "[[mesh]]\ngenerator = 'disc'\nradius = 1.5\nsegments = 8\n";
+
+/// A camera that keys move, and two named ones, of which they move the second.
+fn cameras() -> String {
+    "[camera]\ntarget = [0, 0, 1]\nkeys = [{ time = 0, eye = [0, 0, 30], vertical_fov = 20 }, \
+     { time = 1, eye = [4, 0, 30] }, { time = 3, eye = [4, 8, 26], target = [0, 2, 1], vertical_fov = 40 }]\n\
+     [[cameras]]\nname = 'still'\neye = [1, 2, 3]\ntarget = [0, 0, 0]\n\
+     [[cameras]]\nname = 'lift'\neye = [9, 2, 3]\ntarget = [0, 0, 0]\northographic_height = 4\n\
+     keys = [{ time = 1, eye = [1, 2, 3] }, { time = 2, eye = [1, 4, 3], orthographic_height = 6 }]\n"
+        .to_owned()
+        + DISC
+}
+
+#[test]
+fn cameras_are_where_their_keys_say() {
+    let still = |rest: &str| at(&format!("[camera]\n{rest}\n{DISC}"), None).camera;
+    for (time, own, lift) in [
+        (None, "eye = [0, 0, 30]\ntarget = [0, 0, 1]\nvertical_fov = 20", "eye = [9, 2, 3]\northographic_height = 4"),
+        (
+            Some(2.0),
+            "eye = [4, 4, 28]\ntarget = [0, 2, 1]\nvertical_fov = 33.333333333333336",
+            "eye = [1, 4, 3]\northographic_height = 6",
+        ),
+        (
+            Some(1.5),
+            "eye = [4, 2, 29]\ntarget = [0, 2, 1]\nvertical_fov = 30",
+            "eye = [1, 3, 3]\northographic_height = 6",
+        ),
+        (
+            Some(9.0),
+            "eye = [4, 8, 26]\ntarget = [0, 2, 1]\nvertical_fov = 40",
+            "eye = [1, 4, 3]\northographic_height = 6",
+        ),
+    ] {
+        let scene = at(&cameras(), time);
+        assert_eq!(scene.camera, still(own), "{time:?}");
+        let [a, b] = ["eye = [1, 2, 3]", lift].map(|rest| still(&format!("{rest}\ntarget = [0, 0, 0]")));
+        assert_eq!(scene.cameras, [("still".to_owned(), a), ("lift".to_owned(), b)], "{time:?}");
+    }
+    let info = &try_at(&cameras(), None, AnimationChoice::All).unwrap().animations[0];
+    assert_eq!((info.begin, info.end, info.n_moved, info.n_changed, info.fps), (0.0, 3.0, 0, 2, Some(1.0)));
+}
+
 #[test]
 fn wrong_keys_are_named() {
     let light = |keys: &str| {
         mesh("") + &format!("[[light]]\nkind = 'point'\nposition = [0, 0, 0]\nintensity = [1, 1, 1]\n{keys}\n")
     };
+    let camera = |keys: &str| format!("[camera]\neye = [1, 2, 30]\ntarget = [0, 0, 0]\n\n{keys}\n") + DISC;
     for (text, expected) in [
         (mesh("keys = [{ time = 1 }, { time = 0.5 }]"), "mesh 1: key 2: its time, 0.5 s, is not after that of the key"),
         (mesh("keys = [{ time = 1 }, { time = 1 }]"), "mesh 1: key 2: its time, 1 s, is not after that of the key"),
@@ -160,6 +204,11 @@ fn wrong_keys_are_named() {
             "light 1: key 2: position",
         ),
         (light("keys = [3]"), "light 1: keys: "),
+        (camera("keys = [{ time = 1, eye = [0, nan, 0] }]"), "s.toml:1: camera: key 1: eye"),
+        (camera("keys = [{ time = 1, eye = [0, 0, 0] }]"), "camera: key 1: eye, target and up span no picture"),
+        (camera("keys = [{ time = 1, name = 'b' }]"), "camera: key 1: `name` is neither a number nor numbers"),
+        (camera("[[cameras]]\neye = [1, 2, 3]\ntarget = [0, 0, 0]"), "s.toml:5: camera 1: missing field `name`"),
+        (camera("[[cameras]]\nname = 3"), "s.toml:5: camera 1: its `name` is no string"),
     ] {
         let error = try_at(&text, Some(0.0), AnimationChoice::All).expect_err(&text);
         assert!(error.contains(expected) && error.contains("s.toml:") && error.lines().count() == 1, "{error}");
@@ -230,6 +279,12 @@ fn the_worlds_of_a_scene_file_are_those_of_its_scenes() {
         let shares = keeps && path == &still_light;
         check_worlds(path, keeps, shares);
     }
+    let light = "[[light]]\nkind = 'point'\nposition = [0, 9, 0]\nintensity = [90, 90, 90]\n";
+    let moving_camera = write("camera.toml", &(cameras() + light));
+    for camera in [None, Some("lift".to_owned()), Some("0".to_owned())] {
+        let options = LoadOptions { camera, ..LoadOptions::default() };
+        check_worlds_with(&moving_camera, &options, true, true);
+    }
     let told = |path: &Path| animations_of(path, &LoadOptions::default()).unwrap();
     assert_eq!(told(&packed), told(&by_keys));
     assert_eq!(told(&all).iter().map(|it| it.n_moved).collect::<Vec<_>>(), [2, 1]);
@@ -238,10 +293,14 @@ fn the_worlds_of_a_scene_file_are_those_of_its_scenes() {
 /// The worlds of a file that plays are those of its scenes, whose instances are kept or not. `shares`: whether nothing
 /// moves but instances, so that trees are shared.
 pub fn check_worlds(path: &Path, keeps: bool, shares: bool) {
+    check_worlds_with(path, &LoadOptions::default(), keeps, shares);
+}
+
+fn check_worlds_with(path: &Path, options: &LoadOptions, keeps: bool, shares: bool) {
     let request = |at: f64| {
-        let mut request = LoadRequest::pictures(PictureChoices::default());
-        request.scene.at = Some(at);
-        request
+        let pictures = LoadRequest::pictures(PictureChoices::default());
+        let camera = options.camera.clone();
+        LoadRequest { scene: LoadOptions { at: Some(at), camera, ..pictures.scene.clone() }, ..pictures }
     };
     let world_at = |at: f64| {
         let scene = Opened::read(path, &request(at)).unwrap().scene;

@@ -12,11 +12,12 @@ use toml::{Spanned, Table};
 
 use super::{
     animations::{Animations, Moving, infos_of_files},
+    cameras::Cameras,
     description::{
         AmbientSpec, CameraSpec, Description, EnvironmentSpec, HemispheresSpec, LightSpec, MeshSpec, RenderSpec,
         SceneDenoise, SkySpec,
     },
-    keys::{self, MovingLight},
+    keys::{self, KeyedTable},
     overrides::NamedMaterials,
     placed::{MeshTable, Placer},
 };
@@ -61,7 +62,8 @@ pub(crate) struct Assembled {
     /// The meshes that keys move.
     pub moving: Vec<Moving>,
     /// All lights of the file.
-    pub lights: Vec<MovingLight>,
+    pub lights: Vec<KeyedTable>,
+    pub cameras: Cameras,
     /// Whether animations of glTF files are shown.
     pub plays_files: bool,
 }
@@ -131,7 +133,8 @@ fn assemble(file: &File, description: Description, options: &LoadOptions) -> Res
     let indices = add_materials(file, (&mut scene, &mut images), &description.materials)?;
     let lights = lights(file, description.light)?;
     let tables = mesh_tables(file, description.mesh)?;
-    let own = own_animation(&tables, &lights);
+    let cameras = Cameras::new(file, description.camera.as_ref(), &description.cameras)?;
+    let own = own_animation(&tables, (&lights, &cameras));
     let moment = Animations::new(file, (&tables, own), options)?;
     scene.lights = lights_at(file.path, &lights, (moment.of_keys, DVec3::ZERO))?;
     warn_of_black(file, &scene.lights);
@@ -189,31 +192,27 @@ fn assemble(file: &File, description: Description, options: &LoadOptions) -> Res
         scene.lights = lights_at(file.path, &lights, (moment, scene.origin))?;
     }
     extent::check(file.path, scene.bounds())?;
-    let origin = scene.origin;
-    for (ix, spec) in description.cameras.iter().enumerate() {
-        let named = file.check(&format!("camera {}", ix + 1), spec, |spec| camera(&spec.camera(), origin))?;
-        scene.cameras.push((spec.get_ref().name.clone(), named));
-    }
-    scene.camera = match (&description.camera, scene.cameras.first()) {
-        (Some(spec), _) => file.check("camera", spec, |spec| camera(spec, origin))?,
-        (None, Some((_, first))) => *first,
-        (None, None) => scene.camera,
-    };
-    Ok(Assembled { scene, lacks, moving, lights, plays_files })
+    cameras.pose(file.path, moment, &mut scene)?;
+    Ok(Assembled { scene, lacks, moving, lights, cameras, plays_files })
 }
 
 /// Returns what is known of the animations of a scene file: its keys, and those of the glTF files that it names.
 pub(crate) fn animations(path: &Path, options: &LoadOptions) -> Result<Vec<AnimationInfo>, SceneError> {
     let file = File { path, text: &read_utf8(path)?, access: Access::of(options) };
-    let Description { mesh, light, .. } = file.parse()?;
+    let Description { mesh, light, camera, cameras, .. } = file.parse()?;
     let (tables, lights) = (mesh_tables(&file, mesh)?, lights(&file, light)?);
+    let cameras = Cameras::new(&file, camera.as_ref(), &cameras)?;
     let of_files = infos_of_files(&file, &tables, options)?;
-    Ok(own_animation(&tables, &lights).into_iter().chain(of_files.into_iter().flat_map(|(_, infos)| infos)).collect())
+    Ok(own_animation(&tables, (&lights, &cameras))
+        .into_iter()
+        .chain(of_files.into_iter().flat_map(|(_, infos)| infos))
+        .collect())
 }
 
 /// Returns the animation that the keys of a scene file are, if there are any.
-fn own_animation(tables: &[MeshTable], lights: &[MovingLight]) -> Option<AnimationInfo> {
-    keys::info(tables.iter().map(|table| table.spec.place.times()), lights.iter().map(MovingLight::times))
+fn own_animation(tables: &[MeshTable], (lights, cameras): (&[KeyedTable], &Cameras)) -> Option<AnimationInfo> {
+    let changed = lights.iter().map(KeyedTable::times).chain(cameras.times());
+    keys::info(tables.iter().map(|table| table.spec.place.times()), changed)
 }
 
 /// Reads the tables of meshes.
@@ -275,12 +274,12 @@ fn ambient(spec: &AmbientSpec) -> Checked<(Vec3, Option<Ground>)> {
 }
 
 /// Reads the tables of lights, which are checked as they rest and at all keys.
-fn lights(file: &File, tables: Vec<Spanned<Table>>) -> Result<Vec<MovingLight>, SceneError> {
+fn lights(file: &File, tables: Vec<Spanned<Table>>) -> Result<Vec<KeyedTable>, SceneError> {
     let read = |(number, table): (usize, Spanned<Table>)| {
         let read = |table: &Table| {
-            let moving = MovingLight::new(table.clone())?;
-            moving.check(|spec| light(spec, DVec3::ZERO))?;
-            Ok(moving)
+            let keyed = KeyedTable::new(table.clone())?;
+            keyed.check(|spec| light(spec, DVec3::ZERO))?;
+            Ok(keyed)
         };
         file.check(&format!("light {number}"), &table, read)
     };
@@ -291,11 +290,11 @@ fn lights(file: &File, tables: Vec<Spanned<Table>>) -> Result<Vec<MovingLight>, 
 /// space.
 pub(crate) fn lights_at(
     path: &Path,
-    lights: &[MovingLight],
+    lights: &[KeyedTable],
     (seconds, origin): (Option<f64>, DVec3),
 ) -> Result<Vec<Light>, SceneError> {
-    let at = |(number, moving): (usize, &MovingLight)| {
-        let light = moving.at(seconds).and_then(|spec| light(&spec, origin));
+    let at = |(number, keyed): (usize, &KeyedTable)| {
+        let light = keyed.at(seconds).and_then(|spec| light(&spec, origin));
         light.map_err(|what| SceneError::file(path, format!("light {number}: {what}")))
     };
     (1..).zip(lights).map(at).collect()

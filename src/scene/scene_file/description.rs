@@ -21,12 +21,12 @@ use crate::scene::{
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Description {
-    /// Camera; where absent, and without `cameras`, `standard` chooses one.
-    pub camera: Option<Spanned<CameraSpec>>,
-    /// Cameras with names. Without `camera`, the first one is the scene's.
+    /// Camera, as a table that `KeyedTable::new` reads; where absent, and without `cameras`, `standard` chooses one.
+    pub camera: Option<Spanned<Table>>,
+    /// Cameras, as such tables that have a `name`. Without `camera`, the first one is the scene's.
     #[serde(default)]
-    pub cameras: Vec<Spanned<NamedCameraSpec>>,
-    /// Lights, as tables that `MovingLight::new` reads; without any and without `ambient`, `standard` chooses lights,
+    pub cameras: Vec<Spanned<Table>>,
+    /// Lights, as tables that `KeyedTable::new` reads; without any and without `ambient`, `standard` chooses lights,
     /// `ambient` and, where absent, `background`.
     #[serde(default)]
     pub light: Vec<Spanned<Table>>,
@@ -82,26 +82,6 @@ pub(crate) struct CameraSpec {
     pub vertical_fov: Option<f32>,
     /// Distance between the picture's lower and upper edge, world units; makes the camera orthographic.
     pub orthographic_height: Option<f32>,
-}
-
-/// One `[[cameras]]` table: a camera with a name.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct NamedCameraSpec {
-    pub name: String,
-    eye: [f64; 3],
-    target: [f64; 3],
-    up: Option<[f32; 3]>,
-    vertical_fov: Option<f32>,
-    orthographic_height: Option<f32>,
-}
-
-impl NamedCameraSpec {
-    /// Returns the camera without its name.
-    pub fn camera(&self) -> CameraSpec {
-        let &Self { eye, target, up, vertical_fov, orthographic_height, .. } = self;
-        CameraSpec { eye, target, up, vertical_fov, orthographic_height }
-    }
 }
 
 #[derive(Debug, Deserialize)]

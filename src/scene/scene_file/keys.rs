@@ -1,8 +1,9 @@
-//! `keys` of meshes and lights in scene files: what they state at some times, and what lies between.
+//! `keys` of meshes, lights and cameras in scene files: what they state at some times, and what lies between.
 
+use serde::de::DeserializeOwned;
 use toml::{Table, Value};
 
-use super::description::{LightSpec, read};
+use super::description::read;
 use crate::scene::model::{
     AnimationInfo,
     error::Checked,
@@ -44,9 +45,9 @@ pub(crate) fn moving(rest: &TransformSpec, keys: Vec<Table>) -> Checked<MovingTr
     MovingTransform::new(rest, &timed(keys, read::<TransformSpec>)?)
 }
 
-/// A light, whose keys may change each of its numbers.
+/// A table, such as that of a light or a camera, whose keys may change each of its numbers.
 #[derive(Clone, Debug)]
-pub(crate) struct MovingLight {
+pub(crate) struct KeyedTable {
     /// What is stated beside the keys.
     rest: Table,
     /// What changes, by its name. A number is a list of one.
@@ -55,7 +56,7 @@ pub(crate) struct MovingLight {
     times: Vec<f64>,
 }
 
-impl MovingLight {
+impl KeyedTable {
     pub fn new(mut rest: Table) -> Checked<Self> {
         let keys = match rest.remove("keys") {
             Some(keys) => keys.try_into().map_err(|e: toml::de::Error| format!("keys: {}", e.message()))?,
@@ -63,14 +64,14 @@ impl MovingLight {
         };
         let keys =
             timed(keys, |key| key.into_iter().map(|(name, value)| Ok((numbers(&name, value)?, name))).collect())?;
-        let mut light = Self { rest, tracks: Vec::new(), times: keys.iter().map(|key| key.0).collect() };
+        let mut keyed = Self { rest, tracks: Vec::new(), times: keys.iter().map(|key| key.0).collect() };
         for (number, (time, stated)) in (1..).zip(keys) {
             let stated: Vec<(Vec<f64>, String)> = stated;
             for (value, name) in stated {
-                light.push((number, time), name, value)?;
+                keyed.push((number, time), name, value)?;
             }
         }
-        Ok(light)
+        Ok(keyed)
     }
 
     fn push(&mut self, (number, time): (usize, f64), name: String, value: Vec<f64>) -> Checked<()> {
@@ -91,8 +92,8 @@ impl MovingLight {
         }
     }
 
-    /// Returns the light at a moment, seconds, or as it rests.
-    pub fn at(&self, seconds: Option<f64>) -> Checked<LightSpec> {
+    /// Reads the table as it is at a moment, seconds, or at rest.
+    pub fn at<T: DeserializeOwned>(&self, seconds: Option<f64>) -> Checked<T> {
         let mut table = self.rest.clone();
         for (name, track) in &self.tracks {
             if seconds.is_none() && table.contains_key(name) {
@@ -108,8 +109,8 @@ impl MovingLight {
         read(table)
     }
 
-    /// Checks the light as it rests and at each of its keys.
-    pub fn check<T>(&self, check: impl Fn(&LightSpec) -> Checked<T>) -> Checked<()> {
+    /// Checks the table at rest and at each of its keys.
+    pub fn check<T: DeserializeOwned, U>(&self, check: impl Fn(&T) -> Checked<U>) -> Checked<()> {
         check(&self.at(None)?)?;
         for (number, time) in (1..).zip(&self.times) {
             let checked = self.at(Some(*time)).and_then(|spec| check(&spec));
@@ -139,16 +140,16 @@ fn numbers(name: &str, value: Value) -> Checked<Vec<f64>> {
 }
 
 /// Returns what is known of the keys of a scene file as an animation, or `None` if nothing has any. `meshes` and
-/// `lights`: the times of the keys of each.
+/// `tables`: the times of the keys of each mesh, and of each light and camera.
 pub(crate) fn info<'a>(
     mut meshes: impl Iterator<Item = &'a [f64]>,
-    mut lights: impl Iterator<Item = &'a [f64]>,
+    mut tables: impl Iterator<Item = &'a [f64]>,
 ) -> Option<AnimationInfo> {
     let mut key_times = KeyTimes::default();
     let mut add = |all: &mut dyn Iterator<Item = &'a [f64]>| {
         all.filter(|times| !times.is_empty()).inspect(|times| key_times.add(times)).count()
     };
-    let (n_moved, n_changed) = (add(&mut meshes), add(&mut lights));
+    let (n_moved, n_changed) = (add(&mut meshes), add(&mut tables));
     let ((begin, end), fps) = (key_times.ends(), key_times.fps());
     let info = AnimationInfo { name: NAME.to_owned(), begin, end, fps, n_moved, n_morphed: 0, n_changed };
     (n_moved + n_changed > 0).then_some(info)

@@ -2,6 +2,7 @@
 
 pub(crate) mod animations;
 pub(crate) mod assemble;
+pub(crate) mod cameras;
 pub(crate) mod convert;
 pub(crate) mod description;
 pub(crate) mod keys;

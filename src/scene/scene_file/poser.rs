@@ -1,11 +1,13 @@
-//! A scene file whose meshes and lights are posed by their keys at one moment after the other. The file is read once.
+//! A scene file whose meshes, lights and cameras are posed by their keys at one moment after the other. The file is
+//! read once.
 
 use std::path::{Path, PathBuf};
 
 use super::{
     animations::Moving,
     assemble::{Assembled, lights_at, load_toml},
-    keys::MovingLight,
+    cameras::Cameras,
+    keys::KeyedTable,
 };
 use crate::scene::model::{Instance, LoadOptions, Scene, SceneError};
 
@@ -13,22 +15,26 @@ use crate::scene::model::{Instance, LoadOptions, Scene, SceneError};
 pub(crate) struct KeyPoser {
     path: PathBuf,
     moving: Vec<Moving>,
-    lights: Vec<MovingLight>,
+    lights: Vec<KeyedTable>,
     /// Whether the scene's lights are the file's.
     has_lights: bool,
+    cameras: Cameras,
+    /// The camera that the options choose.
+    camera: Option<String>,
 }
 
 impl KeyPoser {
     /// Reads a file, whose scene at the moment of the options is known. Returns `None` if animations of glTF files are
     /// shown, or if the scene's instances are not the file's.
     pub fn new(path: &Path, options: &LoadOptions, scene: &Scene) -> Option<Self> {
-        let Assembled { scene: own, moving, lights, plays_files, .. } = load_toml(path, options).ok()?;
+        let Assembled { scene: own, moving, lights, cameras, plays_files, .. } = load_toml(path, options).ok()?;
         let is_same = |(a, b): (&Instance, &Instance)| a.mesh_ix == b.mesh_ix && a.transform == b.transform;
         let fits = own.origin == scene.origin
             && own.instances.len() <= scene.instances.len()
             && own.instances.iter().zip(&scene.instances).all(is_same);
         let has_lights = own.lights == scene.lights && !lights.is_empty();
-        (fits && !plays_files).then(|| Self { path: path.to_owned(), moving, lights, has_lights })
+        let (path, camera) = (path.to_owned(), options.camera.clone());
+        (fits && !plays_files).then_some(Self { path, moving, lights, has_lights, cameras, camera })
     }
 
     /// Poses a scene of the file at a moment, seconds.
@@ -38,6 +44,10 @@ impl KeyPoser {
         }
         if self.has_lights {
             scene.lights = lights_at(&self.path, &self.lights, (Some(seconds), scene.origin))?;
+        }
+        self.cameras.pose(&self.path, Some(seconds), scene)?;
+        if let Some(name) = &self.camera {
+            scene.choose_camera(name).map_err(|what| SceneError::file(&self.path, what))?;
         }
         Ok(())
     }
