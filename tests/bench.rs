@@ -327,6 +327,7 @@ fn motion_measures_the_parts_of_frames() {
         check_xml(&svg);
         assert_eq!((json["suite"].as_str(), json["n_frames"].as_u64()), (Some("motion"), Some(5)));
         assert_eq!(json["keeps_instances"], !more.contains(&"flatten"));
+        assert_eq!((&json["n_moved"], &json["n_deformed"]), (&Value::from(1), &Value::from(1)), "{json}");
         let median = |part: &Value| part["ms"]["median"].as_f64().unwrap();
         let parts = json["parts"].as_array().unwrap();
         let names: Vec<_> = parts.iter().map(|part| part["name"].as_str().unwrap()).collect();

@@ -11,7 +11,7 @@ use super::{
     warm_up,
 };
 use crate::{
-    engine::{AnimatedWorld, Engine, LoadError, MomentTimes, Renderer},
+    engine::{AnimatedWorld, Engine, LoadError, MomentWork, Renderer},
     frame::{Goal, Profile, RenderOptions},
     scene::{AnimationChoice, AnimationInfo, Camera},
     world::World,
@@ -36,7 +36,7 @@ pub fn moments(
 /// Times of a frame, milliseconds.
 #[derive(Clone, Debug)]
 pub struct FrameTimes {
-    pub moment: MomentTimes,
+    pub world: MomentWork,
     /// Time of giving the renderer the new world.
     pub upload_ms: f64,
     /// What the passes have taken.
@@ -69,7 +69,7 @@ fn frame(renderer: &mut Renderer, animated: &mut AnimatedWorld, moment: f64) -> 
     let upload_ms = uploading.elapsed().as_secs_f64() * 1e3;
     let profile = renderer.draw(&camera, Goal::Samples(1), || ())?.profile;
     let wall_ms = begin.elapsed().as_secs_f64() * 1e3;
-    Ok(FrameTimes { moment: animated.times(), upload_ms, profile, wall_ms })
+    Ok(FrameTimes { world: animated.work(), upload_ms, profile, wall_ms })
 }
 
 /// A part of a frame, and its times.
@@ -90,6 +90,9 @@ pub struct Report {
     pub n_triangles: usize,
     /// Whether meshes are kept apart, so that only what moves is built and uploaded.
     pub keeps_instances: bool,
+    /// The most instances that move in a frame, and the most meshes that are deformed in one.
+    pub n_moved: usize,
+    pub n_deformed: usize,
     pub integrator: String,
     pub width: u32,
     pub height: u32,
@@ -121,15 +124,26 @@ impl Report {
         }
         let pass = |name| Part { name, ms: of_profiles(&|profile| profile.pass_ms(name)) };
         let parts = vec![
-            Part { name: "pose", ms: of(|it| it.moment.pose_ms) },
-            Part { name: "build", ms: of(|it| it.moment.build_ms) },
+            Part { name: "pose", ms: of(|it| it.world.pose_ms) },
+            Part { name: "build", ms: of(|it| it.world.build_ms) },
             Part { name: "upload", ms: of(|it| it.upload_ms) },
             Part { name: "passes", ms: of_profiles(&|profile| profile.frame_ms) },
         ];
         let total_ms: f64 = times.iter().map(|it| it.wall_ms).sum();
         let passes = names.into_iter().map(pass).collect();
         let frames_per_s = times.len() as f64 / total_ms * 1e3;
-        Self { n_frames: times.len(), parts, passes, wall_ms: of(|it| it.wall_ms), frames_per_s, ..self }
+        let most = |count: fn(&MomentWork) -> usize| times.iter().map(|it| count(&it.world)).max().unwrap_or(0);
+        let (n_moved, n_deformed) = (most(|it| it.n_moved), most(|it| it.n_deformed));
+        Self {
+            n_moved,
+            n_deformed,
+            n_frames: times.len(),
+            parts,
+            passes,
+            wall_ms: of(|it| it.wall_ms),
+            frames_per_s,
+            ..self
+        }
     }
 
     /// Returns a chart of the parts of a frame.

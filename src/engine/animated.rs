@@ -34,16 +34,21 @@ pub struct AnimatedWorld {
     world: World,
     /// The meshes of the scene, in ascending order, that differ from the world's: the last moment had no world.
     deformed: Vec<usize>,
-    times: MomentTimes,
+    work: MomentWork,
 }
 
-/// Times of making the world of a moment, milliseconds.
+/// What the world of a moment took.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct MomentTimes {
-    /// Time of placing what moves and of deforming meshes, or of reading the file if it is read again.
+pub struct MomentWork {
+    /// Time of placing what moves and of deforming meshes, or of reading the file if it is read again, milliseconds.
     pub pose_ms: f64,
-    /// Time of building what rays search, and whatever else the new world does not share.
+    /// Time of building what rays search, and whatever else the new world does not share, milliseconds.
     pub build_ms: f64,
+    /// The number of instances that have moved since the world before. The tree over the instances is built for them.
+    pub n_moved: usize,
+    /// The number of meshes whose vertices have changed since then, of which each needs a new tree or grid. If the file
+    /// is read again and has other meshes, all of them count.
+    pub n_deformed: usize,
 }
 
 impl AnimatedWorld {
@@ -52,7 +57,7 @@ impl AnimatedWorld {
     pub fn new(path: &Path, request: &LoadRequest, scene: Scene, world: &World) -> Self {
         let poser = with_default(&Dispatch::none(), || Poser::new(path, &request.scene, &scene));
         let (path, request, world) = (path.to_owned(), request.clone(), world.clone());
-        Self { path, request, poser, scene, world, deformed: Vec::new(), times: MomentTimes::default() }
+        Self { path, request, poser, scene, world, deformed: Vec::new(), work: MomentWork::default() }
     }
 
     /// Chooses the animations that further moments show.
@@ -61,9 +66,9 @@ impl AnimatedWorld {
         self.request.scene.animation = animation;
     }
 
-    /// Returns the times of the last moment that had a world.
-    pub fn times(&self) -> MomentTimes {
-        self.times
+    /// Returns what the last moment that had a world took.
+    pub fn work(&self) -> MomentWork {
+        self.work
     }
 
     /// Returns the world at another moment, seconds, and its camera. A warning tells of things that cannot be shown
@@ -86,8 +91,8 @@ impl AnimatedWorld {
         match self.posed(&self.scene, &before) {
             Ok(world) => {
                 self.world = world.clone();
+                self.work = MomentWork::of([begin, posed], (&self.scene, &before.0), self.deformed.len());
                 self.deformed.clear();
-                self.times = MomentTimes::of([begin, posed]);
                 Ok((world, self.scene.camera))
             }
             Err(error) => {
@@ -141,7 +146,8 @@ impl AnimatedWorld {
             });
         let before = || (self.scene.instances.clone(), self.scene.lights.clone());
         let world = if is_same { self.posed(&scene, &before())? } else { self.built(&scene)? };
-        self.times = MomentTimes::of([begin, posed]);
+        let n_deformed = if is_same { 0 } else { scene.meshes.len() };
+        self.work = MomentWork::of([begin, posed], (&scene, &self.scene.instances), n_deformed);
         Ok((world, scene.camera))
     }
 
@@ -175,11 +181,13 @@ impl AnimatedWorld {
     }
 }
 
-impl MomentTimes {
-    /// Returns the times of a moment that is ready now. `begin`, `posed`: when its work began, and when what moves had
-    /// its place.
-    fn of([begin, posed]: [Instant; 2]) -> Self {
+impl MomentWork {
+    /// Returns the work on a moment that is ready now. `begin`, `posed`: when it began, and when what moves had its
+    /// place. `before`: the instances of the world before.
+    fn of([begin, posed]: [Instant; 2], (scene, before): (&Scene, &[Instance]), n_deformed: usize) -> Self {
         let ms = |time: Duration| time.as_secs_f64() * 1e3;
-        Self { pose_ms: ms(posed - begin), build_ms: ms(posed.elapsed()) }
+        let has_moved = |(now, before): &(&Instance, &Instance)| now.transform != before.transform;
+        let n_moved = scene.instances.iter().zip(before).filter(has_moved).count();
+        Self { pose_ms: ms(posed - begin), build_ms: ms(posed.elapsed()), n_moved, n_deformed }
     }
 }

@@ -20,7 +20,7 @@ mod renderer;
 use std::sync::Arc;
 
 #[cfg(feature = "files")]
-pub use self::animated::{AnimatedWorld, MomentTimes};
+pub use self::animated::{AnimatedWorld, MomentWork};
 use self::choices::{Cache, Methods, Processor, Request, Workload};
 pub use self::{
     caster::Caster,

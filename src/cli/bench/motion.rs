@@ -57,6 +57,8 @@ pub fn run(args: &MotionArgs) -> Result<(), CliError> {
         scene: world.scene().name.clone(),
         n_triangles,
         keeps_instances: world.scene().instances.is_some(),
+        n_moved: 0,
+        n_deformed: 0,
         integrator: integrator.to_string(),
         width,
         height,
@@ -75,7 +77,9 @@ pub fn run(args: &MotionArgs) -> Result<(), CliError> {
 /// The report as text that ends with a line break.
 fn text(report: &Report) -> String {
     let kept = if report.keeps_instances { "kept apart" } else { "stored as one" };
-    let mut text = format!("{}: {} triangles, meshes {kept}\n", report.scene, report.n_triangles);
+    let Report { scene, n_triangles, n_moved, n_deformed, .. } = report;
+    let mut text = format!("{scene}: {n_triangles} triangles, meshes {kept}\n");
+    text += &format!("in a frame, at most {n_moved} instances move and {n_deformed} meshes are deformed\n");
     text += &format!("{}x{} by {} on {}", report.width, report.height, report.integrator, report.device);
     text += &report.driver.as_ref().map_or_else(String::new, |driver| format!(", {driver}"));
     text += &format!(", {} frames, {} a second of the animation\n\n", report.n_frames, report.fps);
