@@ -23,6 +23,7 @@
 //! # Documents
 //!
 //! - [`documents::guide`]: scene files, rendering, layers, films, the viewer, casting rays, measuring.
+//! - [`documents::python`]: the package for Python, beside Open3D and trimesh.
 //! - [`documents::materials`]: the material model, light units, what MTL and glTF become, textures.
 //! - [`documents::architecture`]: the way of the data; adding a pass, an array, a traversal, an acceleration
 //!   structure.
@@ -127,6 +128,8 @@ pub mod view;
 pub mod documents {
     #[doc = include_str!("../docs/guide.md")]
     pub mod guide {}
+    #[doc = include_str!("../docs/python.md")]
+    pub mod python {}
     #[doc = include_str!("../docs/materials.md")]
     pub mod materials {}
     #[doc = include_str!("../docs/architecture.md")]

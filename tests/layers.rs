@@ -155,6 +155,8 @@ fn unsafe_code_is_in_the_vulkan_layer() {
     for root in ["src/lib.rs", "src/main.rs"] {
         assert!(fs::read_to_string(root).unwrap().contains("#![deny(unsafe_code)]"), "{root}");
     }
+    let manifest = fs::read_to_string("python/Cargo.toml").unwrap();
+    assert!(manifest.contains("[lints.rust]\nunsafe_code = \"forbid\""), "the package for Python has none");
     let allows = |path: &PathBuf| fs::read_to_string(path).unwrap().contains("allow(unsafe_code");
     let found: Vec<_> = sources(Path::new("src")).into_iter().filter(allows).collect();
     assert!(!found.is_empty() && found.iter().all(|path| path.starts_with("src/gpu")), "{found:?}");

@@ -313,8 +313,16 @@ enum Held<'a> {
 impl<'a> CpuCaster<'a> {
     /// Creates a caster, and computes the links (such as ropes) that the traversal reads in addition to the tree.
     pub fn new(geometry: Geometry<'a>, traversal: Traversal) -> Self {
+        Self::of_held(Held::Borrowed(geometry), geometry, traversal)
+    }
+
+    /// Creates a caster that keeps the world.
+    pub fn of_world(world: &World, traversal: Traversal) -> CpuCaster<'static> {
+        CpuCaster::of_held(Held::Kept(world.clone()), world.geometry(), traversal)
+    }
+
+    fn of_held(held: Held<'a>, geometry: Geometry, traversal: Traversal) -> Self {
         let links = TraversalLinks::of(geometry.accel(), traversal);
-        let held = Held::Borrowed(geometry);
         Self { held, traversal, links, wide: OnceLock::new(), n_scattered: AtomicUsize::new(0), hidden: None }
     }
 

@@ -31,6 +31,18 @@ impl<'a> Caster<'a> {
         }))
     }
 
+    /// Does what [`Self::new`] does for a world, which the caster keeps.
+    pub(super) fn of_world(
+        context: Option<&Arc<Context>>,
+        world: &World,
+        traversal: Traversal,
+    ) -> Result<Caster<'static>, GpuError> {
+        Ok(Caster(match context {
+            Some(context) => Backend::Device(Box::new(cast::GpuCaster::new(context, world.geometry(), traversal)?)),
+            None => Backend::Cpu(Box::new(CpuCaster::of_world(world, traversal))),
+        }))
+    }
+
     /// Makes rays pass through the triangles with these indices. A second call replaces the indices of the first.
     ///
     /// # Errors

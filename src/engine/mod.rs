@@ -164,6 +164,14 @@ impl Engine {
         Caster::new(self.context(), geometry, traversal)
     }
 
+    /// Creates a caster that keeps the world, and so may live as long as anybody likes.
+    ///
+    /// # Errors
+    /// Fails as [`Engine::caster`] does.
+    pub fn caster_of_world(&self, world: &World, traversal: Traversal) -> Result<Caster<'static>, GpuError> {
+        Caster::of_world(self.context(), world, traversal)
+    }
+
     /// Draws one picture from the scene's own camera with one sample per pixel. The engine's choices of traversal and
     /// primary visibility replace those of the options.
     ///

@@ -1,0 +1,458 @@
+//! The class `Core`: a scene behind a lock.
+
+use std::{
+    mem,
+    sync::{Mutex, MutexGuard, PoisonError},
+    thread::{self, ThreadId},
+};
+
+use bytemuck::{cast_slice, cast_slice_mut};
+use glam::{DMat4, DVec3, DVec4, Vec3};
+use kdray::{
+    accel::Query,
+    cast::{NO_TRIANGLE, QueryPoint, Ray},
+    engine::Engine,
+    gpu::DeviceSelector,
+};
+use numpy::{
+    IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyReadwriteArray1, PyReadwriteArray2,
+    PyUntypedArrayMethods,
+};
+use pyo3::{exceptions::PyRuntimeError, prelude::*};
+use rayon::prelude::*;
+
+use super::{
+    columns::{Columns, Found},
+    process::{check_fork, is_forked, open, pool},
+    state::{Need, State, failed},
+};
+
+/// Rays that are cast between two looks at Ctrl-C: a batch of a device, or some tenths of a second of the CPU.
+const RAYS_AT_ONCE: [usize; 2] = [1 << 21, 1 << 18];
+/// The same number of queries that take longer.
+const QUERIES_AT_ONCE: [usize; 2] = [1 << 20, 1 << 16];
+
+/// A scene. Arrays are C-contiguous and of the stated types: `kdray/scene.py` sees to it.
+#[pyclass(frozen, module = "kdray._kdray")]
+pub struct Core {
+    /// `None` after the scene was closed.
+    state: Mutex<Option<State>>,
+    /// The thread that has locked the state.
+    owner: Mutex<Option<ThreadId>>,
+    device_name: String,
+}
+
+/// Which device a scene uses.
+#[derive(FromPyObject)]
+pub enum Selector {
+    #[pyo3(transparent)]
+    Index(usize),
+    #[pyo3(transparent)]
+    Name(String),
+}
+
+/// t, geometry_ids, primitive_ids, uvs, normals.
+type Outputs<'py> = (
+    PyReadwriteArray1<'py, f32>,
+    PyReadwriteArray1<'py, u32>,
+    PyReadwriteArray1<'py, u32>,
+    PyReadwriteArray2<'py, f32>,
+    PyReadwriteArray2<'py, f32>,
+);
+
+/// ray_splits, ray_ids, t_hit, geometry_ids, primitive_ids, uvs.
+type Lists<'py> = (
+    Bound<'py, PyArray1<u32>>,
+    Bound<'py, PyArray1<u32>>,
+    Bound<'py, PyArray1<f32>>,
+    Bound<'py, PyArray1<u32>>,
+    Bound<'py, PyArray1<u32>>,
+    Bound<'py, PyArray1<f32>>,
+);
+
+/// Rays as Python hands them over.
+struct Rows<'a> {
+    rows: &'a [f32],
+    /// 6 or 8.
+    width: usize,
+    t_min: &'a [f32],
+    t_max: &'a [f32],
+}
+
+/// t_min and t_max: one for all rays, or one for each.
+type Range<'py> = (PyReadonlyArray1<'py, f32>, PyReadonlyArray1<'py, f32>);
+
+impl<'a> Rows<'a> {
+    fn new(rays: &'a PyReadonlyArray2<f32>, (t_min, t_max): &'a Range) -> PyResult<Self> {
+        let (t_min, t_max) = (t_min.as_slice()?, t_max.as_slice()?);
+        Ok(Self { width: rays.shape()[1], rows: rays.as_slice()?, t_min, t_max })
+    }
+
+    fn len(&self) -> usize {
+        self.rows.len() / self.width
+    }
+
+    /// Returns the rays from `first` on, `n` at most.
+    fn rays(&self, first: usize, n: usize) -> Vec<Ray> {
+        let at = |values: &[f32], ix: usize| if values.len() == 1 { values[0] } else { values[ix] };
+        let ray = |ix: usize| {
+            let row = &self.rows[ix * self.width..][..self.width];
+            let (t_min, t_max) = match row {
+                [.., t_min, t_max] if self.width == 8 => (*t_min, *t_max),
+                _ => (at(self.t_min, ix), at(self.t_max, ix)),
+            };
+            Ray { origin: Vec3::from_slice(row), t_min, direction: Vec3::from_slice(&row[3..]), t_max }
+        };
+        (first..self.len().min(first + n)).into_par_iter().with_min_len(1024).map(ray).collect()
+    }
+}
+
+impl Drop for Core {
+    /// A forked child has neither the threads nor the device that would be waited for.
+    fn drop(&mut self) {
+        if is_forked() {
+            // The lock may be held by a thread that the child does not have.
+            mem::forget(self.state.get_mut().unwrap_or_else(PoisonError::into_inner).take());
+        }
+    }
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Names the owner of a lock, until it is dropped.
+struct Owned<'a>(&'a Mutex<Option<ThreadId>>);
+
+impl<'a> Owned<'a> {
+    fn new(owner: &'a Mutex<Option<ThreadId>>, caller: ThreadId) -> Self {
+        *locked(owner) = Some(caller);
+        Self(owner)
+    }
+}
+
+impl Drop for Owned<'_> {
+    fn drop(&mut self) {
+        *locked(self.0) = None;
+    }
+}
+
+impl Core {
+    /// Calls `f` with the scene, or with none if the scene is closed. No other thread uses it meanwhile, and the GIL is
+    /// released.
+    fn locked<T: Send>(&self, py: Python, f: impl FnOnce(&mut Option<State>) -> PyResult<T> + Send) -> PyResult<T> {
+        check_fork()?;
+        let caller = thread::current().id();
+        // Between chunks, Python may run handlers of signals and finalizers.
+        if *locked(&self.owner) == Some(caller) {
+            return Err(PyRuntimeError::new_err("the scene is in use by a call that this one interrupts"));
+        }
+        py.detach(|| {
+            let mut state = locked(&self.state);
+            let _owned = Owned::new(&self.owner, caller);
+            f(&mut state)
+        })
+    }
+
+    fn with<T: Send>(&self, py: Python, f: impl FnOnce(&mut State) -> PyResult<T> + Send) -> PyResult<T> {
+        let closed = || PyRuntimeError::new_err("the scene is closed");
+        self.locked(py, |state| f(state.as_mut().ok_or_else(closed)?))
+    }
+
+    /// Does the same on a pool of threads. The lock is taken first: a thread of the pool that waited for it could be
+    /// the one whose help the owner of the lock needs.
+    fn with_threads<T: Send>(
+        &self,
+        py: Python,
+        n_threads: usize,
+        f: impl FnOnce(&mut State) -> PyResult<T> + Send,
+    ) -> PyResult<T> {
+        let pool = pool(n_threads)?;
+        self.with(py, |state| pool.install(|| f(state)))
+    }
+}
+
+/// Calls `chunk` on the pool with the first of each `at_once` of `n` queries. In between, the caller's own thread lets
+/// Python raise KeyboardInterrupt.
+fn in_chunks(
+    n: usize,
+    at_once: usize,
+    pool: &rayon::ThreadPool,
+    mut chunk: impl FnMut(usize) -> PyResult<()> + Send,
+) -> PyResult<()> {
+    for first in (0..n).step_by(at_once) {
+        if first > 0 {
+            Python::attach(|py| py.check_signals())?;
+        }
+        pool.install(|| chunk(first))?;
+    }
+    Ok(())
+}
+
+fn of_processor([device, cpu]: [usize; 2], state: &State) -> usize {
+    if state.has_device() { device } else { cpu }
+}
+
+#[pymethods]
+impl Core {
+    /// Opens a device, or uses the CPU if there is no selector.
+    #[new]
+    fn new(py: Python, device: Option<Selector>) -> PyResult<Self> {
+        check_fork()?;
+        let selector = device.map(|device| match device {
+            Selector::Index(index) => DeviceSelector::Index(index),
+            Selector::Name(name) => DeviceSelector::Name(name),
+        });
+        let engine = py.detach(|| match selector {
+            Some(selector) => open(selector).map(Engine::on_device).map_err(failed),
+            None => Ok(Engine::on_cpu()),
+        })?;
+        let device_name = engine.device().map_or("cpu".to_owned(), |device| device.info().name.clone());
+        Ok(Self { state: Mutex::new(Some(State::new(engine))), owner: Mutex::default(), device_name })
+    }
+
+    /// The name of the device, or "cpu".
+    #[getter]
+    fn device_name(&self) -> &str {
+        &self.device_name
+    }
+
+    /// Frees everything. A second call does nothing.
+    fn close(&self, py: Python) -> PyResult<()> {
+        self.locked(py, |state| {
+            *state = None;
+            Ok(())
+        })
+    }
+
+    /// Adds a geometry, and returns its id. `vertices`: (N, 3), `faces`: (M, 3).
+    fn add(&self, py: Python, vertices: PyReadonlyArray2<f32>, faces: PyReadonlyArray2<u32>) -> PyResult<u32> {
+        let vertices = vec3s(vertices.as_slice()?);
+        let faces = cast_slice(faces.as_slice()?).to_vec();
+        self.with_threads(py, 0, |state| state.add(vertices, faces))
+    }
+
+    /// Uses up an id.
+    fn add_removed(&self, py: Python) -> PyResult<()> {
+        self.with(py, |state| {
+            state.add_removed();
+            Ok(())
+        })
+    }
+
+    fn remove(&self, py: Python, id: u32) -> PyResult<()> {
+        self.with(py, |state| state.remove(id))
+    }
+
+    fn set_vertices(&self, py: Python, id: u32, first: usize, vertices: PyReadonlyArray2<f32>) -> PyResult<()> {
+        let vertices = vec3s(vertices.as_slice()?);
+        self.with_threads(py, 0, |state| state.set_vertices(id, first, &vertices))
+    }
+
+    /// `transforms`: (N, 3, 4).
+    fn set_transforms(
+        &self,
+        py: Python,
+        ids: PyReadonlyArray1<u32>,
+        transforms: PyReadonlyArray3<f64>,
+    ) -> PyResult<()> {
+        let (ids, transforms) = (ids.as_slice()?, transforms.as_slice()?);
+        let transforms: Vec<_> = transforms.chunks_exact(12).map(matrix).collect();
+        self.with(py, |state| state.set_transforms(ids, &transforms))
+    }
+
+    /// The number of ids that were given out.
+    fn n_ids(&self, py: Python) -> PyResult<usize> {
+        self.with(py, |state| Ok(state.n_ids()))
+    }
+
+    /// The vertices (N, 3), triangles (M, 3) and transform (3, 4) of a geometry, or None where one was removed. All
+    /// arrays are flat.
+    #[allow(clippy::type_complexity)]
+    fn geometry<'py>(
+        &self,
+        py: Python<'py>,
+        id: u32,
+    ) -> PyResult<Option<(Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f64>>)>> {
+        let geometry = self.with(py, |state| Ok(state.geometry(id).cloned()))?;
+        Ok(geometry.map(|geometry| {
+            let rows = geometry.transform.transpose().to_cols_array();
+            let vertices: Vec<f32> = geometry.vertices.iter().flat_map(|vertex| vertex.to_array()).collect();
+            let faces = geometry.faces.into_flattened();
+            (vertices.into_pyarray(py), faces.into_pyarray(py), rows[..12].to_vec().into_pyarray(py))
+        }))
+    }
+
+    /// Casts rays, and writes their nearest hits into `outputs`.
+    fn cast(
+        &self,
+        py: Python,
+        rays: PyReadonlyArray2<f32>,
+        range: Range,
+        n_threads: usize,
+        outputs: Outputs,
+    ) -> PyResult<()> {
+        let rows = Rows::new(&rays, &range)?;
+        let (mut t, mut geometry_ids, mut primitive_ids, mut uvs, mut normals) = outputs;
+        let mut columns = columns_of(&mut t, &mut geometry_ids, &mut primitive_ids, &mut uvs, &mut normals)?;
+        let pool = pool(n_threads)?;
+        self.with(py, |state| {
+            let at_once = of_processor(RAYS_AT_ONCE, state);
+            in_chunks(rows.len(), at_once, &pool, |first| {
+                let rays = rows.rays(first, at_once);
+                let hits = state.caster(Need::Hits, rows.len())?.cast(&rays, Query::Closest, 1).map_err(failed)?.hits;
+                columns.split_off(rays.len()).write(state.world(Need::Hits), &hits);
+                Ok(())
+            })
+        })
+    }
+
+    /// Tells of each ray whether it hits anything.
+    fn occluded(
+        &self,
+        py: Python,
+        rays: PyReadonlyArray2<f32>,
+        range: Range,
+        n_threads: usize,
+        mut output: PyReadwriteArray1<bool>,
+    ) -> PyResult<()> {
+        let rows = Rows::new(&rays, &range)?;
+        let output = output.as_slice_mut()?;
+        let pool = pool(n_threads)?;
+        self.with(py, |state| {
+            let at_once = of_processor(RAYS_AT_ONCE, state);
+            in_chunks(rows.len(), at_once, &pool, |first| {
+                let rays = rows.rays(first, at_once);
+                let hits = state.caster(Need::Hits, rows.len())?.cast(&rays, Query::Any, 1).map_err(failed)?.hits;
+                output[first..].iter_mut().zip(&hits).for_each(|(out, hit)| *out = hit.triangle_ix != NO_TRIANGLE);
+                Ok(())
+            })
+        })
+    }
+
+    /// Counts the hits of rays.
+    fn count(
+        &self,
+        py: Python,
+        rays: PyReadonlyArray2<f32>,
+        range: Range,
+        n_threads: usize,
+        mut output: PyReadwriteArray1<i32>,
+    ) -> PyResult<()> {
+        let rows = Rows::new(&rays, &range)?;
+        let output = output.as_slice_mut()?;
+        let pool = pool(n_threads)?;
+        self.with(py, |state| {
+            let at_once = of_processor(QUERIES_AT_ONCE, state);
+            in_chunks(rows.len(), at_once, &pool, |first| {
+                let rays = rows.rays(first, at_once);
+                let counts = state.caster(Need::FlatTree, rows.len())?.count_hits(&rays).map_err(failed)?;
+                output[first..].iter_mut().zip(&counts).for_each(|(out, count)| *out = *count as i32);
+                Ok(())
+            })
+        })
+    }
+
+    /// Lists the hits of rays: ray_splits, ray_ids, t_hit, geometry_ids, primitive_ids, uvs (flat).
+    fn list<'py>(
+        &self,
+        py: Python<'py>,
+        rays: PyReadonlyArray2<f32>,
+        range: Range,
+        most_per_ray: Option<u32>,
+        n_threads: usize,
+    ) -> PyResult<Lists<'py>> {
+        let rows = Rows::new(&rays, &range)?;
+        let pool = pool(n_threads)?;
+        let (mut splits, mut ray_ids, mut t_hit) = (vec![0_u32], Vec::new(), Vec::new());
+        let (mut geometry_ids, mut primitive_ids, mut uvs) = (Vec::new(), Vec::new(), Vec::new());
+        self.with(py, |state| {
+            let at_once = of_processor(QUERIES_AT_ONCE, state);
+            in_chunks(rows.len(), at_once, &pool, |first| {
+                let rays = rows.rays(first, at_once);
+                let caster = state.caster(Need::FlatTree, rows.len())?;
+                let all = caster.all_hits(&rays, most_per_ray).map_err(failed)?;
+                let before = t_hit.len() as u64;
+                if before + all.hits.len() as u64 > u64::from(u32::MAX) {
+                    return Err(PyRuntimeError::new_err("rays: there are more than 2^32 - 1 hits"));
+                }
+                splits.extend(all.ray_splits[1..].iter().map(|end| (before + end) as u32));
+                for (ix, ends) in all.ray_splits.windows(2).enumerate() {
+                    ray_ids.extend((ends[0]..ends[1]).map(|_| (first + ix) as u32));
+                }
+                let world = state.world(Need::FlatTree);
+                let found: Vec<_> = all.hits.par_iter().with_min_len(1024).map(|hit| Found::of(world, hit)).collect();
+                t_hit.extend(all.hits.iter().map(|hit| hit.t));
+                geometry_ids.extend(found.iter().map(|it| it.geometry_id));
+                primitive_ids.extend(found.iter().map(|it| it.primitive_id));
+                uvs.extend(found.iter().flat_map(|it| it.uv));
+                Ok(())
+            })
+        })?;
+        Ok((
+            splits.into_pyarray(py),
+            ray_ids.into_pyarray(py),
+            t_hit.into_pyarray(py),
+            geometry_ids.into_pyarray(py),
+            primitive_ids.into_pyarray(py),
+            uvs.into_pyarray(py),
+        ))
+    }
+
+    /// Finds the closest points of (N, 3) points. Writes distances and ids into `outputs`, and points into `closest`.
+    fn closest(
+        &self,
+        py: Python,
+        points: PyReadonlyArray2<f32>,
+        n_threads: usize,
+        outputs: Outputs,
+        mut closest: PyReadwriteArray2<f32>,
+    ) -> PyResult<()> {
+        let points: &[[f32; 3]] = cast_slice(points.as_slice()?);
+        let closest: &mut [[f32; 3]] = cast_slice_mut(closest.as_slice_mut()?);
+        let (mut t, mut geometry_ids, mut primitive_ids, mut uvs, mut normals) = outputs;
+        let mut columns = columns_of(&mut t, &mut geometry_ids, &mut primitive_ids, &mut uvs, &mut normals)?;
+        let pool = pool(n_threads)?;
+        self.with(py, |state| {
+            let at_once = of_processor(QUERIES_AT_ONCE, state);
+            in_chunks(points.len(), at_once, &pool, |first| {
+                let end = points.len().min(first + at_once);
+                let query = |p: &[f32; 3]| QueryPoint { position: Vec3::from(*p), t_max: f32::INFINITY };
+                let queries: Vec<_> = points[first..end].iter().map(query).collect();
+                let caster = state.caster(Need::FlatTree, points.len())?;
+                let hits = caster.closest_points(&queries, 1).map_err(failed)?.hits;
+                let world = state.world(Need::FlatTree);
+                let rows = closest[first..end].par_iter_mut().zip(&hits).with_min_len(1024);
+                rows.for_each(|(row, hit)| *row = Found::of(world, hit).point.to_array());
+                columns.split_off(hits.len()).write(world, &hits);
+                Ok(())
+            })
+        })
+    }
+}
+
+fn columns_of<'a>(
+    t: &'a mut PyReadwriteArray1<f32>,
+    geometry_ids: &'a mut PyReadwriteArray1<u32>,
+    primitive_ids: &'a mut PyReadwriteArray1<u32>,
+    uvs: &'a mut PyReadwriteArray2<f32>,
+    normals: &'a mut PyReadwriteArray2<f32>,
+) -> PyResult<Columns<'a>> {
+    Ok(Columns {
+        t: t.as_slice_mut()?,
+        geometry_ids: geometry_ids.as_slice_mut()?,
+        primitive_ids: primitive_ids.as_slice_mut()?,
+        uvs: cast_slice_mut(uvs.as_slice_mut()?),
+        normals: cast_slice_mut(normals.as_slice_mut()?),
+    })
+}
+
+fn vec3s(values: &[f32]) -> Vec<Vec3> {
+    values.par_chunks_exact(3).with_min_len(4096).map(Vec3::from_slice).collect()
+}
+
+/// Returns the matrix of three rows of four.
+fn matrix(rows: &[f64]) -> DMat4 {
+    let row = |ix: usize| DVec4::from_slice(&rows[4 * ix..]);
+    DMat4::from_cols(row(0), row(1), row(2), DVec3::ZERO.extend(1.0)).transpose()
+}

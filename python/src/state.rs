@@ -1,0 +1,334 @@
+//! The geometries of a scene, and the worlds that are made of them when rays need them.
+
+use glam::{DMat4, DVec3, Vec3};
+use kdray::{
+    accel::kdtree::Traversal,
+    engine::{
+        Caster, Engine, LoadRequest, Opened, Source, Work,
+        choices::{Request, Workload},
+    },
+    gpu::GpuError,
+    scene::{Camera, Instance, Material, Mesh, Projection, RenderDefaults, Scene, Transform},
+    world::{InstanceUpdate, World, instances::Instancing},
+};
+use pyo3::{
+    exceptions::{PyIndexError, PyRuntimeError, PyValueError},
+    prelude::*,
+};
+use rayon::prelude::*;
+
+/// Number of rays for which a structure is built when it is not known how many will follow.
+const EXPECTED_RAYS: u64 = 1 << 24;
+
+/// Batches of fewer rays or points are cast by the CPU, also where the scene has a GPU: a submission and the copies of
+/// rays and hits take longer.
+const SMALL_BATCH: usize = 4096;
+
+/// Triangles that belong together, and their place.
+#[derive(Clone)]
+pub struct Geometry {
+    pub vertices: Vec<Vec3>,
+    pub faces: Vec<[u32; 3]>,
+    /// From the vertices to the world.
+    pub transform: DMat4,
+    /// The scene's counter of changes when the transform was last set.
+    moved_at: u64,
+}
+
+/// The geometry of an instance of a world.
+pub struct Place {
+    pub geometry_id: u32,
+    /// Whether the world has the corners of triangles in another order.
+    pub mirrors: bool,
+}
+
+/// A world of the scene's geometries as they were, and what casts into it.
+pub struct Ready {
+    pub world: World,
+    /// One per instance of the world.
+    pub places: Vec<Place>,
+    traversal: Traversal,
+    on_device: Option<Caster<'static>>,
+    on_cpu: Option<Caster<'static>>,
+    shapes_at: u64,
+    places_at: u64,
+}
+
+/// What is asked of a world.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Need {
+    /// The nearest hits of rays, or whether there are any.
+    Hits,
+    /// All hits of rays, or closest points, which are not found through kept instances.
+    FlatTree,
+}
+
+/// A scene.
+pub struct State {
+    engine: Engine,
+    cpu: Engine,
+    /// By identifier; `None` where a geometry was removed.
+    geometries: Vec<Option<Geometry>>,
+    /// Counts changes.
+    now: u64,
+    /// The change that last added, removed or deformed a geometry, and the one that last moved one.
+    shapes_at: u64,
+    places_at: u64,
+    /// The world with the geometries where they are.
+    flat: Option<Ready>,
+    /// The world of geometries that are moved, each with a structure of its own.
+    kept: Option<Ready>,
+}
+
+impl State {
+    pub fn new(engine: Engine) -> Self {
+        let (now, shapes_at, places_at) = Default::default();
+        let cpu = Engine::on_cpu();
+        Self { engine, cpu, geometries: Vec::new(), now, shapes_at, places_at, flat: None, kept: None }
+    }
+
+    /// Returns the number of identifiers that were given out.
+    pub fn n_ids(&self) -> usize {
+        self.geometries.len()
+    }
+
+    /// Returns a geometry, or none where one was removed.
+    pub fn geometry(&self, id: u32) -> Option<&Geometry> {
+        self.geometries.get(id as usize)?.as_ref()
+    }
+
+    fn geometry_mut(&mut self, id: u32) -> PyResult<&mut Geometry> {
+        let n_ids = self.geometries.len();
+        let removed = || PyIndexError::new_err(format!("id: the geometry {id} was removed"));
+        let missing = || PyIndexError::new_err(format!("id: there is no geometry {id} among {n_ids}"));
+        self.geometries.get_mut(id as usize).ok_or_else(missing)?.as_mut().ok_or_else(removed)
+    }
+
+    /// Adds a geometry and returns its identifier.
+    pub fn add(&mut self, vertices: Vec<Vec3>, faces: Vec<[u32; 3]>) -> PyResult<u32> {
+        check_finite("vertex_positions", &vertices)?;
+        if let Some(ix) = faces.as_flattened().par_iter().find_first(|ix| **ix as usize >= vertices.len()) {
+            let what = format!("triangle_indices: has the index {ix}, but there are {} vertices", vertices.len());
+            return Err(PyIndexError::new_err(what));
+        }
+        self.now += 1;
+        self.shapes_at = self.now;
+        self.geometries.push(Some(Geometry { vertices, faces, transform: DMat4::IDENTITY, moved_at: 0 }));
+        Ok(self.geometries.len() as u32 - 1)
+    }
+
+    /// Leaves room for an identifier that has no geometry.
+    pub fn add_removed(&mut self) {
+        self.geometries.push(None);
+    }
+
+    pub fn remove(&mut self, id: u32) -> PyResult<()> {
+        self.geometry_mut(id)?;
+        self.geometries[id as usize] = None;
+        self.now += 1;
+        self.shapes_at = self.now;
+        Ok(())
+    }
+
+    /// Replaces vertices of a geometry from `first` on.
+    pub fn set_vertices(&mut self, id: u32, first: usize, vertices: &[Vec3]) -> PyResult<()> {
+        check_finite("vertex_positions", vertices)?;
+        let geometry = self.geometry_mut(id)?;
+        let n = geometry.vertices.len();
+        let Some(range) = first.checked_add(vertices.len()).and_then(|end| geometry.vertices.get_mut(first..end))
+        else {
+            let what = format!("first: vertices {first} to {} of {n}", first.saturating_add(vertices.len()));
+            return Err(PyIndexError::new_err(what));
+        };
+        range.copy_from_slice(vertices);
+        self.now += 1;
+        self.shapes_at = self.now;
+        Ok(())
+    }
+
+    /// Sets the transforms of geometries. If one of them is refused, none is set.
+    pub fn set_transforms(&mut self, ids: &[u32], transforms: &[DMat4]) -> PyResult<()> {
+        for (row, (id, transform)) in ids.iter().zip(transforms).enumerate() {
+            self.geometry_mut(*id)?;
+            let wrong = |what| PyValueError::new_err(format!("transforms[{row}]: {what}"));
+            Transform::of_affine(*transform).map_err(wrong)?;
+        }
+        self.now += 1;
+        let now = self.now;
+        for (id, transform) in ids.iter().zip(transforms) {
+            let geometry = self.geometry_mut(*id)?;
+            (geometry.transform, geometry.moved_at) = (*transform, now);
+        }
+        self.places_at = now;
+        Ok(())
+    }
+
+    /// Whether the scene casts on a Vulkan device.
+    pub fn has_device(&self) -> bool {
+        self.engine.device().is_some()
+    }
+
+    /// Returns what casts `n` rays or points into the geometries as they are now.
+    pub fn caster(&mut self, need: Need, n: usize) -> PyResult<&mut Caster<'static>> {
+        let keeps = self.keeps(need);
+        self.prepare(keeps, n)?;
+        let ready = if keeps { &mut self.kept } else { &mut self.flat };
+        ready.as_mut().expect("prepared").caster([&self.engine, &self.cpu], n)
+    }
+
+    /// Returns the world of the last caster.
+    pub fn world(&self, need: Need) -> &Ready {
+        let ready = if self.keeps(need) { &self.kept } else { &self.flat };
+        ready.as_ref().expect("a caster was asked for")
+    }
+
+    /// Geometries that never moved are flattened for all queries.
+    fn keeps(&self, need: Need) -> bool {
+        need == Need::Hits && self.places_at > 0
+    }
+
+    /// Makes the world of the geometries as they are now. `n_rays`: that are about to be cast.
+    fn prepare(&mut self, keeps: bool, n_rays: usize) -> PyResult<()> {
+        if !self.geometries.iter().flatten().any(|geometry| !geometry.faces.is_empty()) {
+            return Err(PyRuntimeError::new_err("the scene has no triangles: add_triangles adds some"));
+        }
+        let before = if keeps { self.kept.take() } else { self.flat.take() };
+        let ready = match before {
+            Some(ready) if (ready.shapes_at, ready.places_at) == (self.shapes_at, self.places_at) => ready,
+            Some(ready) if keeps && ready.shapes_at == self.shapes_at => match self.moved(ready) {
+                Ok(ready) => ready,
+                Err(_) => self.build(keeps, n_rays, None)?,
+            },
+            before => self.build(keeps, n_rays, before)?,
+        };
+        *(if keeps { &mut self.kept } else { &mut self.flat }) = Some(ready);
+        Ok(())
+    }
+
+    /// Moves the instances of a world to where their geometries are now.
+    fn moved(&self, mut ready: Ready) -> Result<Ready, GpuError> {
+        let mut updates = Vec::new();
+        for (instance_ix, place) in ready.places.iter_mut().enumerate() {
+            let geometry = self.geometry(place.geometry_id).expect("the shapes are those of the world");
+            if geometry.moved_at > ready.places_at {
+                let transform = Transform::of_affine(geometry.transform).expect("checked when it was set");
+                place.mirrors = transform.mirrors();
+                updates.push(InstanceUpdate { instance_ix, transform: Some(transform), ..InstanceUpdate::default() });
+            }
+        }
+        ready.world = ready.world.with_instances_changed(&updates)?;
+        for caster in ready.on_device.iter_mut().chain(&mut ready.on_cpu) {
+            caster.set_world(&ready.world)?;
+        }
+        ready.places_at = self.places_at;
+        Ok(ready)
+    }
+
+    /// Builds a world. `before`: the world that it replaces, which tells that the scene's shapes change.
+    fn build(&self, keeps: bool, n_rays: usize, before: Option<Ready>) -> PyResult<Ready> {
+        let n_rays = if before.is_some() { n_rays as u64 } else { EXPECTED_RAYS };
+        let pinned = before.map(|before| before.traversal);
+        let (scene, places) = self.scene(keeps)?;
+        let instances = if keeps { Instancing::Keep } else { Instancing::Flatten };
+        let engine = self.engine.clone().with_request(Request { instances, ..Request::default() });
+        let wrong = |error: &dyn std::error::Error| PyValueError::new_err(error.to_string());
+        let opened = Opened::read(Source::Scene(Box::new(scene)), &LoadRequest::rays(n_rays));
+        let opened = opened.map_err(|error| wrong(&error))?;
+        let world = engine.builder().build(opened, &Work::Rays(n_rays)).map_err(|error| wrong(&error))?.world;
+        let traversal = match pinned {
+            Some(traversal) => traversal,
+            None => engine.methods(&world, &Workload::of_rays(n_rays)).map_err(failed)?.traversal.value,
+        };
+        let (shapes_at, places_at) = (self.shapes_at, self.places_at);
+        Ok(Ready { world, places, traversal, on_device: None, on_cpu: None, shapes_at, places_at })
+    }
+
+    /// Returns the geometries as a scene: each moved by its instance, or in its place.
+    fn scene(&self, keeps: bool) -> PyResult<(Scene, Vec<Place>)> {
+        let (mut meshes, mut instances, mut places) = (Vec::new(), Vec::new(), Vec::new());
+        for (id, geometry) in self.geometries.iter().enumerate() {
+            let Some(geometry) = geometry.as_ref().filter(|geometry| !geometry.faces.is_empty()) else { continue };
+            let transform = Transform::of_affine(geometry.transform).expect("checked when it was set");
+            let (vertices, transform) = match keeps {
+                true => (geometry.vertices.clone(), transform),
+                false => (geometry.placed(id)?, Transform::IDENTITY),
+            };
+            places.push(Place { geometry_id: id as u32, mirrors: transform.mirrors() });
+            instances.push(Instance { mesh_ix: meshes.len(), transform, materials: vec![0], ..Instance::default() });
+            meshes.push(Mesh::of_triangles(vertices, geometry.faces.clone()));
+        }
+        Ok((scene_of(meshes, instances), places))
+    }
+}
+
+impl Geometry {
+    /// Returns the vertices in the world. `id`: what an error names.
+    fn placed(&self, id: usize) -> PyResult<Vec<Vec3>> {
+        if self.transform == DMat4::IDENTITY {
+            return Ok(self.vertices.clone());
+        }
+        let mesh = Mesh { positions: self.vertices.clone(), ..Mesh::default() };
+        let transform = Transform::of_affine(self.transform).expect("checked when it was set");
+        mesh.placed(&transform).map_err(|what| PyValueError::new_err(format!("geometry {id}: {what}")))
+    }
+}
+
+impl Ready {
+    /// Returns what casts `n` rays: the device, or the CPU if they are few. It is made at the first use.
+    fn caster(&mut self, [engine, cpu]: [&Engine; 2], n: usize) -> PyResult<&mut Caster<'static>> {
+        let is_small = engine.device().is_some_and(|device| !device.is_software()) && n < SMALL_BATCH;
+        if engine.device().is_none() || is_small {
+            return made(&mut self.on_cpu, || cpu.caster_of_world(&self.world, Traversal::OF_CPU));
+        }
+        made(&mut self.on_device, || engine.caster_of_world(&self.world, self.traversal))
+    }
+}
+
+fn made<T>(place: &mut Option<T>, make: impl FnOnce() -> Result<T, GpuError>) -> PyResult<&mut T> {
+    match place {
+        Some(caster) => Ok(caster),
+        None => Ok(place.insert(make().map_err(failed)?)),
+    }
+}
+
+/// Returns what Python is told of a failed call.
+pub fn failed(error: GpuError) -> PyErr {
+    PyRuntimeError::new_err(error.to_string())
+}
+
+fn check_finite(name: &str, vertices: &[Vec3]) -> PyResult<()> {
+    let not_finite = |vertex: &Vec3| !vertex.is_finite();
+    match vertices.par_iter().position_first(not_finite) {
+        Some(ix) => Err(PyValueError::new_err(format!("{name}: vertex {ix} is {}, not finite", vertices[ix]))),
+        None => Ok(()),
+    }
+}
+
+/// Returns a scene of which nobody makes a picture.
+fn scene_of(meshes: Vec<Mesh>, instances: Vec<Instance>) -> Scene {
+    Scene {
+        name: "scene".to_owned(),
+        origin: DVec3::ZERO,
+        meshes,
+        instances,
+        materials: vec![Material::default()],
+        images: Vec::new(),
+        lights: Vec::new(),
+        chosen_light: None,
+        environment: None,
+        sky: None,
+        studio: None,
+        camera: Camera {
+            eye: Vec3::ZERO,
+            target: Vec3::NEG_Z,
+            up: Vec3::Y,
+            projection: Projection::Perspective { vertical_fov_degrees: 40.0 },
+        },
+        cameras: Vec::new(),
+        animations: Vec::new(),
+        ambient: Vec3::ZERO,
+        ground: None,
+        background: Vec3::ZERO,
+        defaults: RenderDefaults::default(),
+    }
+}

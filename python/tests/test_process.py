@@ -1,0 +1,226 @@
+"""Threads, processes, signals, pickles, devices, types."""
+
+import copy
+import os
+import pickle
+import subprocess
+import sys
+import threading
+import time
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from conftest import assert_same_hits, ball, fresh, random_rays, soup
+
+import kdray
+
+
+def run(code, **kwargs):
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, **kwargs)
+
+
+def test_threads_cast_while_another_updates(device, random):
+    scene = fresh(device, [ball(8), soup(random, 50)])
+    rays = random_rays(random, 500)
+    expected = [fresh(device, [(ball(8)[0] * size, ball(8)[1]), soup(np.random.default_rng(3), 50)]) for size in [1, 2]]
+    scene = fresh(device, [ball(8), soup(np.random.default_rng(3), 50)])
+    states = [it.cast_rays(rays)["t_hit"] for it in expected]
+    assert (states[0] != states[1]).any()
+    errors, is_over = [], threading.Event()
+
+    def cast():
+        try:
+            while not is_over.is_set():
+                t = scene.cast_rays(rays)["t_hit"]
+                if not any((t == state).all() for state in states):
+                    raise AssertionError("a cast saw neither state")
+        except BaseException as error:
+            errors.append(error)
+
+    threads = [threading.Thread(target=cast) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for turn in range(20):
+        scene.update_vertices(0, ball(8)[0] * (2 - turn % 2))
+    is_over.set()
+    for thread in threads:
+        thread.join()
+    assert not errors, errors
+
+
+def test_python_runs_while_rays_fly(random):
+    scene, rays = fresh("cpu", [soup(random, 3000)]), random_rays(random, 300_000)
+    scene.cast_rays(rays[:1])
+    thread = threading.Thread(target=scene.count_intersections, args=(rays,))
+    n_ticks = 0
+    thread.start()
+    while thread.is_alive():
+        n_ticks += 1
+        time.sleep(0.001)
+    assert n_ticks > 20
+
+
+@pytest.mark.parametrize("make", [lambda scene: pickle.loads(pickle.dumps(scene)), copy.deepcopy])
+def test_pickles(make, device, random):
+    scene = fresh(device, [soup(random, 40), soup(random, 40), soup(random, 40)])
+    scene.update_transforms([0], [[[0, -1, 0, 0.1], [1, 0, 0, 0], [0, 0, 1, 0]]])
+    scene.remove(1)
+    again = make(scene)
+    rays = random_rays(random, 2000)
+    assert_same_hits(again.cast_rays(rays), scene.cast_rays(rays), most=0)
+    assert again.add_triangles(*ball(6)) == 3 and again.device == scene.device
+
+
+def test_a_forked_child_is_told_to_spawn(device, random):
+    scene = fresh(device, [ball(6)])
+    scene.cast_rays(random_rays(random, 10))
+    reader, writer = os.pipe()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        child = os.fork()
+    if child == 0:
+        try:
+            for call in [lambda: scene.cast_rays(np.zeros((1, 6))), scene.close, kdray.devices]:
+                try:
+                    call()
+                    os.write(writer, b"no error;")
+                except RuntimeError as error:
+                    os.write(writer, b"spawn;" if "spawn" in str(error) else repr(error).encode())
+            del scene
+        finally:
+            os._exit(0)
+    os.close(writer)
+    with os.fdopen(reader) as said:
+        assert said.read() == "spawn;spawn;spawn;"
+    assert os.waitpid(child, 0)[1] == 0
+
+
+def test_a_spawned_child_casts(random):
+    scene = fresh("cpu", [ball(6)])
+    code = "import pickle, sys; print(pickle.load(sys.stdin.buffer).cast_rays([0, 0, 2, 0, 0, -1])['t_hit'])"
+    child = subprocess.run([sys.executable, "-c", code], input=pickle.dumps(scene), capture_output=True, timeout=60)
+    assert child.stdout.decode().strip() == "1.0", child.stderr
+
+
+def test_interrupts():
+    code = """
+import os, signal, threading, numpy as np, kdray
+random = np.random.default_rng(1)
+corners = random.uniform(-1, 1, (2000, 1, 3)) + random.uniform(-0.3, 0.3, (2000, 3, 3))
+scene = kdray.RaycastingScene(device="cpu")
+scene.add_triangles(corners.reshape(-1, 3), np.arange(6000).reshape(-1, 3))
+scene.cast_rays(np.zeros((1, 6)))
+rays = np.tile(random.uniform(-1, 1, (200_000, 6)).astype(np.float32), (100, 1))
+threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+try:
+    scene.count_intersections(rays)
+    print("not interrupted")
+except KeyboardInterrupt:
+    print("interrupted", scene.cast_rays([0, 0, 0, 0, 0, 1])["t_hit"].shape)
+"""
+    begin = time.monotonic()
+    child = run(code)
+    assert child.stdout == "interrupted ()\n", child.stderr
+    assert time.monotonic() - begin < 30
+
+
+def test_a_signals_handler_cannot_wait_for_the_call_that_it_interrupts():
+    code = """
+import os, signal, threading, numpy as np, kdray
+random = np.random.default_rng(1)
+scene = kdray.RaycastingScene(device="cpu")
+corners = random.uniform(-1, 1, (2000, 1, 3)) + random.uniform(-0.3, 0.3, (2000, 3, 3))
+scene.add_triangles(corners.reshape(-1, 3), np.arange(6000).reshape(-1, 3))
+signal.signal(signal.SIGINT, lambda *_: scene.close())
+threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+try:
+    scene.count_intersections(np.tile(random.uniform(-1, 1, (200_000, 6)).astype(np.float32), (100, 1)))
+except RuntimeError as error:
+    print(error)
+"""
+    assert "in use by a call that this one interrupts" in run(code).stdout
+
+
+def test_exit_with_work_in_flight():
+    code = """
+import threading, numpy as np, kdray
+random = np.random.default_rng(1)
+scene = kdray.RaycastingScene(device="cpu")
+corners = random.uniform(-1, 1, (2000, 1, 3)) + random.uniform(-0.3, 0.3, (2000, 3, 3))
+scene.add_triangles(corners.reshape(-1, 3), np.arange(6000).reshape(-1, 3))
+scene.cast_rays(np.zeros((1, 6)))
+rays = random.uniform(-1, 1, (2_000_000, 6))
+threading.Thread(target=scene.count_intersections, args=(rays,), daemon=True).start()
+print("over")
+"""
+    child = run(code)
+    assert (child.returncode, child.stdout) == (0, "over\n"), child.stderr
+
+
+def test_devices():
+    found = kdray.devices()
+    assert [device.index for device in found] == list(range(len(found)))
+    usable = next(device for device in found if not device.missing)
+    for selector in [usable, usable.index, usable.name, usable.name[1:-1].upper()]:
+        assert kdray.RaycastingScene(device=selector).device == usable.name
+    assert kdray.RaycastingScene(device="CPU").device == "cpu"
+
+
+def test_without_a_driver_the_cpu_casts_and_one_warning_says_so():
+    code = """
+import warnings, kdray
+with warnings.catch_warnings(record=True) as caught:
+    warnings.simplefilter("always")
+    scenes = [kdray.RaycastingScene() for _ in range(3)]
+print([scene.device for scene in scenes], len(caught), caught[0].filename, kdray.devices())
+"""
+    nowhere = {**os.environ, "VK_DRIVER_FILES": "/nowhere.json", "VK_ICD_FILENAMES": "/nowhere.json"}
+    assert run(code, env=nowhere).stdout == "['cpu', 'cpu', 'cpu'] 1 <string> []\n"
+
+
+def test_libvulkan_is_loaded_late():
+    maps = "print('libvulkan' in open('/proc/self/maps').read())"
+    scenes = [f"scene = kdray.RaycastingScene(device={device}); {maps}" for device in ["'cpu'", 0]]
+    code = f"import kdray; {'; '.join(scenes)}"
+    assert run(code).stdout == "False\nTrue\n"
+
+
+def test_numbers_of_threads(random):
+    scene, rays = fresh("cpu", [soup(random, 30)]), random_rays(random, 3000)
+    expected = scene.cast_rays(rays)
+    for set_to, given in [(1, 0), (2, 3), (0, 0)]:
+        kdray.set_threads(set_to)
+        assert_same_hits(scene.cast_rays(rays, given), expected, most=0)
+
+
+def test_types():
+    package = Path(kdray.__file__).parent
+    assert (package / "py.typed").exists()
+    options = ["--strict", "--no-incremental", "--cache-dir=/dev/null"]
+    checked = subprocess.run(
+        [sys.executable, "-m", "mypy", *options, "-p", "kdray"], cwd="/", capture_output=True, text=True
+    )
+    assert checked.returncode == 0, checked.stdout + checked.stderr
+
+
+def test_docstrings():
+    import doctest
+
+    assert doctest.testmod(kdray).failed == 0
+    public = [kdray.RaycastingScene, kdray.Device, kdray.devices, kdray.set_threads]
+    members = [getattr(kdray.RaycastingScene, name) for name in dir(kdray.RaycastingScene) if name[0] != "_"]
+    assert all(it.__doc__ for it in public + members if not isinstance(it, int))
+
+
+@pytest.mark.parametrize("document", ["README.md", "docs/python.md"])
+def test_examples_of_documents(document):
+    text = (Path(__file__).parents[2] / document).read_text()
+    code = text.split("```python\n")[1].split("```")[0].replace("RaycastingScene()", 'RaycastingScene(device="cpu")')
+    vertices, triangles = ball(6)
+    mesh = trimesh.Trimesh(vertices, triangles)
+    names = {"vertices": vertices, "triangles": triangles, "points": vertices, "mesh": mesh, "poses": [np.eye(4)]}
+    exec(code, names)
+    assert 0.01 < np.mean(names["depth"] < np.inf) < 1

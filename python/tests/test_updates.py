@@ -1,0 +1,105 @@
+"""Scenes that change: hits are those of a new scene."""
+
+import resource
+
+import numpy as np
+import pytest
+from conftest import assert_same_hits, ball, fresh, random_rays, soup
+
+import kdray
+
+
+def random_transforms(random, n, mirrors=False):
+    """Turns and shifts, all or none of which mirror."""
+    turns, _ = np.linalg.qr(random.normal(size=(n, 3, 3)))
+    turns *= random.uniform(0.5, 1.2, (n, 1, 1))
+    turns[(np.linalg.det(turns) < 0) != mirrors] *= -1
+    return np.concatenate([turns, random.uniform(-0.5, 0.5, (n, 3, 1))], axis=2)
+
+
+def placed(vertices, transform):
+    return (vertices @ transform[:, :3].T + transform[:, 3]).astype(np.float32)
+
+
+@pytest.mark.parametrize("mirrors", [False, True])
+def test_transforms(device, random, mirrors):
+    parts = [soup(random, 40) for _ in range(8)]
+    scene, rays = fresh(device, parts), random_rays(random, 5000)
+    scene.cast_rays(rays)
+    transforms = np.tile(np.eye(3, 4), (8, 1, 1))
+    for ids in [[3], [0, 5, 7], [3, 1]]:
+        transforms[ids] = random_transforms(random, len(ids), mirrors)
+        scene.update_transforms(ids, transforms[ids])
+        moved = [(placed(vertices, at), triangles) for (vertices, triangles), at in zip(parts, transforms)]
+        again = fresh(device, moved)
+        assert_same_hits(scene.cast_rays(rays), again.cast_rays(rays))
+        assert np.mean(scene.test_occlusions(rays) == again.test_occlusions(rays)) > 0.999
+        assert np.mean(scene.count_intersections(rays) == again.count_intersections(rays)) > 0.999
+        np.testing.assert_allclose(
+            scene.compute_distance(rays[:, :3]), again.compute_distance(rays[:, :3]), atol=1e-5
+        )
+
+
+def test_vertices(device, random):
+    parts = [soup(random, 40), soup(random, 60)]
+    scene, rays = fresh(device, parts), random_rays(random, 5000)
+    scene.cast_rays(rays)
+    changed = random.uniform(-1, 1, (30, 3)).astype(np.float32)
+    scene.update_vertices(1, changed, first=12)
+    parts[1][0][12:42] = changed
+    expected = fresh(device, parts)
+    assert_same_hits(scene.cast_rays(rays), expected.cast_rays(rays), most=0)
+    scene.update_transforms([0], random_transforms(random, 1))
+    scene.update_vertices(0, parts[0][0] * 0.5)
+    scene.update_transforms([0], [np.eye(4)])
+    expected = fresh(device, [(parts[0][0] * 0.5, parts[0][1]), parts[1]])
+    assert_same_hits(scene.cast_rays(rays), expected.cast_rays(rays))
+
+
+def test_remove(device, random):
+    parts = [soup(random, 40) for _ in range(3)]
+    scene, rays = fresh(device, parts), random_rays(random, 5000)
+    scene.remove(1)
+    hits, expected = scene.cast_rays(rays), fresh(device, [parts[0], parts[2]]).cast_rays(rays)
+    expected["geometry_ids"][expected["geometry_ids"] == 1] = 2
+    assert_same_hits(hits, expected, most=0)
+    assert set(hits["geometry_ids"]) == {0, 2, scene.INVALID_ID}
+    assert scene.add_triangles(*parts[1]) == 3, "ids are not given out again"
+    assert set(scene.compute_closest_points(rays[:, :3])["geometry_ids"]) == {0, 2, 3}
+    with pytest.raises(IndexError, match="geometry 1 was removed"):
+        scene.update_vertices(1, parts[1][0])
+
+
+def test_a_stale_scene_would_be_noticed(device, random):
+    """The comparison of the tests above fails for a scene that has missed a change."""
+    parts = [soup(random, 40), soup(random, 60)]
+    scene, rays = fresh(device, parts), random_rays(random, 5000)
+    parts[1][0][:9] += 0.3
+    with pytest.raises(AssertionError):
+        assert_same_hits(scene.cast_rays(rays), fresh(device, parts).cast_rays(rays))
+
+
+def test_memory_stays_constant(random):
+    scene = fresh("cpu", [ball(8) for _ in range(10)])
+    rays, ids = random_rays(random, 64), np.arange(10)
+
+    def updates(n):
+        for _ in range(n):
+            scene.update_transforms(ids, random_transforms(random, 10))
+            scene.cast_rays(rays)
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+    before = updates(500)
+    assert updates(2500) - before < 4096, "KiB"
+
+
+def test_transforms_that_cannot_keep_a_space_of_their_own(device, random):
+    parts = [ball(8), soup(random, 20)]
+    scene, rays = fresh(device, parts), random_rays(random, 3000)
+    thin = np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1e-7, 0.25]])
+    scene.update_transforms([0], [thin])
+    again = fresh(device, [(placed(parts[0][0], thin), parts[0][1]), parts[1]])
+    ours, expected = scene.cast_rays(rays), again.cast_rays(rays)
+    np.testing.assert_allclose(ours["t_hit"], expected["t_hit"], rtol=1e-3, atol=1e-4)
+    scene.update_transforms([0], [np.eye(3, 4)])
+    assert_same_hits(scene.cast_rays(rays), fresh(device, parts).cast_rays(rays))
