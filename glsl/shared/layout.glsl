@@ -1118,13 +1118,17 @@ struct AccelConstants {
 #define CONSTANT_FIRST_SURFACE_LAYER 16u
 // Whether a kernel builds the lower level of a grid.
 #define CONSTANT_LOWER_LEVEL 10u
-// Which counts a prefix sum in a grid's build adds up: `GRID_SCANS_CELLS` and its like. The first three values equal
-// those of `GRID_COUNTS_CELLS` and its like.
+// Which counts a prefix sum in a build adds up: `GRID_SCANS_CELLS`, `KD_SCANS_CELLS` and their like. The first three of
+// a grid's values equal those of `GRID_COUNTS_CELLS` and its like.
 #define CONSTANT_SCANS 11u
 #define GRID_SCANS_CELLS 0u
 #define GRID_SCANS_COLUMNS 1u
 #define GRID_SCANS_PAIRS 2u
 #define GRID_SCANS_DIGITS 3u
+// What a prefix sum in a kd-tree's build adds up: finite triangles, references on the sides of planes, or cells.
+#define KD_SCANS_TRIANGLES 0u
+#define KD_SCANS_REFERENCES 1u
+#define KD_SCANS_CELLS 2u
 
 // Constants that have the same value in all kernels over one scene.
 
@@ -1395,6 +1399,157 @@ struct GridSort {
     uint first_bit;
 };
 
+// The build of a kd-tree (src/passes/kdtree). kdtree_build/kd_build.glsl defines its terms.
+
+// Rows of entries that a workgroup goes through. A row has `SCAN_GROUP_SIZE` entries, one for each invocation.
+#define KD_ROWS 8u
+// The number of entries in these rows, a block: `KD_ROWS * SCAN_GROUP_SIZE`.
+#define KD_BLOCK_SIZE 1024u
+// Workgroups of a dispatch side by side. More are in further rows, since a device need not accept more than 65,535.
+#define KD_GROUPS_X 1024u
+// The most references of a small cell, whose planes are all tried.
+#define KD_SMALL_CELL 64u
+// The number of references that one workgroup counts by bins at a time. A cell with more is large.
+#define KD_BIN_BLOCK 4096u
+// Bins on an axis: two for each invocation of a workgroup.
+#define KD_BINS 256u
+// Words of a cell's bins: on each axis, four for each bin.
+#define KD_BIN_WORDS 3072u
+// Scales of triangles, 0 to 18 (src/accel/kdtree/scales.rs).
+#define KD_SCALES 19u
+// Records in `kd_levels`: of the levels 0 to `KD_WORD_DEPTH`, and of the one below.
+#define KD_LEVEL_RECORDS 34u
+// Value of `KdCell.axis`: the cell becomes a leaf.
+#define KD_NO_AXIS 3u
+// `KdBuild.n_triangles` and all other numbers of entries stay below this, so that a word holds a node and a scale.
+#define KD_MOST_ENTRIES 67108864u
+
+// The state of a kd-tree's build. The host writes it before the build and reads it afterwards.
+struct KdBuild {
+    // The root's cell, and the margin of a triangle of scale 0 (world units).
+    vec3 box_min;
+    float margin;
+    vec3 box_max;
+    // The largest coordinate of all triangles (world units).
+    float largest;
+    // The bounds of the finite triangles as integers of the floats' order, the number of these triangles, and the
+    // number of all triangles.
+    uint least_x;
+    uint least_y;
+    uint least_z;
+    uint n_finite;
+    uint greatest_x;
+    uint greatest_y;
+    uint greatest_z;
+    uint n_triangles;
+    // The options. empty_factor: on the weight of a split with an empty side. max_depth: the most levels below the
+    // root.
+    float traversal_cost;
+    float intersection_cost;
+    float empty_factor;
+    uint max_depth;
+    // Capacities: references of a level and entries of all leaves, pairs of nodes, and cells of a level.
+    uint max_references;
+    uint max_pairs;
+    uint max_cells;
+    // The finest scale of the tree.
+    uint finest;
+    // The index in scan_blocks at which blocks of cells begin. Blocks of references begin at 0.
+    uint cell_blocks_begin;
+    // Cells that became leaves because their children would have passed a capacity.
+    uint n_limited;
+    // Entries of all leaves, and pairs of nodes, the root's included.
+    uint n_entries;
+    uint n_pairs;
+    // The deepest level.
+    uint depth;
+    // Workgroups over the entries.
+    uint entry_groups_x;
+    uint entry_groups_y;
+    uint entry_groups_z;
+};
+
+// A level of a kd-tree's build. It is 0 throughout if no cell is open there.
+struct KdLevel {
+    // Cells and references of the level.
+    uint n_cells;
+    uint n_references;
+    // Of all levels above: references in leaves, and pairs of nodes, those of this level's nodes included.
+    uint n_closed;
+    uint n_pairs;
+    // Pairs of this level's nodes.
+    uint n_new_pairs;
+    // The first cell that is not split for lack of capacity. All cells after it become leaves, too.
+    uint cutoff;
+    // Sums over the level: references below and above their cells' planes, splits, children with references, and
+    // references in leaves.
+    uint n_below;
+    uint n_above;
+    uint n_splits;
+    uint n_open;
+    uint n_in_leaves;
+    // Workgroups over blocks of references that are counted by bins, over cells, over blocks of references, over blocks
+    // of cells, of a prefix sum, and over blocks of new pairs.
+    uint bin_groups_x;
+    uint bin_groups_y;
+    uint bin_groups_z;
+    uint cell_groups_x;
+    uint cell_groups_y;
+    uint cell_groups_z;
+    uint reference_groups_x;
+    uint reference_groups_y;
+    uint reference_groups_z;
+    uint cell_block_groups_x;
+    uint cell_block_groups_y;
+    uint cell_block_groups_z;
+    uint spine_groups_x;
+    uint spine_groups_y;
+    uint spine_groups_z;
+    uint pair_groups_x;
+    uint pair_groups_y;
+    uint pair_groups_z;
+};
+
+// A reference of a kd-tree's build: a triangle in a cell, and the bounds of its part there, grown by its margin
+// (`Reference` in src/accel/bounds.rs). `cell_ix` is among the cells of the level.
+struct KdReference {
+    vec3 box_min;
+    uint triangle_ix;
+    vec3 box_max;
+    uint cell_ix;
+};
+
+// An open cell of a kd-tree's build.
+struct KdCell {
+    vec3 box_min;
+    // The cell's first reference and the number of its references.
+    uint first;
+    vec3 box_max;
+    uint n_references;
+    // Index in `built_nodes`.
+    uint node_ix;
+    // The split: `KD_NO_AXIS` and any position for a leaf.
+    uint axis;
+    float position;
+    // References of the children, and what is added to the number of references below (above) the planes that come
+    // before one, to find its place in the next level.
+    uint n_below;
+    uint n_above;
+    uint below_offset;
+    uint above_offset;
+    // Of all cells of the level before: splits, children with references, and references in leaves.
+    uint splits_before;
+    uint open_before;
+    uint in_leaves_before;
+    uint reserved0;
+    uint reserved1;
+};
+
+// Push constants of a kd-tree's build.
+struct KdStage {
+    uint level_ix;
+};
+
 // Bindings of the frame's descriptor set. scene_arrays.glsl has those of the scene's arrays. Below, "rays" are the
 // `Frame.queue_capacity` rays of the queue, and "pixels" are the window's, rows from the top.
 
@@ -1516,5 +1671,50 @@ struct GridSort {
 #define BIND_GRID_LEAF_PLANES 50u
 // A word for each column: its first pair, counted from the first one of its scan block.
 #define BIND_GRID_FIRST_PAIRS 51u
+
+// The descriptor set of a kd-tree's build. A "block" is `KD_BLOCK_SIZE` consecutive entries. "From" is the level that
+// is built, "to" the one below.
+
+// One `KdBuild`.
+#define BIND_KD_BUILD 96u
+// `KD_LEVEL_RECORDS` of `KdLevel`.
+#define BIND_KD_LEVELS 97u
+// The triangles.
+#define BIND_KD_TRIANGLES 98u
+// `KD_SCALES` words: the number of triangles that need each scale.
+#define BIND_KD_SCALE_COUNTS 99u
+// One `KdReference` for each reference of the level.
+#define BIND_KD_REFERENCES_FROM 100u
+#define BIND_KD_REFERENCES_TO 101u
+// For each reference that its cell's plane cuts: the part above. The part below replaces the reference itself.
+#define BIND_KD_ABOVE 102u
+// One `KdCell` for each open cell of the level.
+#define BIND_KD_CELLS_FROM 103u
+#define BIND_KD_CELLS_TO 104u
+// A word for each reference of the level: how many of its block before it are below planes (10 bits) and above (10
+// bits), and whether it is itself (bit 20, bit 21).
+#define BIND_KD_SIDES 105u
+// Four words for each block of triangles or references, and then for each block of cells: its sums; after the scan,
+// the sums of all blocks before it.
+#define BIND_KD_SCAN_BLOCKS 106u
+// `KD_BIN_WORDS` for each large cell of the level, which is numbered by its first reference / `KD_BIN_BLOCK`.
+#define BIND_KD_BINS 107u
+// One `KdNode` for each node, pairs in the order of their levels. The children of a split are given by their pair in
+// this order; the entries of a leaf begin in `leaf_references`.
+#define BIND_KD_BUILT_NODES 108u
+// A word for each pair of built nodes: its parent's index among them.
+#define BIND_KD_BUILT_PARENTS 109u
+// Two words for each built node: pairs and entries below it.
+#define BIND_KD_BELOW 110u
+// Two words for each built node: its children's pair and its first entry in the finished tree.
+#define BIND_KD_PLACES 111u
+// Two words for each reference in a leaf, in the order in which leaves are made: the triangle; the built node (27
+// bits) and the scale of its cell.
+#define BIND_KD_LEAF_REFERENCES 112u
+// The finished tree: its nodes, their parents, and for each entry of a leaf a `LeafTriangle` and a `Plane`.
+#define BIND_KD_NODES 113u
+#define BIND_KD_PARENTS 114u
+#define BIND_KD_LEAF_TRIANGLES 115u
+#define BIND_KD_LEAF_PLANES 116u
 
 #endif

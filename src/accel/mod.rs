@@ -2,7 +2,7 @@
 //! CPU, a kd-tree is converted to a wide hierarchy of boxes.
 
 pub(crate) mod bottom_level;
-mod bounds;
+pub(crate) mod bounds;
 pub mod grid;
 pub mod kdtree;
 mod query;

@@ -1,6 +1,6 @@
 //! The passes of a frame, one file each, with the pipelines of the pass and the functions that record its dispatches.
 //! The kernel of the same name is in `glsl/passes`, its twin on the CPU in `reference`, its test in `tests/passes`.
-//! The kernels that build a grid have a folder, `grid`.
+//! The kernels that build a grid have a folder, `grid`, and those that build a kd-tree another, `kdtree`.
 //!
 //! # Needs and leaves
 //!
@@ -15,8 +15,8 @@
 //! The names are those of the buffers in the kernels, which are fields of [`Resources`](crate::buffers::Resources)
 //! and its parts. Not mentioned are the scene's arrays, which no pass writes, and `bounces` where it only gives a
 //! pass its range of rays and the size of its dispatch. The barriers between the passes of a frame are in
-//! [`plan`](crate::frame::plan). Only the build of a grid, the images of [`Visibility`] and the transfers within a
-//! pass have their own.
+//! [`plan`](crate::frame::plan). Only the builds of grids and kd-trees, the images of [`Visibility`] and the transfers
+//! within a pass have their own.
 
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ use crate::{
     accel::{AccelKind, Search, kdtree::Traversal},
     buffers::uses_graphics_pipeline,
     frame::{Primary, RenderOptions},
-    gpu::{BindingLayout, ComputeDesc, ComputePipeline, Constant, Constants, Context, GpuError, Shader},
+    gpu::{BindingLayout, ComputeDesc, ComputePipeline, Constant, Constants, Context, Dispatch, GpuError, Shader},
     layout::{CONSTANTS_OF_SHADERS, constants},
 };
 
@@ -40,6 +40,7 @@ mod denoise;
 mod false_color;
 mod frame_passes;
 pub mod grid;
+pub mod kdtree;
 mod path_accumulate;
 mod path_begin;
 mod path_compact;
@@ -288,6 +289,37 @@ fn kernel(
     ComputePipeline::new(context, bindings, &ComputeDesc { name, shader, constants, full_subgroups: false })
 }
 
+/// Factory of a build's kernels, for one device and one layout of bindings.
+struct Kernels<'a> {
+    context: &'a Arc<Context>,
+    bindings: &'a Arc<BindingLayout>,
+}
+
+impl Kernels<'_> {
+    /// Creates a kernel whose workgroups go through blocks of entries. It requires full subgroups.
+    ///
+    /// # Panics
+    /// The shader does not declare one of the `constants`.
+    fn of_blocks(
+        &self,
+        name: &'static str,
+        shader: Shader,
+        constants: &Constants,
+    ) -> Result<ComputePipeline, GpuError> {
+        assert_eq!(undeclared(shader.file, constants), None, "constants of {}", shader.file);
+        let desc = ComputeDesc { name, shader, constants, full_subgroups: true };
+        ComputePipeline::new(self.context, self.bindings, &desc)
+    }
+
+    /// Creates a kernel of one invocation.
+    fn of_one(&self, name: &'static str, shader: Shader, constants: &Constants) -> Result<ComputePipeline, GpuError> {
+        kernel(self.context, self.bindings, name, shader, constants)
+    }
+}
+
+/// The size of a dispatch of one workgroup.
+const ONE_GROUP: Dispatch<'static> = Dispatch::Threads([1, 1, 1], [1, 1, 1]);
+
 /// Returns a constant that the shader does not declare, if there is one.
 fn undeclared(file: &str, constants: &Constants) -> Option<&'static str> {
     let declared = CONSTANTS_OF_SHADERS.iter().find(|(known, _)| *known == file);
@@ -298,6 +330,30 @@ fn undeclared(file: &str, constants: &Constants) -> Option<&'static str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The opcode of a decoration in SPIR-V, and the decoration that forbids contraction.
+    const OP_DECORATE: u32 = 71;
+    const NO_CONTRACTION: u32 = 42;
+    /// Opcodes of sums, differences and products of floats, of products of vectors and scalars and with matrices, and
+    /// of the dot product.
+    const ARITHMETIC: [u32; 8] = [129, 131, 133, 142, 143, 144, 145, 148];
+
+    /// Counts the arithmetic instructions of a module that lack `NoContraction`. A device may contract these to
+    /// others, which round differently.
+    pub fn n_contractible(spirv: &[u8]) -> usize {
+        let words: Vec<u32> = spirv.chunks_exact(4).map(|b| u32::from_le_bytes(b.try_into().unwrap())).collect();
+        let (mut results, mut exact) = (Vec::new(), Vec::new());
+        let mut rest = &words[5..];
+        while let [first, operands @ ..] = rest {
+            match (first & 0xffff, operands) {
+                (OP_DECORATE, [result, NO_CONTRACTION, ..]) => exact.push(*result),
+                (op, [_, result, ..]) if ARITHMETIC.contains(&op) => results.push(*result),
+                _ => {}
+            }
+            rest = &rest[(first >> 16) as usize..];
+        }
+        results.iter().filter(|result| !exact.contains(result)).count()
+    }
 
     #[test]
     fn a_constant_that_a_shader_lacks_is_noticed() {

@@ -10,7 +10,7 @@
 //! ```text
 //! passes      primary_hit, trace, pixel_aovs, compact, shadow, shade, resolve, accumulate, denoise, false_color,
 //!             tonemap, cast, closest_point; path_* and auxiliary; demodulate and atrous_filter; visibility, for which
-//!             the device rasterizes
+//!             the device rasterizes; kdtree_build
 //! traversal   traverser: one ray by any algorithm
 //!               kdtree, leaf, slab, kd_boxes, ropes, brute and the pending_* of each algorithm; grid; candidate
 //! points      distant_cells: cells of the kd-tree as a point sees them; point_triangle
@@ -52,6 +52,7 @@ pub mod inputs;
 pub mod instances;
 pub mod kd_boxes;
 pub mod kdtree;
+pub mod kdtree_build;
 pub mod leaf;
 pub mod light;
 pub(crate) mod live_paths;

@@ -15,6 +15,7 @@ mod comparers;
 mod demodulate;
 mod denoise;
 mod false_color;
+mod kdtree_build;
 mod path_accumulate;
 mod path_begin;
 mod path_compact;

@@ -9,14 +9,18 @@
 //! ```text
 //! error of                                                   units
 //! the height of the point at a hit's t above the plane         149   (86 on each axis, times sqrt(3): bounds.rs)
-//! the plane                                                      4
+//! the plane: 4 if the host computes it, on devices               25
 //! the height of the origin above the plane                      30
 //! the slope (the change of height per t), times t               26
 //! the middle of the t interval                                   9
 //! half of the t interval                                         9
 //! middle * slope + height, and half * |slope|                4 + 4   (`is_clear` in glsl/shared/kdtree/slab.glsl)
-//! sum                                                          235   of 256
+//! sum                                                          256   of 256
 //! ```
+//!
+//! A device computes planes in f32 (`kdtree_leaves.comp`). There, the rounding of the normal's products may put the
+//! plane up to 16 units off, or else the plane is 0. The scaling of the normal to length 1 rounds each component, which
+//! makes 3.5 more; the three products of the distance and their sum make 5.2.
 
 use rayon::prelude::*;
 
@@ -28,6 +32,25 @@ use crate::{
     accel::bounds::Bounds,
     layout::{Plane, Triangle},
 };
+
+/// The most that a plane may be off its triangle, in units of 2^-24 times the length of its scale.
+const MAX_ERROR: f64 = 25.0 / (1 << 24) as f64;
+
+/// Whether the planes of a tree let no ray miss a triangle: each is 0, or near its triangle (see the module's
+/// documentation), and its normal is no longer than that of [`planes_of`], but for a rounding.
+pub fn are_valid(parts: &Parts, triangles: &[Triangle], scales: &Scales) -> bool {
+    let is_near = |((&ix, plane), cell_scale): ((&u32, &Plane), u32)| {
+        let triangle = &triangles[ix as usize];
+        let length = f64::from(length_of(cell_scale.min(scales.of_triangle(triangle))));
+        let (normal, distance) = (length * plane.normal.as_dvec3(), length * f64::from(plane.distance));
+        let most = length * MAX_ERROR * f64::from(scales.largest());
+        let height = |corner: glam::Vec3| (normal.dot(corner.as_dvec3()) - distance).abs();
+        let corners = [triangle.v0, triangle.v1, triangle.v2];
+        normal.length() <= 1.0 + 1e-6 && corners.into_iter().all(|corner| height(corner) <= most)
+    };
+    let planes = parts.leaf_triangles.par_iter().zip(&parts.leaf_planes).zip(cell_scales(parts, scales));
+    parts.leaf_planes.len() == parts.leaf_triangles.len() && planes.all(is_near)
+}
 
 /// Returns the plane of each entry's triangle. It has the coarser one of the scales of the triangle and of the leaf's
 /// cell.
@@ -76,7 +99,7 @@ mod tests {
     use glam::{Vec3, vec3};
 
     use super::*;
-    use crate::accel::kdtree::tests::staircase;
+    use crate::accel::kdtree::{BuildOptions, KdTree, tests::staircase};
 
     #[test]
     fn all_corners_lie_in_the_plane() {
@@ -87,6 +110,24 @@ mod tests {
                 assert!((plane.normal.dot(corner) - plane.distance).abs() < 1e-5, "{plane:?}");
             }
         }
+    }
+
+    #[test]
+    fn planes_that_are_off_by_more_than_roundings_are_not_valid() {
+        let triangles = staircase(100);
+        let tree = KdTree::build(&triangles, &BuildOptions { slabs: false, ..BuildOptions::default() });
+        let scales = tree.scales;
+        let parts = tree.into_parts();
+        let is_valid = |change: fn(&mut Plane, f32)| {
+            let mut changed = parts.clone();
+            change(&mut changed.leaf_planes[5], scales.largest() / (1 << 24) as f32);
+            are_valid(&changed, &triangles, &scales)
+        };
+        assert!(is_valid(|_, _| ()));
+        assert!(is_valid(|plane, _| *plane = Plane::default()));
+        assert!(is_valid(|plane, unit| plane.distance += 20.0 * unit));
+        assert!(!is_valid(|plane, unit| plane.distance += 31.0 * unit));
+        assert!(!is_valid(|plane, _| *plane = Plane { normal: 1.01 * plane.normal, distance: 1.01 * plane.distance }));
     }
 
     #[test]

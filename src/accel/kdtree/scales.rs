@@ -113,6 +113,11 @@ impl Scales {
         exponent.min(self.finest)
     }
 
+    /// The largest coordinate of all triangles, world units.
+    pub fn largest(&self) -> f32 {
+        self.largest
+    }
+
     /// Whether all triangles and cells have scale 0.
     pub fn has_one(&self) -> bool {
         self.finest == 0

@@ -43,12 +43,10 @@ use std::{mem::offset_of, sync::Arc};
 
 pub use self::builder::{DeviceGrid, GridBuilder};
 use self::level::Level;
-use super::{kernel, spirv, undeclared};
+use super::{Kernels, ONE_GROUP, spirv};
 use crate::{
     buffers::{GridBuffers, PairSets},
-    gpu::{
-        Access, BindingLayout, Commands, ComputeDesc, ComputePipeline, Constants, Context, Dispatch, GpuError, Shader,
-    },
+    gpu::{Access, BindingLayout, Commands, ComputePipeline, Constants, Context, Dispatch, GpuError},
     layout::{GRID_BLOCK_SIZE, GRID_GROUPS_X, GRID_MAX_ATTEMPTS, GRID_SCANS_CELLS, GridBuild, GridSort, constants},
 };
 
@@ -163,36 +161,6 @@ impl Cut {
     }
 }
 
-/// Factory of a build's kernels, for one device and one layout of bindings.
-struct Kernels<'a> {
-    context: &'a Arc<Context>,
-    bindings: &'a Arc<BindingLayout>,
-}
-
-impl Kernels<'_> {
-    /// Creates a kernel whose workgroups go through blocks of entries. It requires full subgroups.
-    ///
-    /// # Panics
-    /// The shader does not declare one of the `constants`.
-    fn of_blocks(
-        &self,
-        name: &'static str,
-        shader: Shader,
-        constants: &Constants,
-    ) -> Result<ComputePipeline, GpuError> {
-        assert_eq!(undeclared(shader.file, constants), None, "constants of {}", shader.file);
-        let desc = ComputeDesc { name, shader, constants, full_subgroups: true };
-        ComputePipeline::new(self.context, self.bindings, &desc)
-    }
-
-    /// Creates a kernel of one invocation.
-    fn of_one(&self, name: &'static str, shader: Shader, constants: &Constants) -> Result<ComputePipeline, GpuError> {
-        kernel(self.context, self.bindings, name, shader, constants)
-    }
-}
-
-const ONE_GROUP: Dispatch<'static> = Dispatch::Threads([1, 1, 1], [1, 1, 1]);
-
 /// Returns the indirect dispatch whose size is at a byte offset of `build`.
 fn sized_by(buffers: &GridBuffers, offset: usize) -> Dispatch<'_> {
     Dispatch::Indirect(buffers.build.any(), offset as u64)
@@ -211,30 +179,7 @@ fn then(commands: &Commands) {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// The opcode of a decoration in SPIR-V, and the decoration that forbids contraction.
-    const OP_DECORATE: u32 = 71;
-    const NO_CONTRACTION: u32 = 42;
-    /// Opcodes of sums, differences and products of floats, of products of vectors and scalars and with matrices, and
-    /// of the dot product.
-    const ARITHMETIC: [u32; 8] = [129, 131, 133, 142, 143, 144, 145, 148];
-
-    /// Counts the arithmetic instructions of a module that lack `NoContraction`. A device may contract these to
-    /// others, which round differently.
-    fn n_contractible(spirv: &[u8]) -> usize {
-        let words: Vec<u32> = spirv.chunks_exact(4).map(|b| u32::from_le_bytes(b.try_into().unwrap())).collect();
-        let (mut results, mut exact) = (Vec::new(), Vec::new());
-        let mut rest = &words[5..];
-        while let [first, operands @ ..] = rest {
-            match (first & 0xffff, operands) {
-                (OP_DECORATE, [result, NO_CONTRACTION, ..]) => exact.push(*result),
-                (op, [_, result, ..]) if ARITHMETIC.contains(&op) => results.push(*result),
-                _ => {}
-            }
-            rest = &rest[(first >> 16) as usize..];
-        }
-        results.iter().filter(|result| !exact.contains(result)).count()
-    }
+    use crate::{gpu::Shader, passes::tests::n_contractible};
 
     #[test]
     fn no_arithmetic_may_be_contracted() {

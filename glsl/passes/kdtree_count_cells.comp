@@ -1,0 +1,51 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
+// Kd-tree, count cells: counts the references of the cells' children, and the splits, the children with references and
+// the references in leaves of each block of cells. One workgroup per block of cells.
+// Reads build, levels, sides; updates cells_from; writes scan_blocks.
+#include "kdtree_build/kd_sides.glsl"
+#include "scan.glsl"
+
+layout(local_size_x = SCAN_GROUP_SIZE) in;
+layout(std430, set = 0, binding = BIND_KD_CELLS_FROM) buffer CellsFromBlock { KdCell cells_from[]; };
+
+// Counts the children's references. Returns the splits and, in the upper half, the children with references; and the
+// references in leaves.
+uvec2 count(uint cell_ix) {
+    KdCell cell = cells_from[cell_ix];
+    if (cell.axis == KD_NO_AXIS) return uvec2(0u, cell.n_references);
+    uvec2 begin = sides_before(cell.first), end = sides_before(cell.first + cell.n_references);
+    uvec2 n = end - begin;
+    cells_from[cell_ix].n_below = n.x;
+    cells_from[cell_ix].n_above = n.y;
+    cells_from[cell_ix].below_offset = begin.y;
+    cells_from[cell_ix].above_offset = end.x;
+    uint n_open = (n.x > 0u ? 1u : 0u) + (n.y > 0u ? 1u : 0u);
+    return uvec2(1u | n_open << 16, 0u);
+}
+
+void main() {
+    uint block = index_of_group();
+    uint n_cells = levels[stage.level_ix].n_cells;
+    uvec2 sum = uvec2(0u);
+    for (uint row = 0u; row < KD_ROWS; ++row) {
+        uint cell_ix = block * KD_BLOCK_SIZE + row * SCAN_GROUP_SIZE + scan_rank();
+        bool is_cell = cell_ix < n_cells;
+        uvec2 counts = uvec2(0u);
+        if (is_cell) counts = count(cell_ix);
+        uvec2 total, before;
+        before.x = sum.x + workgroup_exclusive_add(counts.x, total.x);
+        before.y = sum.y + workgroup_exclusive_add(counts.y, total.y);
+        if (is_cell) {
+            uvec2 halves = halves_of(before.x);
+            cells_from[cell_ix].splits_before = halves.x;
+            cells_from[cell_ix].open_before = halves.y;
+            cells_from[cell_ix].in_leaves_before = before.y;
+        }
+        sum += total;
+    }
+    if (gl_LocalInvocationIndex == 0u && block < blocks_of(n_cells)) {
+        scan_blocks[build.cell_blocks_begin + block] = uvec4(halves_of(sum.x), sum.y, 0u);
+    }
+}

@@ -1,0 +1,48 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Kd-tree, place: writes the nodes of a level into the finished tree, in depth-first order: a pair, then all pairs
+// below its first node, then those below its second. One workgroup per block of pairs of the level; an invocation
+// writes one pair per row.
+// Reads build, levels, built_nodes, built_parents, below; updates places; writes nodes, parents.
+#include "kdtree_build/kd_build.glsl"
+
+layout(local_size_x = SCAN_GROUP_SIZE) in;
+layout(std430, set = 0, binding = BIND_KD_BUILT_NODES) readonly buffer BuiltNodesBlock { KdNode built_nodes[]; };
+layout(std430, set = 0, binding = BIND_KD_BUILT_PARENTS) readonly buffer BuiltParentsBlock { uint built_parents[]; };
+layout(std430, set = 0, binding = BIND_KD_BELOW) readonly buffer BelowBlock { uvec2 below[]; };
+layout(std430, set = 0, binding = BIND_KD_PLACES) buffer PlacesBlock { uvec2 places[]; };
+layout(std430, set = 0, binding = BIND_KD_NODES) writeonly buffer NodesBlock { KdNode nodes[]; };
+layout(std430, set = 0, binding = BIND_KD_PARENTS) writeonly buffer ParentsBlock { uint parents[]; };
+
+// Writes a node. place: the pair of its children, if it has any, and its first entry.
+void write_node(uint built_ix, uint node_ix, uvec2 place) {
+    KdNode node = built_nodes[built_ix];
+    if ((node.axis_and_child & KD_LEAF) != 0u) {
+        node.split_or_first = place.y;
+    } else {
+        node.axis_and_child = place.x << KD_PAIR_SHIFT | (node.axis_and_child & KD_AXIS_MASK);
+        parents[place.x] = node_ix;
+    }
+    nodes[node_ix] = node;
+    places[built_ix] = place;
+}
+
+void main() {
+    KdLevel level = levels[stage.level_ix];
+    uint begin = index_of_group() * KD_BLOCK_SIZE + gl_LocalInvocationIndex;
+    for (uint row = 0u; row < KD_ROWS; ++row) {
+        uint i = begin + row * SCAN_GROUP_SIZE;
+        if (i >= level.n_new_pairs) break;
+        uint built_ix = level.n_pairs - level.n_new_pairs + i;
+        if (built_ix == 0u) {
+            write_node(0u, 0u, uvec2(1u, 0u));
+            nodes[1] = KdNode(0u, KD_LEAF);
+            parents[0] = 0u;
+            continue;
+        }
+        uvec2 place = places[built_parents[built_ix]];
+        uvec2 first = uvec2(place.x + 1u, place.y);
+        write_node(2u * built_ix, 2u * place.x, first);
+        write_node(2u * built_ix + 1u, 2u * place.x + 1u, first + below[2u * built_ix]);
+    }
+}

@@ -1,0 +1,213 @@
+//! Kd-tree: builds a kd-tree over triangles by the surface area heuristic, breadth-first, without the host.
+//! [`reference::kdtree_build`](crate::reference::kdtree_build) is the twin of these kernels. The trees that
+//! [`accel::kdtree`](crate::accel::kdtree) builds on the CPU differ: it tries more planes, and clips more exactly.
+//!
+//! ```text
+//! bounds             finds the box of the triangles
+//! scales             counts how many triangles need each scale
+//! spine, root        open the first level: the root's cell
+//! gather             writes its references
+//! each level, 0 to 32; without open cells, its dispatches have no workgroups
+//!   bins             counts the references of large cells by bins
+//!   choose           finds each cell's split, a workgroup a cell
+//!   sort_out         finds each reference's sides of its cell's plane, and clips triangles that the plane cuts
+//!   spine            prefix sums over blocks of references
+//!   count_cells      counts splits, open children and references in leaves
+//!   spine            prefix sums over blocks of cells
+//!   cut              finds the first cell whose children would pass a capacity
+//!   split_cells      writes nodes and the cells of the next level, and sizes its dispatches
+//!   scatter          writes the references of the next level, and those in leaves
+//! each level upwards
+//!   sum              counts pairs and entries below each node
+//! each level downwards
+//!   place            writes the nodes in depth-first order
+//! leaves             writes the entries of leaves, with triangles and planes
+//! ```
+//!
+//! Prefix sums give all places, and atomics only add, or find a least or greatest integer. So the same device builds
+//! the same tree, bit for bit. From the first cell of a level whose children would pass a capacity on, all cells of the
+//! level become leaves.
+//!
+//! Zhou, Hou, Wang and Guo, "Real-time KD-tree construction on graphics hardware", 2008; Wu, Zhao and Liu, "SAH KD-tree
+//! construction on GPU", 2011.
+
+mod builder;
+
+use std::{mem::offset_of, sync::Arc};
+
+pub use self::builder::{BuiltTree, KdTreeBuilder, KdTreeBuilderOptions};
+use super::{Kernels, ONE_GROUP, spirv};
+use crate::{
+    buffers::KdTreeBuffers,
+    gpu::{Access, BindingLayout, Commands, ComputePipeline, Constants, Context, Dispatch, GpuError},
+    layout::{
+        KD_BLOCK_SIZE, KD_GROUPS_X, KD_SCANS_CELLS, KD_SCANS_REFERENCES, KD_SCANS_TRIANGLES, KdBuild, KdLevel, KdStage,
+        constants,
+    },
+};
+
+/// All kernels of a build.
+struct KdTreePasses {
+    bounds: ComputePipeline,
+    scales: ComputePipeline,
+    spine_triangles: ComputePipeline,
+    root: ComputePipeline,
+    gather: ComputePipeline,
+    bins: ComputePipeline,
+    choose: ComputePipeline,
+    sort_out: ComputePipeline,
+    spine_references: ComputePipeline,
+    count_cells: ComputePipeline,
+    spine_cells: ComputePipeline,
+    cut: ComputePipeline,
+    split_cells: ComputePipeline,
+    scatter: ComputePipeline,
+    sum: ComputePipeline,
+    place: ComputePipeline,
+    leaves: ComputePipeline,
+}
+
+/// Dispatches before the first level, of a level, and after all levels without those of `sum` and `place`.
+const N_STAGES: [u32; 3] = [5, 9, 1];
+
+impl KdTreePasses {
+    /// Creates the pipelines.
+    ///
+    /// # Errors
+    /// The driver refuses a shader.
+    fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>) -> Result<Self, GpuError> {
+        let kernels = Kernels { context, bindings };
+        let none = Constants::new();
+        let spine = |name, scans| {
+            kernels.of_blocks(name, spirv!("kdtree_spine.comp"), &Constants::new().set(constants::SCANS, scans))
+        };
+        Ok(Self {
+            bounds: kernels.of_blocks("kdtree_bounds", spirv!("kdtree_bounds.comp"), &none)?,
+            scales: kernels.of_blocks("kdtree_scales", spirv!("kdtree_scales.comp"), &none)?,
+            spine_triangles: spine("kdtree_spine_triangles", KD_SCANS_TRIANGLES)?,
+            root: kernels.of_one("kdtree_root", spirv!("kdtree_root.comp"), &none)?,
+            gather: kernels.of_blocks("kdtree_gather", spirv!("kdtree_gather.comp"), &none)?,
+            bins: kernels.of_blocks("kdtree_bins", spirv!("kdtree_bins.comp"), &none)?,
+            choose: kernels.of_blocks("kdtree_choose", spirv!("kdtree_choose.comp"), &none)?,
+            sort_out: kernels.of_blocks("kdtree_sort_out", spirv!("kdtree_sort_out.comp"), &none)?,
+            spine_references: spine("kdtree_spine_references", KD_SCANS_REFERENCES)?,
+            count_cells: kernels.of_blocks("kdtree_count_cells", spirv!("kdtree_count_cells.comp"), &none)?,
+            spine_cells: spine("kdtree_spine_cells", KD_SCANS_CELLS)?,
+            cut: kernels.of_blocks("kdtree_cut", spirv!("kdtree_cut.comp"), &none)?,
+            split_cells: kernels.of_blocks("kdtree_split_cells", spirv!("kdtree_split_cells.comp"), &none)?,
+            scatter: kernels.of_blocks("kdtree_scatter", spirv!("kdtree_scatter.comp"), &none)?,
+            sum: kernels.of_blocks("kdtree_sum", spirv!("kdtree_sum.comp"), &none)?,
+            place: kernels.of_blocks("kdtree_place", spirv!("kdtree_place.comp"), &none)?,
+            leaves: kernels.of_blocks("kdtree_leaves", spirv!("kdtree_leaves.comp"), &none)?,
+        })
+    }
+
+    /// Returns the number of dispatches of a build of levels 0 to `max_depth`.
+    fn n_stages(max_depth: u32) -> u32 {
+        let [before, of_level, after] = N_STAGES;
+        // Both `sum` and `place` run for all levels; `sum` has nothing to add at the root's.
+        before + of_level * (max_depth + 1) + max_depth + max_depth + 1 + after
+    }
+
+    /// Records what comes before the first level. Needs `triangles`. Leaves the root's level, its cell, and its
+    /// references.
+    fn setup(&self, commands: &Commands, buffers: &KdTreeBuffers) {
+        let reset = || {
+            commands.update_buffer(buffers.build.any(), std::slice::from_ref(buffers.initial()));
+            for buffer in [buffers.levels.any(), buffers.scale_counts.any(), buffers.bins.any()] {
+                commands.clear_buffer(buffer);
+            }
+            commands.barrier(Access::TransferWrite, Access::KernelUpdate); // build, levels, scale_counts, bins
+        };
+        let n_groups = buffers.capacities.n_triangles.div_ceil(KD_BLOCK_SIZE);
+        let blocks = || Dispatch::Threads([n_groups.min(KD_GROUPS_X), n_groups.div_ceil(KD_GROUPS_X), 1], [1, 1, 1]);
+        let none = KdStage::default();
+        commands.bind(buffers.set_of(0));
+        commands.dispatch_after(reset, &self.bounds, None, &none, blocks());
+        then(commands);
+        commands.dispatch(&self.scales, None, &none, blocks());
+        then(commands);
+        commands.dispatch(&self.spine_triangles, None, &none, ONE_GROUP);
+        then(commands);
+        commands.dispatch(&self.root, None, &none, ONE_GROUP);
+        then(commands);
+        commands.dispatch(&self.gather, None, &none, blocks());
+        then(commands);
+    }
+
+    /// Records a level. Needs its record in `levels`, `cells_from`, `references_from` and `bins` of zeros. Leaves the
+    /// same for the next level, and the nodes and leaves of this one.
+    fn level(&self, commands: &Commands, buffers: &KdTreeBuffers, level_ix: u32) {
+        let run = |kernel: &ComputePipeline, groups: usize| {
+            let offset = level_ix as usize * size_of::<KdLevel>() + groups;
+            let dispatch = Dispatch::Indirect(buffers.levels.any(), offset as u64);
+            commands.dispatch(kernel, Some(level_ix), &KdStage { level_ix }, dispatch);
+        };
+        let references = offset_of!(KdLevel, reference_groups_x);
+        let cell_blocks = offset_of!(KdLevel, cell_block_groups_x);
+        let spine = offset_of!(KdLevel, spine_groups_x);
+        commands.bind(buffers.set_of(level_ix));
+        run(&self.bins, offset_of!(KdLevel, bin_groups_x));
+        then(commands);
+        run(&self.choose, offset_of!(KdLevel, cell_groups_x));
+        then(commands);
+        run(&self.sort_out, references);
+        then(commands);
+        run(&self.spine_references, spine);
+        then(commands);
+        run(&self.count_cells, cell_blocks);
+        then(commands);
+        run(&self.spine_cells, spine);
+        then(commands);
+        run(&self.cut, cell_blocks);
+        then(commands);
+        run(&self.split_cells, cell_blocks);
+        then(commands);
+        run(&self.scatter, references);
+        then(commands);
+    }
+
+    /// Records what comes after the last level. Needs the built nodes, and the references in leaves. Leaves `nodes`,
+    /// `parents`, `leaf_triangles` and `leaf_planes`.
+    fn finish(&self, commands: &Commands, buffers: &KdTreeBuffers) {
+        let max_depth = buffers.initial().max_depth;
+        let run = |kernel: &ComputePipeline, level_ix: u32| {
+            let offset = level_ix as usize * size_of::<KdLevel>() + offset_of!(KdLevel, pair_groups_x);
+            let dispatch = Dispatch::Indirect(buffers.levels.any(), offset as u64);
+            commands.dispatch(kernel, Some(level_ix), &KdStage { level_ix }, dispatch);
+            then(commands);
+        };
+        (1..=max_depth).rev().for_each(|level_ix| run(&self.sum, level_ix));
+        (0..=max_depth).for_each(|level_ix| run(&self.place, level_ix));
+        let entries = offset_of!(KdBuild, entry_groups_x) as u64;
+        commands.dispatch(&self.leaves, None, &KdStage::default(), Dispatch::Indirect(buffers.build.any(), entries));
+    }
+}
+
+/// Makes the next kernel wait for the previous one, and for the sizes of dispatches that the previous one has
+/// written.
+fn then(commands: &Commands) {
+    commands.barrier(Access::KernelUpdate, Access::KernelUpdate); // the build's arrays
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{gpu::Shader, passes::tests::n_contractible};
+
+    #[test]
+    fn no_arithmetic_may_be_contracted() {
+        let kernels = [
+            spirv!("kdtree_bins.comp"),
+            spirv!("kdtree_choose.comp"),
+            spirv!("kdtree_gather.comp"),
+            spirv!("kdtree_leaves.comp"),
+            spirv!("kdtree_root.comp"),
+            spirv!("kdtree_scales.comp"),
+            spirv!("kdtree_sort_out.comp"),
+        ];
+        for Shader { file, spirv } in kernels {
+            assert_eq!(n_contractible(spirv), 0, "{file}");
+        }
+    }
+}

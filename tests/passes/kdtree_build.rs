@@ -1,0 +1,212 @@
+//! Trees that a device builds: they are those of the twin, node for node, the host's validator accepts them, and they
+//! cost hardly more than the host's trees.
+
+use std::{f32::consts::TAU, sync::Arc};
+
+use glam::{Vec3, vec3};
+use kdray::{
+    accel::kdtree::{BuildOptions, KdTree, Parts},
+    buffers::KdTreeRoom,
+    gpu::{Buffer, BufferUse, Context, Timer},
+    layout::{KD_BIN_BLOCK, KD_BLOCK_SIZE, KD_SMALL_CELL, KD_WORD_DEPTH, Triangle},
+    passes::kdtree::{BuiltTree, KdTreeBuilder, KdTreeBuilderOptions},
+    reference::kdtree_build::{Tree, kdtree_build},
+};
+
+use crate::support::{assert_silent, device, meshes};
+
+/// The most by which a device's tree may cost more than the host's.
+const MOST_COST: f64 = 1.02;
+
+fn builder(context: &Arc<Context>, triangles: &[Triangle], options: &KdTreeBuilderOptions) -> KdTreeBuilder {
+    let buffer = Buffer::with(context, "triangles", triangles, BufferUse::Storage).expect("triangles");
+    KdTreeBuilder::new(context, &buffer, options).expect("a builder")
+}
+
+fn built(builder: &KdTreeBuilder) -> (BuiltTree, Parts) {
+    let built = builder.build(None).expect("a tree");
+    let parts = builder.read_back(&built).expect("its arrays");
+    (built, parts)
+}
+
+/// Returns the cost of a tree as a multiple of that of the host's tree.
+fn relative_cost(tree: &KdTree, triangles: &[Triangle]) -> f64 {
+    let host = BuildOptions { slabs: false, max_depth: Some(KD_WORD_DEPTH), ..BuildOptions::default() };
+    let [cost, expected] =
+        [tree, &KdTree::build(triangles, &host)].map(|tree| tree.statistics(triangles.len(), &host).sah_cost);
+    if expected > 0.0 { cost / expected } else { 1.0 + cost }
+}
+
+/// Checks a tree against the twin's, which knows only scale 0. Software drivers divide exactly, GPUs need not.
+fn check_twin(context: &Context, name: &str, triangles: &[Triangle], (found, parts): (&BuiltTree, &Parts)) {
+    if context.is_software() && found.finest_scale == 0 {
+        let Parts { nodes, parents, leaf_triangles, .. } = parts.clone();
+        let is_twin = Tree { nodes, parents, leaf_triangles } == kdtree_build(triangles, &BuildOptions::default());
+        assert!(is_twin, "{name} has another tree than the twin's");
+    }
+}
+
+/// Builds a tree twice and checks it.
+fn check(context: &Arc<Context>, name: &str, triangles: &[Triangle]) {
+    let options = KdTreeBuilderOptions::default();
+    let builder = builder(context, triangles, &options);
+    let (found, parts) = built(&builder);
+    assert_eq!(found.n_limited, 0, "{name}");
+    assert_eq!(built(&builder).1, parts, "{name}, again");
+    check_twin(context, name, triangles, (&found, &parts));
+    let tree = KdTree::from_parts(parts, triangles).unwrap_or_else(|invalid| panic!("{name}: {invalid}"));
+    let cost = relative_cost(&tree, triangles);
+    println!("{name}: {} nodes, {} entries, {cost} times the host's cost", found.n_nodes, found.n_entries);
+    assert!(cost <= MOST_COST, "{name}: {cost} times the host's cost");
+}
+
+/// A tube around a knot that winds twice around one axis and three times around another.
+fn knot(n_along: usize, n_around: usize) -> Vec<Triangle> {
+    let middle = |i: usize| {
+        let angle = (i % n_along) as f32 / n_along as f32 * TAU;
+        let radius = 1.0 + 0.4 * (3.0 * angle).cos();
+        vec3(radius * (2.0 * angle).cos(), radius * (2.0 * angle).sin(), 0.4 * (3.0 * angle).sin())
+    };
+    let point = |i: usize, k: usize| {
+        let (at, next) = (middle(i), middle(i + 1));
+        let u = (next - at).cross(at).normalize();
+        let v = u.cross(next - at).normalize();
+        let angle = (k % n_around) as f32 / n_around as f32 * TAU;
+        at + 0.15 * (u * angle.cos() + v * angle.sin())
+    };
+    let quad = |(i, k)| {
+        let (a, b, c, d) = (point(i, k), point(i + 1, k), point(i + 1, k + 1), point(i, k + 1));
+        [meshes::triangle(a, b, c), meshes::triangle(a, c, d)]
+    };
+    (0..n_along).flat_map(|i| (0..n_around).map(move |k| (i, k))).flat_map(quad).collect()
+}
+
+#[test]
+fn meshes_have_trees_as_good_as_the_hosts() {
+    let context = device();
+    let torus = || meshes::torus(40, 20);
+    check(&context, "none", &[]);
+    check(&context, "one", &[meshes::triangle(Vec3::X, Vec3::Y, Vec3::Z)]);
+    check(&context, "torus", &torus());
+    check(&context, "cube", &meshes::cube(9, 0.0));
+    check(&context, "sphere", &meshes::cube(10, 1.0));
+    check(&context, "soup", &meshes::soup(1200, 7));
+    check(&context, "threefold", &meshes::threefold(meshes::soup(200, 2)));
+    check(&context, "tiny", &meshes::placed(torus(), 1e-6, Vec3::ZERO));
+    check(&context, "huge", &meshes::placed(torus(), 1e6, Vec3::ZERO));
+    check(&context, "far", &meshes::placed(torus(), 0.3, vec3(1000.0, -70.0, 3.0)));
+    check(&context, "farther", &meshes::placed(torus(), 10.0, vec3(1e5, -1e5, 3.0)));
+    assert_silent(&context);
+}
+
+#[test]
+fn degenerate_triangles_have_valid_trees() {
+    let context = device();
+    let [a, b] = [vec3(0.1, 0.2, 0.3), vec3(-1.0, 2.0, 0.5)];
+    check(&context, "points", &[meshes::triangle(a, a, a); 300]);
+    check(&context, "segments", &[meshes::triangle(a, b, a.lerp(b, 0.3)); 300]);
+    check(&context, "origin", &[meshes::triangle(Vec3::ZERO, Vec3::ZERO, -Vec3::ZERO)]);
+    check(&context, "coincident", &[meshes::triangle(a, b, Vec3::ONE); 200]);
+    let sheet = |i: usize| {
+        let corner = vec3((i % 20) as f32, (i / 20) as f32, 5.0);
+        meshes::triangle(corner, corner + Vec3::X, corner + Vec3::Y)
+    };
+    check(&context, "sheet", &(0..400).map(sheet).collect::<Vec<_>>());
+    let needle = |i: usize| {
+        let at = vec3(i as f32 * 0.01, (i as f32 * 1.7).sin(), (i as f32 * 0.9).cos());
+        meshes::triangle(-3.0 * at, 3.0 * at, 3.0 * at + vec3(1e-4, 0.0, 0.0))
+    };
+    check(&context, "needles", &(0..300).map(needle).collect::<Vec<_>>());
+    let mut holed = meshes::torus(30, 20);
+    holed[7].v0.x = f32::NAN;
+    holed[500].v1.y = f32::INFINITY;
+    holed[1199].v2.z = f32::NEG_INFINITY;
+    check(&context, "holed", &holed);
+    holed.iter_mut().for_each(|triangle| triangle.v1.x = f32::NAN);
+    check(&context, "nothing finite", &holed);
+    assert_silent(&context);
+}
+
+#[test]
+fn numbers_of_triangles_around_a_limit_have_valid_trees() {
+    let context = device();
+    let soup = meshes::soup(KD_BIN_BLOCK as usize + 1, 3);
+    for limit in [KD_SMALL_CELL, KD_BLOCK_SIZE, KD_BIN_BLOCK] {
+        for n in [limit - 1, limit, limit + 1] {
+            check(&context, &format!("{n} triangles"), &soup[..n as usize]);
+        }
+    }
+    assert_silent(&context);
+}
+
+#[test]
+fn triangles_of_very_different_sizes_have_a_valid_tree() {
+    let context = device();
+    let mut triangles = meshes::placed(meshes::torus(40, 20), 1e-3, Vec3::ONE);
+    triangles.extend(meshes::placed(meshes::cube(2, 0.0), 3000.0, Vec3::ZERO));
+    check(&context, "small in large", &triangles);
+    assert_silent(&context);
+}
+
+#[test]
+fn a_knot_of_20000_triangles_has_a_good_tree() {
+    let context = device();
+    check(&context, "knot", &knot(400, 25));
+    assert_silent(&context);
+}
+
+#[test]
+fn a_build_without_room_ends_in_leaves() {
+    let context = device();
+    let triangles = meshes::torus(60, 40);
+    let full = KdTreeRoom { references: 6, pairs: 5, cells: 2 };
+    let rooms = [
+        KdTreeRoom { references: 1, ..full },
+        KdTreeRoom { pairs: 0, ..full },
+        KdTreeRoom { cells: 0, ..full },
+        KdTreeRoom { references: 1, pairs: 0, cells: 0 },
+    ];
+    for room in rooms {
+        let options = KdTreeBuilderOptions { room, ..KdTreeBuilderOptions::default() };
+        let builder = builder(&context, &triangles, &options);
+        let (found, parts) = built(&builder);
+        let capacities = builder.buffers().capacities;
+        assert!(found.n_limited > 0, "{room:?}");
+        assert!(found.n_entries <= capacities.n_references && found.n_nodes <= 2 * capacities.n_pairs, "{room:?}");
+        assert_eq!(built(&builder).1, parts, "{room:?}, again");
+        KdTree::from_parts(parts, &triangles).unwrap_or_else(|invalid| panic!("{room:?}: {invalid}"));
+    }
+    assert_silent(&context);
+}
+
+#[test]
+fn submits_and_timers_do_not_change_the_tree() {
+    let context = device();
+    let triangles = meshes::torus(30, 20);
+    let whole = built(&builder(&context, &triangles, &KdTreeBuilderOptions::default())).1;
+    for levels_per_submit in [0, 1, 100] {
+        let options = KdTreeBuilderOptions { levels_per_submit, ..KdTreeBuilderOptions::default() };
+        assert_eq!(built(&builder(&context, &triangles, &options)).1, whole, "{levels_per_submit}");
+    }
+    let builder = builder(&context, &triangles, &KdTreeBuilderOptions::default());
+    let timer = Timer::new(&context, builder.n_stages()).expect("a timer");
+    let timed = builder.build(Some(&timer)).expect("a tree");
+    assert_eq!(timed.stages.len(), builder.n_stages() as usize);
+    assert_eq!(builder.read_back(&timed).expect("its arrays"), whole);
+    assert_silent(&context);
+}
+
+#[test]
+fn trees_of_limited_depth_are_valid_and_cost_more() {
+    let context = device();
+    let triangles = meshes::torus(30, 20);
+    for max_depth in [0, 1, 5] {
+        let tree = BuildOptions { max_depth: Some(max_depth), ..BuildOptions::default() };
+        let options = KdTreeBuilderOptions { tree, ..KdTreeBuilderOptions::default() };
+        let (found, parts) = built(&builder(&context, &triangles, &options));
+        assert_eq!(found.depth, max_depth);
+        let tree = KdTree::from_parts(parts, &triangles).expect("a valid tree");
+        assert!(relative_cost(&tree, &triangles) > MOST_COST, "{max_depth} levels");
+    }
+    assert_silent(&context);
+}
