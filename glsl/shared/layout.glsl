@@ -1395,6 +1395,65 @@ struct GridSort {
     uint first_bit;
 };
 
+// Slabs of a kd-tree, computed on a device (src/passes/kd_slabs.rs). kdtree/slab_build.glsl defines the terms.
+
+// The most entries below a node that gets a slab.
+#define KD_SLAB_MAX_ENTRIES 2048u
+// The most entries of a candidate whose normal one invocation computes. A workgroup computes that of a larger one.
+#define KD_SLAB_SMALL 32u
+// The most workgroups that compute normals of larger candidates. Each goes through several candidates if there are
+// more.
+#define KD_SLAB_GROUPS 2048u
+
+// What the kernels that compute slabs need to know of a tree, 48 bytes.
+//
+// - `box_min`, `box_max`: the root's cell (world units). `n_nodes`, `n_entries`: of the tree.
+// - `largest`, `margin`, `finest_scale`: the tree's scales (src/accel/kdtree/scales.rs).
+struct KdSlabTree {
+    vec3 box_min;
+    uint n_nodes;
+    vec3 box_max;
+    uint n_entries;
+    float largest;
+    float margin;
+    uint finest_scale;
+    uint reserved;
+};
+
+// The state of the computation of slabs: workgroups of the dispatches over nodes and over entries, and the number of
+// candidates with more than `KD_SLAB_SMALL` entries.
+struct KdSlabBuild {
+    uint node_groups_x;
+    uint node_groups_y;
+    uint node_groups_z;
+    uint entry_groups_x;
+    uint entry_groups_y;
+    uint entry_groups_z;
+    uint n_large;
+};
+
+// The surface below a node: a leaf with entries, or a candidate for a slab. 48 bytes.
+//
+// - `cell_min`, `cell_max`: the node's cell (world units).
+// - `above`: the next candidate on the way to the root, or 0xffffffff.
+// - `normal`: of a candidate's surface; of unit length, or 0 if the surface has no area.
+struct KdSlabPatch {
+    vec3 cell_min;
+    uint above;
+    vec3 cell_max;
+    uint reserved0;
+    vec3 normal;
+    uint reserved1;
+};
+
+// How far a candidate's surface reaches along its normal, from the centre of its cell. The floats are stored as
+// integers of the same order (`ordered`). `scale`: the coarsest scale of its triangles.
+struct KdSlabExtent {
+    uint low;
+    uint high;
+    uint scale;
+};
+
 // Bindings of the frame's descriptor set. scene_arrays.glsl has those of the scene's arrays. Below, "rays" are the
 // `Frame.queue_capacity` rays of the queue, and "pixels" are the window's, rows from the top.
 
@@ -1516,5 +1575,32 @@ struct GridSort {
 #define BIND_GRID_LEAF_PLANES 50u
 // A word for each column: its first pair, counted from the first one of its scan block.
 #define BIND_GRID_FIRST_PAIRS 51u
+
+// The descriptor set of the kernels that compute a kd-tree's slabs. These bindings are above those of texels.
+
+// One `KdSlabTree`.
+#define BIND_KD_SLAB_TREE 192u
+// One `KdSlabBuild`.
+#define BIND_KD_SLAB_BUILD 193u
+// The tree's nodes.
+#define BIND_KD_SLAB_NODES 194u
+// A word for each pair of nodes: their parent.
+#define BIND_KD_SLAB_PARENTS 195u
+// One `LeafTriangle` for each entry.
+#define BIND_KD_SLAB_LEAF_TRIANGLES 196u
+// Two words for each node: the first of the entries below it, and their number.
+#define BIND_KD_SLAB_RANGES 197u
+// A word for each entry: its leaf, or 0xffffffff if the leaf has more than `KD_SLAB_MAX_ENTRIES` entries.
+#define BIND_KD_SLAB_ENTRY_LEAVES 198u
+// One `KdSlabPatch` for each node.
+#define BIND_KD_SLAB_PATCHES 199u
+// One `KdSlabExtent` for each node.
+#define BIND_KD_SLAB_EXTENTS 200u
+// A vec4 for each entry: the area vector of the part of its triangle near its leaf (scaled units), and 0.
+#define BIND_KD_SLAB_AREAS 201u
+// A word for each candidate with more than `KD_SLAB_SMALL` entries: its node, in any order.
+#define BIND_KD_SLAB_LARGE 202u
+// One `Slab` for each node.
+#define BIND_KD_SLAB_SLABS 203u
 
 #endif

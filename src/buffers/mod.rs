@@ -12,6 +12,7 @@
 //! suspended_rays  rays that have spent a dispatch's loop iterations
 //! resources       all of these, with the frame's descriptor set
 //! grid            the build of a grid
+//! kd_slabs        the slabs of a kd-tree, while they are computed
 //! cast            given rays, their hits, and the cast's descriptor set
 //! closest_point   given points, their hits, and the descriptor set of the search
 //! all_hits        given rays, all of their hits, and the descriptor set over them
@@ -22,6 +23,7 @@ mod all_hits;
 mod cast;
 mod closest_point;
 mod grid;
+mod kd_slabs;
 mod pixels;
 mod queue;
 mod raster_queue;
@@ -39,6 +41,7 @@ pub use self::{
     cast::CastResources,
     closest_point::PointResources,
     grid::{GridBuffers, GridCapacities, PairSets},
+    kd_slabs::{KdSlabBuffers, TreeBuffers},
     pixels::Pixels,
     queue::{PathQueue, Queue},
     raster_queue::{RasterQueue, RasterState},
@@ -49,13 +52,13 @@ pub use self::{
 pub(crate) use self::{accel::hidden_words, pixels::uses_graphics_pipeline};
 use crate::{
     gpu::BindingKind,
-    layout::{BIND_ACCEL, BIND_FRAME, BIND_NOISE_TILES, BIND_TEXELS, BIND_TRIANGLE_IDS},
+    layout::{BIND_ACCEL, BIND_FRAME, BIND_KD_SLAB_TREE, BIND_NOISE_TILES, BIND_TEXELS, BIND_TRIANGLE_IDS},
 };
 
 /// Returns a binding number of layout.glsl with the kind of object that it is bound to.
 fn binding(number: u32) -> (u32, BindingKind) {
     let kind = match number {
-        BIND_TEXELS.. => BindingKind::Texels,
+        BIND_TEXELS..BIND_KD_SLAB_TREE => BindingKind::Texels,
         BIND_FRAME | BIND_ACCEL | BIND_NOISE_TILES => BindingKind::Uniform,
         BIND_TRIANGLE_IDS => BindingKind::Image,
         _ => BindingKind::Storage,
