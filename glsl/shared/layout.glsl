@@ -1550,6 +1550,65 @@ struct KdStage {
     uint level_ix;
 };
 
+// Slabs of a kd-tree, computed on a device (src/passes/kd_slabs.rs). kdtree/slab_build.glsl defines the terms.
+
+// The most entries below a node that gets a slab.
+#define KD_SLAB_MAX_ENTRIES 2048u
+// The most entries of a candidate whose normal one invocation computes. A workgroup computes that of a larger one.
+#define KD_SLAB_SMALL 32u
+// The most workgroups that compute normals of larger candidates. Each goes through several candidates if there are
+// more.
+#define KD_SLAB_GROUPS 2048u
+
+// What the kernels that compute slabs need to know of a tree, 48 bytes.
+//
+// - `box_min`, `box_max`: the root's cell (world units). `n_nodes`, `n_entries`: of the tree.
+// - `largest`, `margin`, `finest_scale`: the tree's scales (src/accel/kdtree/scales.rs).
+struct KdSlabTree {
+    vec3 box_min;
+    uint n_nodes;
+    vec3 box_max;
+    uint n_entries;
+    float largest;
+    float margin;
+    uint finest_scale;
+    uint reserved;
+};
+
+// The state of the computation of slabs: workgroups of the dispatches over nodes and over entries, and the number of
+// candidates with more than `KD_SLAB_SMALL` entries.
+struct KdSlabBuild {
+    uint node_groups_x;
+    uint node_groups_y;
+    uint node_groups_z;
+    uint entry_groups_x;
+    uint entry_groups_y;
+    uint entry_groups_z;
+    uint n_large;
+};
+
+// The surface below a node: a leaf with entries, or a candidate for a slab. 48 bytes.
+//
+// - `cell_min`, `cell_max`: the node's cell (world units).
+// - `above`: the next candidate on the way to the root, or 0xffffffff.
+// - `normal`: of a candidate's surface; of unit length, or 0 if the surface has no area.
+struct KdSlabPatch {
+    vec3 cell_min;
+    uint above;
+    vec3 cell_max;
+    uint reserved0;
+    vec3 normal;
+    uint reserved1;
+};
+
+// How far a candidate's surface reaches along its normal, from the centre of its cell. The floats are stored as
+// integers of the same order (`ordered`). `scale`: the coarsest scale of its triangles.
+struct KdSlabExtent {
+    uint low;
+    uint high;
+    uint scale;
+};
+
 // Bindings of the frame's descriptor set. scene_arrays.glsl has those of the scene's arrays. Below, "rays" are the
 // `Frame.queue_capacity` rays of the queue, and "pixels" are the window's, rows from the top.
 
@@ -1672,49 +1731,76 @@ struct KdStage {
 // A word for each column: its first pair, counted from the first one of its scan block.
 #define BIND_GRID_FIRST_PAIRS 51u
 
-// The descriptor set of a kd-tree's build. A "block" is `KD_BLOCK_SIZE` consecutive entries. "From" is the level that
-// is built, "to" the one below.
+// The descriptor set of a kd-tree's build. These bindings are above those of texels. A "block" is `KD_BLOCK_SIZE`
+// consecutive entries. "From" is the level that is built, "to" the one below.
 
 // One `KdBuild`.
-#define BIND_KD_BUILD 96u
+#define BIND_KD_BUILD 128u
 // `KD_LEVEL_RECORDS` of `KdLevel`.
-#define BIND_KD_LEVELS 97u
+#define BIND_KD_LEVELS 129u
 // The triangles.
-#define BIND_KD_TRIANGLES 98u
+#define BIND_KD_TRIANGLES 130u
 // `KD_SCALES` words: the number of triangles that need each scale.
-#define BIND_KD_SCALE_COUNTS 99u
+#define BIND_KD_SCALE_COUNTS 131u
 // One `KdReference` for each reference of the level.
-#define BIND_KD_REFERENCES_FROM 100u
-#define BIND_KD_REFERENCES_TO 101u
+#define BIND_KD_REFERENCES_FROM 132u
+#define BIND_KD_REFERENCES_TO 133u
 // For each reference that its cell's plane cuts: the part above. The part below replaces the reference itself.
-#define BIND_KD_ABOVE 102u
+#define BIND_KD_ABOVE 134u
 // One `KdCell` for each open cell of the level.
-#define BIND_KD_CELLS_FROM 103u
-#define BIND_KD_CELLS_TO 104u
+#define BIND_KD_CELLS_FROM 135u
+#define BIND_KD_CELLS_TO 136u
 // A word for each reference of the level: how many of its block before it are below planes (10 bits) and above (10
 // bits), and whether it is itself (bit 20, bit 21).
-#define BIND_KD_SIDES 105u
+#define BIND_KD_SIDES 137u
 // Four words for each block of triangles or references, and then for each block of cells: its sums; after the scan,
 // the sums of all blocks before it.
-#define BIND_KD_SCAN_BLOCKS 106u
+#define BIND_KD_SCAN_BLOCKS 138u
 // `KD_BIN_WORDS` for each large cell of the level, which is numbered by its first reference / `KD_BIN_BLOCK`.
-#define BIND_KD_BINS 107u
+#define BIND_KD_BINS 139u
 // One `KdNode` for each node, pairs in the order of their levels. The children of a split are given by their pair in
 // this order; the entries of a leaf begin in `leaf_references`.
-#define BIND_KD_BUILT_NODES 108u
+#define BIND_KD_BUILT_NODES 140u
 // A word for each pair of built nodes: its parent's index among them.
-#define BIND_KD_BUILT_PARENTS 109u
+#define BIND_KD_BUILT_PARENTS 141u
 // Two words for each built node: pairs and entries below it.
-#define BIND_KD_BELOW 110u
+#define BIND_KD_BELOW 142u
 // Two words for each built node: its children's pair and its first entry in the finished tree.
-#define BIND_KD_PLACES 111u
+#define BIND_KD_PLACES 143u
 // Two words for each reference in a leaf, in the order in which leaves are made: the triangle; the built node (27
 // bits) and the scale of its cell.
-#define BIND_KD_LEAF_REFERENCES 112u
+#define BIND_KD_LEAF_REFERENCES 144u
 // The finished tree: its nodes, their parents, and for each entry of a leaf a `LeafTriangle` and a `Plane`.
-#define BIND_KD_NODES 113u
-#define BIND_KD_PARENTS 114u
-#define BIND_KD_LEAF_TRIANGLES 115u
-#define BIND_KD_LEAF_PLANES 116u
+#define BIND_KD_NODES 145u
+#define BIND_KD_PARENTS 146u
+#define BIND_KD_LEAF_TRIANGLES 147u
+#define BIND_KD_LEAF_PLANES 148u
+
+// The descriptor set of the kernels that compute a kd-tree's slabs. These bindings are above those of texels.
+
+// One `KdSlabTree`.
+#define BIND_KD_SLAB_TREE 192u
+// One `KdSlabBuild`.
+#define BIND_KD_SLAB_BUILD 193u
+// The tree's nodes.
+#define BIND_KD_SLAB_NODES 194u
+// A word for each pair of nodes: their parent.
+#define BIND_KD_SLAB_PARENTS 195u
+// One `LeafTriangle` for each entry.
+#define BIND_KD_SLAB_LEAF_TRIANGLES 196u
+// Two words for each node: the first of the entries below it, and their number.
+#define BIND_KD_SLAB_RANGES 197u
+// A word for each entry: its leaf, or 0xffffffff if the leaf has more than `KD_SLAB_MAX_ENTRIES` entries.
+#define BIND_KD_SLAB_ENTRY_LEAVES 198u
+// One `KdSlabPatch` for each node.
+#define BIND_KD_SLAB_PATCHES 199u
+// One `KdSlabExtent` for each node.
+#define BIND_KD_SLAB_EXTENTS 200u
+// A vec4 for each entry: the area vector of the part of its triangle near its leaf (scaled units), and 0.
+#define BIND_KD_SLAB_AREAS 201u
+// A word for each candidate with more than `KD_SLAB_SMALL` entries: its node, in any order.
+#define BIND_KD_SLAB_LARGE 202u
+// One `Slab` for each node.
+#define BIND_KD_SLAB_SLABS 203u
 
 #endif

@@ -442,7 +442,7 @@ impl AccelBuffers {
 }
 
 /// Writes the triangles of the leaves' entries from entry `first` on. `entries`: the index of each entry's triangle.
-fn leaf_triangles(triangles: &[Triangle], entries: &[u32], first: usize, part: &mut [LeafTriangle]) {
+pub(super) fn leaf_triangles(triangles: &[Triangle], entries: &[u32], first: usize, part: &mut [LeafTriangle]) {
     let numbers = &entries[first..][..part.len()];
     part.par_iter_mut().zip(numbers).for_each(|(entry, &triangle_ix)| {
         let Triangle { v0, v1, v2, .. } = triangles[triangle_ix as usize];

@@ -13,6 +13,7 @@
 //! resources       all of these, with the frame's descriptor set
 //! grid            the build of a grid
 //! kdtree          the build of a kd-tree
+//! kd_slabs        the slabs of a kd-tree, while they are computed
 //! cast            given rays, their hits, and the cast's descriptor set
 //! closest_point   given points, their hits, and the descriptor set of the search
 //! all_hits        given rays, all of their hits, and the descriptor set over them
@@ -23,6 +24,7 @@ mod all_hits;
 mod cast;
 mod closest_point;
 mod grid;
+mod kd_slabs;
 mod kdtree;
 mod pixels;
 mod queue;
@@ -41,6 +43,7 @@ pub use self::{
     cast::CastResources,
     closest_point::PointResources,
     grid::{GridBuffers, GridCapacities, PairSets},
+    kd_slabs::{KdSlabBuffers, TreeBuffers},
     kdtree::{KdTreeBuffers, KdTreeCapacities, KdTreeRoom},
     pixels::Pixels,
     queue::{PathQueue, Queue},

@@ -61,6 +61,13 @@ mod tests {
             BIND_GRID_CELLS => Some("GridCell"),
             BIND_GRID_LEAF_TRIANGLES => Some("LeafTriangle"),
             BIND_GRID_LEAF_PLANES => Some("Plane"),
+            BIND_KD_SLAB_TREE => Some("KdSlabTree"),
+            BIND_KD_SLAB_BUILD => Some("KdSlabBuild"),
+            BIND_KD_SLAB_NODES => Some("KdNode"),
+            BIND_KD_SLAB_LEAF_TRIANGLES => Some("LeafTriangle"),
+            BIND_KD_SLAB_PATCHES => Some("KdSlabPatch"),
+            BIND_KD_SLAB_EXTENTS => Some("KdSlabExtent"),
+            BIND_KD_SLAB_SLABS => Some("Slab"),
             _ => None,
         }
     }

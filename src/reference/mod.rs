@@ -20,6 +20,7 @@
 //!             sample_sums
 //! textures    texture, maps, alpha_test
 //! inputs      the data that kernels only read
+//! builds      kd_slabs
 //! counting    the same traversal with its reads counted
 //! ```
 
@@ -51,6 +52,7 @@ pub mod grid;
 pub mod inputs;
 pub mod instances;
 pub mod kd_boxes;
+pub mod kd_slabs;
 pub mod kdtree;
 pub mod kdtree_build;
 pub mod leaf;

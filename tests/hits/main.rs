@@ -4,6 +4,7 @@
 mod support;
 
 mod all_hits;
+mod device_slabs;
 mod grid;
 mod hidden;
 mod huge_ground;

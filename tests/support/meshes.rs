@@ -31,6 +31,21 @@ pub fn torus(n_around: usize, n_across: usize) -> Vec<Triangle> {
     })
 }
 
+/// A closed tube along a trefoil knot around y.
+pub fn knot(n_along: usize, n_across: usize) -> Vec<Triangle> {
+    let centre = |t: f32| {
+        let radius = 1.0 + 0.4 * (3.0 * t).cos();
+        vec3(radius * (2.0 * t).cos(), 0.4 * (3.0 * t).sin(), radius * (2.0 * t).sin())
+    };
+    grid(n_along, n_across, |u, v| {
+        let along = (u % n_along) as f32 / n_along as f32 * TAU;
+        let across = (v % n_across) as f32 / n_across as f32 * TAU;
+        let heading = (centre(along + 1e-2) - centre(along - 1e-2)).normalize();
+        let side = heading.cross(Vec3::Y).normalize();
+        centre(along) + 0.15 * (across.cos() * side + across.sin() * side.cross(heading))
+    })
+}
+
 /// A closed cube from -1 to 1 whose faces are cut into n x n squares. The tree's split planes are along the edges of
 /// these. `bulge` moves each point towards the unit sphere.
 pub fn cube(n: usize, bulge: f32) -> Vec<Triangle> {

@@ -36,7 +36,7 @@ use rayon::prelude::*;
 
 use crate::{
     accel::bounds::{Bounds, MARGIN, is_finite},
-    layout::{KD_MAX_ORIGIN_DISTANCE, Triangle},
+    layout::{KD_MAX_ORIGIN_DISTANCE, KdSlabTree, Triangle},
 };
 
 /// The finest scale of any tree. It bounds the rounding of moved origins: see the module's documentation.
@@ -70,6 +70,12 @@ impl Scales {
         let is_in_range = (LIMITS[0]..=LIMITS[1]).contains(&largest);
         let finest = if is_in_range { all.finest_needed(triangles) } else { 0 };
         Self { finest, ..all }
+    }
+
+    /// Returns the scales as kernels need them. All other members are 0.
+    pub(super) fn slab_tree(&self) -> KdSlabTree {
+        let Self { largest, margin, finest: finest_scale } = *self;
+        KdSlabTree { largest, margin, finest_scale, ..KdSlabTree::default() }
     }
 
     /// Returns the finest scale that `NEEDY_SHARE` of the triangles need.

@@ -5,6 +5,8 @@
 //! A slab holds the parts of triangles within their margins (bounds.rs) of the cell. It reaches beyond them by the
 //! epsilon of planes.rs at the coarsest of the scales of the cell and its triangles. The proof is that of planes.rs,
 //! except that rounding moves a slab by 5 of the units there, and a plane by 4.
+//!
+//! Kernels can compute the slabs of a tree, too (src/passes/kd_slabs.rs).
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -12,7 +14,7 @@ use rayon::prelude::*;
 use super::{KdTree, Node, clip::Polygon, scales::length_of};
 use crate::{
     accel::bounds::Bounds,
-    layout::{KD_HAS_SLAB, Slab, Triangle},
+    layout::{KD_HAS_SLAB, KdSlabTree, Slab, Triangle},
 };
 
 /// Limits of the number of entries below a split, by which the splits that may get a slab are chosen. On each path
@@ -46,6 +48,17 @@ impl KdTree {
         for (node, slab) in slabs.into_iter().flatten() {
             parts.slabs[node as usize] = slab;
             parts.nodes[node as usize].axis_and_child |= KD_HAS_SLAB;
+        }
+    }
+
+    /// Returns what kernels need to know of the tree to compute its slabs.
+    pub(crate) fn slab_tree(&self) -> KdSlabTree {
+        KdSlabTree {
+            box_min: self.box_min(),
+            n_nodes: self.nodes().len() as u32,
+            box_max: self.box_max(),
+            n_entries: self.leaf_triangles().len() as u32,
+            ..self.scales.slab_tree()
         }
     }
 
