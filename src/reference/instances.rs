@@ -131,6 +131,24 @@ fn in_geometry(instance: &Instance, ray: &SearchRay, t_best: f32) -> (SearchRay,
 /// Finds a ray's closest hit in all instances, or with `ANY_HIT` one that need not be the closest. `search` finds that
 /// of a ray in a geometry. A miss has t = `t_max`.
 pub fn search_instances<R: ReadCounter, const ANY_HIT: bool>(
+/// Calls `visit` for each instance that a ray may meet: with the inputs of the search through its geometry, the ray in
+/// its space, and the factor by which t is multiplied there.
+pub fn visit_instances<R: ReadCounter>(
+    inputs: &KernelInputs<R>,
+    instanced: &Instanced,
+    ray: &SearchRay,
+    mut visit: impl FnMut(&KernelInputs<R>, &SearchRay, f32),
+) {
+    let top_ray = TopRay::new(ray, inputs, instanced);
+    let mut at = TopCell { node_ix: 0, pending: 0 };
+    let wanted = (ray.t_max, inputs.kind_of_rays(false));
+    while let Some(instance) = at.find_instance(&top_ray, instanced, wanted, |n| inputs.kd_nodes.count(n)) {
+        let (local, inv_scale) = in_geometry(instance, ray, ray.t_max);
+        visit(&inputs.of_instance(instanced, instance), &local, inv_scale);
+        at.leave(&instanced.two.top().nodes);
+    }
+}
+
     inputs: &KernelInputs<R>,
     instanced: &Instanced,
     ray: &SearchRay,

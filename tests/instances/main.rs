@@ -3,6 +3,7 @@
 #[path = "../support/mod.rs"]
 mod support;
 
+mod all_hits;
 mod casts;
 mod costs;
 mod grids;
