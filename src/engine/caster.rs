@@ -74,8 +74,8 @@ impl<'a> Caster<'a> {
     /// [`GpuCaster::closest_points`](cast::GpuCaster::closest_points) does.
     ///
     /// # Errors
-    /// The triangles are in a grid or are those of instances, there are more than
-    /// [`MOST_REPETITIONS`](cast::MOST_REPETITIONS), memory runs out, or a call fails.
+    /// The triangles are in grids, there are more than [`MOST_REPETITIONS`](cast::MOST_REPETITIONS), memory runs out,
+    /// or a call fails.
     pub fn closest_points(&mut self, points: &[QueryPoint], n_times: u32) -> Result<CastResult, GpuError> {
         cast::check_repetitions(n_times)?;
         match &mut self.0 {

@@ -5,6 +5,7 @@ mod support;
 
 mod all_hits;
 mod casts;
+mod closest_points;
 mod costs;
 mod grids;
 mod margins;
