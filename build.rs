@@ -26,9 +26,6 @@ use std::{
 const SEARCHING: [(&str, bool); 5] =
     [("all_hits", false), ("cast", false), ("path_trace", true), ("shadow", true), ("trace", true)];
 
-/// Those of them that do not search in instances.
-const FLAT_ONLY: [&str; 1] = ["all_hits"];
-
 include!("src/accel/search_modules.rs");
 
 /// A module of SPIR-V: a shader, compiled with some macros.
@@ -212,8 +209,8 @@ fn searching_modules(kernel: &str, has_alpha_test: bool, path: &Path) -> Vec<Mod
         let with = |more: Vec<(&'static str, Option<String>)>| iter::once(traversal.clone()).chain(more).collect();
         let of_alpha = alpha_test.clone().map(|alpha_test| module("_alpha", with(vec![alpha_test])));
         let instances = alpha_test.into_iter().chain([("WITH_INSTANCES", None)]).collect();
-        let of_instances = (!FLAT_ONLY.contains(&kernel)).then(|| module("_instances", with(instances)));
-        iter::once(module("", with(Vec::new()))).chain(of_alpha).chain(of_instances).collect::<Vec<_>>()
+        let of_instances = module("_instances", with(instances));
+        iter::once(module("", with(Vec::new()))).chain(of_alpha).chain([of_instances]).collect::<Vec<_>>()
     };
     SEARCH_MODULES.into_iter().flat_map(of_search).collect()
 }

@@ -9,6 +9,9 @@
 // (Amstutz, Gribble, Guenther, Wald: An Evaluation of Multi-Hit Ray Traversal in a BVH Using Existing First-Hit/Any-Hit
 // Kernels, JCGT 2015, calls that next-hit traversal, with offsets in place of the order.)
 //
+// In a world of instances, the hits of one instance follow those of another, since their t, which are exact in the
+// instance's space alone, are rounded in the world's. The host brings them in order (src/cast/all_hits.rs).
+//
 // Reads cast_rays and the acceleration structure; updates hit_cursors, in which a suspended ray leaves its mark
 // (search/suspended_rays.glsl); writes listed_hits.
 #include "layout.glsl"
@@ -39,6 +42,7 @@ uint next_dispatch() {
 // one of them, so that the searches of a subgroup's rays take no more iterations than those of a cast.
 void find_hits(Ray ray, inout HitCursor cursor) {
     last_hit = Nearest(cursor.t, cursor.triangle_ix);
+    if (INSTANCED) next_cell = TopCell(cursor.top_node, cursor.top_pending);
     cursor.mark = NO_TRIANGLE;
     bool goes_on = cursor.next_ix < cursor.end_ix;
     while (goes_on) {
@@ -59,6 +63,10 @@ void find_hits(Ray ray, inout HitCursor cursor) {
     }
     cursor.t = last_hit.t;
     cursor.triangle_ix = last_hit.triangle_ix;
+    if (INSTANCED) {
+        cursor.top_node = next_cell.node_ix;
+        cursor.top_pending = next_cell.pending;
+    }
 }
 
 void main() {

@@ -6,11 +6,13 @@
 // (search/suspended_rays.glsl).
 // Source: Arya and Mount, Algorithms for Fast Vector Quantization, 1993: the search descends to the nearer child first
 // and keeps the other one, unless its cell is farther away than the best point. The distance to a cell is the length
-// of a vector of which each step down replaces one component.
+// of a vector of which each step down replaces one component. In a world of instances, that is the search through each
+// of them that may be closer (instances/closest.glsl).
 #include "layout.glsl"
 
 const bool COUNT_COSTS = false;
 const bool PREDICATES_BRANCHES = false;
+#include "constants.glsl"
 #include "scene.glsl"
 #include "search/suspended_rays.glsl"
 #include "search/steps.glsl"
@@ -20,8 +22,8 @@ const bool PREDICATES_BRANCHES = false;
 #include "search/point_triangle.glsl"
 #include "kdtree/kd_nodes.glsl"
 #include "kdtree/distant_cells.glsl"
+#include "instances/closest.glsl"
 #include "rays/lanes.glsl"
-#include "constants.glsl"
 
 layout(constant_id = CONSTANT_SKIPS_HIDDEN) const bool SKIPS_HIDDEN = false;
 
@@ -30,73 +32,44 @@ layout(push_constant) uniform CastBatchBlock { CastBatch batch; };
 layout(std430, set = 0, binding = BIND_CAST_POINTS) readonly buffer CastPointsBlock { QueryPoint cast_points[]; };
 layout(std430, set = 0, binding = BIND_CAST_HITS) buffer CastHitsBlock { Hit cast_hits[]; };
 
-// A leaf and those of its entries that are still to be tested.
-struct LeafVisit {
-    uint node_offset;
-    uint entry_ix;
-    uint end_ix;
-};
+#include "kdtree/closest.glsl"
 
-// The closest point so far: the square of its distance, its triangle and its weights.
-struct Closest {
-    float squared;
-    uint triangle_ix;
-    float u;
-    float v;
-};
-
-// Descends to the leaf of a cell that is closest to the point.
-LeafVisit descend(Query query, float best_squared, DistantCell cell) {
-    KdNode node = kd_node(cell.node_offset);
-    while (!is_leaf(node)) {
-        DistantCell near, far;
-        split_cell(query, node, cell, near, far);
-        push_if_closer(far, best_squared);
-        cell = near;
-        node = kd_node(cell.node_offset);
+// Searches the trees of all instances that may be closer. position: the point in the world.
+uint search_instances(Query query, vec3 position, inout Closest best) {
+    TopCell at = TopCell(0u, 0u);
+    bool is_inside = false;
+    if (is_resumed()) {
+        SuspendedRay state = suspended_rays[resumed_slot];
+        at = TopCell(state.top_node, state.top_pending);
+        is_inside = state.node_offset != NO_TRIANGLE;
+        resumes = is_inside;
     }
-    uint n_entries = node.axis_and_child >> KD_PAIR_SHIFT;
-    return LeafVisit(cell.node_offset, node.split_or_first, node.split_or_first + n_entries);
-}
-
-// Tests a triangle of a leaf. Of two that are equally close, the one of the lower index counts.
-void test_entry(Query query, uint entry_ix, inout Closest best) {
-    LeafTriangle entry = leaf_triangle_at(entry_ix);
-    if (SKIPS_HIDDEN && (load_triangle_materials(entry.triangle_ix) & TRIANGLE_HIDDEN) != 0u) return;
-    precise vec3 a = entry.v0 * query.scale - query.position;
-    precise vec3 b = entry.v1 * query.scale - query.position;
-    precise vec3 c = entry.v2 * query.scale - query.position;
-    PointOnTriangle at = closest_on_triangle(a, b, c);
-    bool is_first = at.squared == best.squared && entry.triangle_ix < best.triangle_ix;
-    if (at.squared < best.squared || is_first) best = Closest(at.squared, entry.triangle_ix, at.u, at.v);
-}
-
-#include "kdtree/resume_closest.glsl"
-
-// Searches the tree. Returns 0, or the mark of a search that was suspended.
-uint search(Query query, inout Closest best) {
-    LeafVisit leaf = LeafVisit(root_offset(), 0u, 0u); // nothing to test before the first descent
-    if (is_resumed()) leaf = resume(query, best);
-    else push_if_closer(root_of(query), best.squared);
     uint mark = 0u;
     bool goes_on = true;
     while (goes_on) {
         count_iteration();
-        if (leaf.entry_ix < leaf.end_ix) {
-            test_entry(query, leaf.entry_ix, best);
-            leaf.entry_ix += 1u;
-        } else if (n_pending > 0u) {
-            DistantCell cell = pop_pending();
-            if (may_be_closer(cell.gap, best.squared)) leaf = descend(query, best.squared, cell);
-        } else {
-            goes_on = false;
+        if (is_inside || find_closer_instance(query, best.squared, at)) {
+            enter_geometry(top_node_at(at.node_ix).link & ~TOP_LEAF);
+            outer = OuterSearch(at.node_ix, at.pending, 0.0, 0u);
+            mark = search_tree(query, local_query(position, query.scale), best);
+            if (mark == 0u) leave_node(at);
         }
+        is_inside = false;
+        goes_on = mark == 0u && at.node_ix != NO_TRIANGLE;
         if (goes_on && !has_iterations()) {
-            mark = suspend_at(leaf, best);
+            outer = OuterSearch(at.node_ix, at.pending, 0.0, 0u);
+            mark = suspend_at(LeafVisit(NO_TRIANGLE, 0u, 0u), best);
             goes_on = false;
         }
     }
     return mark;
+}
+
+// Searches all triangles. Returns 0, or the mark of a search that was suspended.
+uint search(Query query, vec3 position, inout Closest best) {
+    if (is_resumed()) best = resumed_best();
+    if (INSTANCED) return search_instances(query, position, best);
+    return search_tree(query, LocalQuery(query, 1.0, 0.0), best);
 }
 
 Hit miss() {
@@ -111,18 +84,14 @@ bool is_point(QueryPoint point) {
 }
 
 Hit find_closest(QueryPoint point) {
-    uint bits = max(longest_bits(point.position), max(longest_bits(accel.box_min), longest_bits(accel.box_max)));
-    uint exponent = clamp(bits >> 23, 1u, 253u);
-    float scale = uintBitsToFloat((254u - exponent) << 23); // 2^(127 - exponent)
-    float inv_scale = uintBitsToFloat(exponent << 23);
-    precise vec3 position = point.position * scale;
-    precise float most = point.t_max * scale;
+    Query query = query_at(point.position, accel.box_min, accel.box_max);
+    precise float most = point.t_max * query.scale;
     precise float most_squared = most * most;
     Closest best = Closest(most_squared, NO_TRIANGLE, 0.0, 0.0);
-    uint mark = search(Query(position, scale), best);
+    uint mark = search(query, point.position, best);
     if (CAN_SUSPEND && mark != 0u) return Hit(0.0, mark, 0.0, 0.0);
     if (best.triangle_ix == NO_TRIANGLE) return miss();
-    return Hit(min(sqrt(best.squared) * inv_scale, point.t_max), best.triangle_ix, best.u, best.v);
+    return Hit(min(sqrt(best.squared) * inverse_of(query.scale), point.t_max), best.triangle_ix, best.u, best.v);
 }
 
 void main() {

@@ -1258,19 +1258,22 @@ struct CastBatch {
     uint resume_pass;
 };
 
-// How far a ray is on its way from hit to hit, 20 bytes (all_hits.comp).
+// How far a ray is on its way from hit to hit, 28 bytes (all_hits.comp).
 //
 // - `t`, `triangle_ix`: the last hit, `NO_TRIANGLE` before the first one. `t` is counted from the ray's origin as the
-//   search has moved it.
+//   search has moved it, in the space of the hit's instance if there are instances.
 // - `next_ix`: where the next hit belongs. If hits are only counted, it is their number.
 // - `end_ix`: the value of `next_ix` at which the ray ends.
 // - `mark`: that of a suspended ray, or `NO_TRIANGLE`.
+// - `top_node`, `top_pending`: the place in the hierarchy over the instances, 0 before the first search.
 struct HitCursor {
     float t;
     uint triangle_ix;
     uint next_ix;
     uint end_ix;
     uint mark;
+    uint top_node;
+    uint top_pending;
 };
 
 // Push constants of a cast by the driver's own ray tracing: the device address of its acceleration structure.

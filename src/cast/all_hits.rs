@@ -5,14 +5,14 @@
 
 use std::{ops::Range, sync::Arc};
 
+use bytemuck::Zeroable;
+
 use super::{CpuCaster, GpuCaster, Hit, NO_TRIANGLE, Ray};
 use crate::{
     buffers::{AllHitsResources, ResumePass},
-    frame::BadOptions,
     gpu::{BindingLayout, GpuError},
     layout::HitCursor,
     passes, reference,
-    world::Geometry,
 };
 
 /// All hits of rays.
@@ -26,51 +26,38 @@ pub struct AllHits {
 }
 
 impl AllHits {
-    /// `ends`: where each ray's hits end.
-    fn new(ends: impl IntoIterator<Item = u64>, mut hits: Vec<Hit>) -> Self {
-        let ray_splits: Vec<u64> = std::iter::once(0).chain(ends).collect();
-        // Rays from afar were searched from a nearer origin. There t can differ that are the same when they are counted
-        // from the ray's own origin.
-        for ends in ray_splits.windows(2) {
-            hits[ends[0] as usize..ends[1] as usize]
-                .sort_by(|a, b| a.t.total_cmp(&b.t).then(a.triangle_ix.cmp(&b.triangle_ix)));
+    /// `ends`: where each ray's hits end. The `most` nearest hits of a ray are kept.
+    fn new(ends: impl IntoIterator<Item = usize>, mut hits: Vec<Hit>, most: usize) -> Self {
+        let (mut ray_splits, mut begin, mut n_kept) = (vec![0], 0, 0);
+        for end in ends {
+            // Hits of several instances have no order. Rays from afar were searched from a nearer origin: there t can
+            // differ that are the same when they are counted from the ray's own origin.
+            hits[begin..end].sort_by(|a, b| a.t.total_cmp(&b.t).then(a.triangle_ix.cmp(&b.triangle_ix)));
+            let n = most.min(end - begin);
+            hits.copy_within(begin..begin + n, n_kept);
+            n_kept += n;
+            ray_splits.push(n_kept as u64);
+            begin = end;
         }
+        hits.truncate(n_kept);
         Self { ray_splits, hits }
     }
-}
-
-/// Refuses worlds of instances.
-fn check_flat(geometry_is_flat: bool) -> Result<(), BadOptions> {
-    let why = "all hits of a ray are not found in kept instances: flatten them (`--instances flatten`)";
-    if geometry_is_flat { Ok(()) } else { Err(BadOptions(why.to_owned())) }
 }
 
 impl CpuCaster<'_> {
     /// Counts the triangles that each ray meets in (`t_min`, `t_max`]. Each counts once, also if it coincides with
     /// others.
-    ///
-    /// # Errors
-    /// The world has instances.
-    pub fn count_hits(&self, rays: &[Ray]) -> Result<Vec<u32>, BadOptions> {
-        check_flat(is_flat(self.geometry()))?;
-        Ok(reference::all_hits::count_hits(&self.inputs(), self.traversal, rays))
+    pub fn count_hits(&self, rays: &[Ray]) -> Vec<u32> {
+        reference::all_hits::count_hits(&self.inputs(), self.traversal, rays)
     }
 
     /// Lists the hits that [`Self::count_hits`] counts, or of each ray the `most_per_ray` nearest ones. The
-    /// t that decide are those of the search, which are not rounded to the far origin of a ray from afar.
-    ///
-    /// # Errors
-    /// The world has instances.
-    pub fn all_hits(&self, rays: &[Ray], most_per_ray: Option<u32>) -> Result<AllHits, BadOptions> {
-        check_flat(is_flat(self.geometry()))?;
+    /// t that decide are those of the search, which without instances are not rounded to the far origin of a ray.
+    pub fn all_hits(&self, rays: &[Ray], most_per_ray: Option<u32>) -> AllHits {
         let most = most_per_ray.map_or(usize::MAX, |most| most as usize);
         let (ends, hits) = reference::all_hits::list_hits(&self.inputs(), self.traversal, rays, most);
-        Ok(AllHits::new(ends.into_iter().map(|end| end as u64), hits))
+        AllHits::new(ends, hits, most)
     }
-}
-
-fn is_flat(geometry: Geometry) -> bool {
-    geometry.accel().structures_id().is_none()
 }
 
 /// The kernels of a [`GpuCaster`], and what they bind.
@@ -85,7 +72,7 @@ impl GpuCaster {
     /// coincides with others.
     ///
     /// # Errors
-    /// The world has instances, memory runs out, or a call fails.
+    /// Memory runs out, or a call fails.
     pub fn count_hits(&mut self, rays: &[Ray]) -> Result<Vec<u32>, GpuError> {
         let kernels = self.hit_kernels()?;
         let mut counts = Vec::with_capacity(rays.len());
@@ -96,30 +83,30 @@ impl GpuCaster {
     }
 
     /// Lists the hits that [`Self::count_hits`] counts, or of each ray the `most_per_ray` nearest ones. The
-    /// t that decide are those of the search, which are not rounded to the far origin of a ray from afar.
+    /// t that decide are those of the search, which without instances are not rounded to the far origin of a ray.
     ///
     /// # Errors
-    /// The world has instances, a ray has more hits than a buffer of the device holds, memory runs out, or a call
-    /// fails.
+    /// A ray has more hits than a buffer of the device holds, memory runs out, or a call fails.
     pub fn all_hits(&mut self, rays: &[Ray], most_per_ray: Option<u32>) -> Result<AllHits, GpuError> {
         let kernels = self.hit_kernels()?;
+        // Of several instances, the last one may have the nearest hit.
+        let most_found = most_per_ray.filter(|_| self.structures_id.is_none()).unwrap_or(u32::MAX);
         let (mut ends, mut hits) = (Vec::with_capacity(rays.len()), Vec::new());
         for batch in rays.chunks(self.rays_per_batch) {
-            let counts = self.count_batch(&kernels, batch, most_per_ray.unwrap_or(u32::MAX))?;
-            let mut end = hits.len() as u64;
+            let counts = self.count_batch(&kernels, batch, most_found)?;
+            let mut end = hits.len();
             ends.extend(counts.iter().map(|count| {
-                end += u64::from(*count);
+                end += *count as usize;
                 end
             }));
             for part in parts(&counts, HITS_PER_RAY * self.rays_per_batch as u64) {
                 hits.extend(self.list_part(&kernels, &batch[part.clone()], &counts[part])?);
             }
         }
-        Ok(AllHits::new(ends, hits))
+        Ok(AllHits::new(ends, hits, most_per_ray.map_or(usize::MAX, |most| most as usize)))
     }
 
     fn hit_kernels(&self) -> Result<Kernels, GpuError> {
-        check_flat(self.structures_id.is_none())?;
         let bindings = AllHitsResources::bindings(&self.context, &self.tree)?;
         let kernel = |lists| passes::AllHits::new(&self.context, &bindings, self.traversal, lists);
         Ok(Kernels { count: kernel(false)?, list: kernel(true)?, bindings })
@@ -127,7 +114,7 @@ impl GpuCaster {
 
     fn count_batch(&self, kernels: &Kernels, rays: &[Ray], most: u32) -> Result<Vec<u32>, GpuError> {
         let resources = AllHitsResources::new(&self.context, &kernels.bindings, &self.tree, [rays.len(), 0])?;
-        let cursor = HitCursor { t: 0.0, triangle_ix: NO_TRIANGLE, next_ix: 0, end_ix: most, mark: NO_TRIANGLE };
+        let cursor = cursor_at(0..most);
         self.find_hits(&kernels.count, &resources, rays, &vec![cursor; rays.len()])?;
         let cursors = resources.hit_cursors.download_first(rays.len())?;
         Ok(cursors.iter().map(|cursor| cursor.next_ix).collect())
@@ -149,7 +136,7 @@ impl GpuCaster {
         let cursor = |count: &u32| {
             let next_ix = end_ix;
             end_ix += count;
-            HitCursor { t: 0.0, triangle_ix: NO_TRIANGLE, next_ix, end_ix, mark: NO_TRIANGLE }
+            cursor_at(next_ix..end_ix)
         };
         let cursors: Vec<_> = counts.iter().map(cursor).collect();
         self.find_hits(&kernels.list, &resources, rays, &cursors)?;
@@ -176,6 +163,12 @@ impl GpuCaster {
         })?;
         Ok(())
     }
+}
+
+/// Returns the cursor of a ray that begins, whose hits have these places.
+fn cursor_at(places: Range<u32>) -> HitCursor {
+    let Range { start: next_ix, end: end_ix } = places;
+    HitCursor { next_ix, end_ix, triangle_ix: NO_TRIANGLE, mark: NO_TRIANGLE, ..HitCursor::zeroed() }
 }
 
 /// The hits that are listed at a time, as a multiple of a batch's rays. Their buffer is then as large as that of rays.

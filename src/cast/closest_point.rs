@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::{CastResult, CpuCaster, GpuCaster, Hit, QueryPoint, check_repetitions};
 use crate::{
+    accel::AccelKind,
     buffers::PointResources,
     frame::BadOptions,
     gpu::{BindingLayout, Commands, GpuError},
@@ -28,11 +29,11 @@ impl GpuCaster {
     /// `t_max` is NaN or negative. Hidden triangles are not there.
     ///
     /// # Errors
-    /// The triangles are in a grid or are those of instances, there are more than
-    /// [`MOST_REPETITIONS`](super::MOST_REPETITIONS), memory runs out, or a call fails.
+    /// The triangles are in grids, there are more than [`MOST_REPETITIONS`](super::MOST_REPETITIONS), memory runs out,
+    /// or a call fails.
     pub fn closest_points(&mut self, points: &[QueryPoint], n_times: u32) -> Result<CastResult, GpuError> {
         check_repetitions(n_times)?;
-        check_structure(self.is_flat_tree)?;
+        check_structure(self.accel_kind)?;
         let search = self.prepared_for(points.len())?;
         let PointResources { cast_points, cast_hits, set } = &search.resources;
         let record = |commands: &Commands, n_points, pass| search.kernel.record(commands, set, n_points, pass);
@@ -64,18 +65,18 @@ impl CpuCaster<'_> {
     /// the current rayon pool.
     ///
     /// # Errors
-    /// The triangles are in a grid or are those of instances.
+    /// The triangles are in grids.
     pub fn closest_points(&self, points: &[QueryPoint]) -> Result<Vec<Hit>, BadOptions> {
-        check_structure(self.geometry().accel().as_kdtree().is_some())?;
+        check_structure(self.geometry().accel().kind())?;
         let mut hits = vec![Hit::zeroed(); points.len()];
         reference::closest_point::closest_point(&self.inputs(), points, &mut hits);
         Ok(hits)
     }
 }
 
-fn check_structure(is_flat_tree: bool) -> Result<(), BadOptions> {
-    let refusal = "closest points are found in a kd-tree without instances (--accel kdtree --instances flatten)";
-    if is_flat_tree { Ok(()) } else { Err(BadOptions(refusal.to_owned())) }
+fn check_structure(kind: AccelKind) -> Result<(), BadOptions> {
+    let refusal = "closest points are found in kd-trees (--accel kdtree)";
+    if kind == AccelKind::KdTree { Ok(()) } else { Err(BadOptions(refusal.to_owned())) }
 }
 
 /// Counts the points that can only miss. Their position is not finite, or their `t_max` is NaN or negative.

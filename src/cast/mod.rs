@@ -45,7 +45,7 @@ pub use self::{
 pub use crate::layout::{Hit, NO_TRIANGLE, QueryPoint, Ray};
 use crate::{
     accel::{
-        Query,
+        AccelKind, Query,
         kdtree::{Traversal, TraversalLinks},
         two_level::StructuresId,
         wide_bvh::WideBvh,
@@ -97,8 +97,8 @@ pub struct GpuCaster {
     resources: CastResources,
     /// The search for closest points, created at its first use.
     point_search: Option<closest_point::PointSearch>,
-    /// Whether there are neither instances nor a grid.
-    is_flat_tree: bool,
+    /// The kind of the structure, or of that of each geometry.
+    accel_kind: AccelKind,
     rays_per_batch: usize,
 }
 
@@ -124,7 +124,7 @@ impl GpuCaster {
             closest: None,
             any: None,
             point_search: None,
-            is_flat_tree: geometry.accel().as_kdtree().is_some(),
+            accel_kind: geometry.accel().kind(),
         })
     }
 
@@ -153,6 +153,7 @@ impl GpuCaster {
         tree.set_instances(&self.context, geometry)?;
         self.resources = self.resources.with_accel(&self.bindings, &tree)?;
         self.tree = tree;
+        self.point_search = None;
         Ok(())
     }
 

@@ -546,8 +546,8 @@ impl CastArgs {
     /// Refuses arguments that contradict each other.
     pub fn check(&self) -> Result<(), CliError> {
         check_accel(self.accel, self.traversal, self.build)?;
-        if self.closest && (self.accel != AccelKind::KdTree || self.instances == Instancing::Keep) {
-            let reason = "--closest searches a kd-tree without instances: use --accel kdtree --instances flatten";
+        if self.closest && self.accel != AccelKind::KdTree {
+            let reason = "--closest searches kd-trees: use --accel kdtree";
             return Err(CliError::Usage(reason.to_owned()));
         }
         require_ending(&self.output, "npz", "a file of hits")

@@ -45,7 +45,7 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
 
     let engine = device.clone().map_or_else(Engine::on_cpu, Engine::on_device).with_request(args.request());
     let n_triangles = opened.scene.n_triangles();
-    let building = engine.builder().describe(n_triangles);
+    let building = engine.builder().describe(&opened.scene);
     let (built, _) = progress.stage(&building, || engine.build(opened, &Work::Rays(queries.n())));
     let (Loaded { world, accel, build_ms, .. }, methods) = built?;
     let casting = format!("casting {} {}", queries.n(), args.noun());

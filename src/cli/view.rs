@@ -149,7 +149,7 @@ fn load(args: &ViewArgs, progress: &Progress) -> Result<Start, CliError> {
         let n_samples = u64::from(tour.n_frames()) * u64::from(n_samples(args, true));
         settings.request.work = engine::Work::Window { n_samples: Some(n_samples) };
     }
-    let building = settings.builder.describe(opened.scene.n_triangles());
+    let building = settings.builder.describe(&opened.scene);
     settings.builder.progress = progress.observer(&building, &[Work::Building]);
     let (loaded, _) = progress.stage(&building, || LoadedScene::build(Some(path), opened, &settings));
     let loaded = loaded?;

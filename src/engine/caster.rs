@@ -86,8 +86,8 @@ impl<'a> Caster<'a> {
     /// [`GpuCaster::closest_points`](cast::GpuCaster::closest_points) does.
     ///
     /// # Errors
-    /// The triangles are in a grid or are those of instances, there are more than
-    /// [`MOST_REPETITIONS`](cast::MOST_REPETITIONS), memory runs out, or a call fails.
+    /// The triangles are in grids, there are more than [`MOST_REPETITIONS`](cast::MOST_REPETITIONS), memory runs out,
+    /// or a call fails.
     pub fn closest_points(&mut self, points: &[QueryPoint], n_times: u32) -> Result<CastResult, GpuError> {
         cast::check_repetitions(n_times)?;
         match &mut self.0 {
@@ -103,23 +103,22 @@ impl<'a> Caster<'a> {
     /// others.
     ///
     /// # Errors
-    /// The world has instances, memory runs out, or a call fails.
+    /// Memory runs out, or a call fails.
     pub fn count_hits(&mut self, rays: &[Ray]) -> Result<Vec<u32>, GpuError> {
         match &mut self.0 {
             Backend::Device(caster) => caster.count_hits(rays),
-            Backend::Cpu(caster) => Ok(caster.count_hits(rays)?),
+            Backend::Cpu(caster) => Ok(caster.count_hits(rays)),
         }
     }
 
     /// Lists the hits that [`Self::count_hits`] counts, or of each ray the `most_per_ray` nearest ones.
     ///
     /// # Errors
-    /// The world has instances, a ray has more hits than a buffer of the device holds, memory runs out, or a call
-    /// fails.
+    /// A ray has more hits than a buffer of the device holds, memory runs out, or a call fails.
     pub fn all_hits(&mut self, rays: &[Ray], most_per_ray: Option<u32>) -> Result<AllHits, GpuError> {
         match &mut self.0 {
             Backend::Device(caster) => caster.all_hits(rays, most_per_ray),
-            Backend::Cpu(caster) => Ok(caster.all_hits(rays, most_per_ray)?),
+            Backend::Cpu(caster) => Ok(caster.all_hits(rays, most_per_ray)),
         }
     }
 }

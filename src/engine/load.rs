@@ -251,10 +251,9 @@ impl Builder {
             self.require_for_pictures(&options, n_samples, n_at_once)?;
         }
         let keeps_instances = self.request.instances.keeps(&scene);
-        let n_built = if keeps_instances { scene.n_stored() } else { scene.n_triangles() };
         let workload = work.workload(&scene, &options);
         let accel = self.request.choose_accel(self.processor, scene.n_triangles(), &workload);
-        self.require_for_build(accel, n_built)?;
+        self.require_for_build(accel, &scene)?;
         let flat = if keeps_instances { FlatScene::with_instances(&scene)? } else { FlatScene::new(&scene)? };
         notes.extend(note_of_instances(&flat, self.request.instances));
         let bounds = scene.shown_bounds();

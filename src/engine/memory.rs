@@ -7,6 +7,7 @@ use super::{
 use crate::{
     frame::{Integrator, RenderOptions},
     layout::{PixelAovs, Triangle},
+    scene::Scene,
     util::memory::{OutOfMemory, require},
 };
 
@@ -47,19 +48,24 @@ impl Builder {
         require(&what, u64::from(n_at_once) * needed)
     }
 
-    /// Refuses triangles and their structure if they, and the build, do not fit in the host's memory.
-    pub(super) fn require_for_build(&self, accel: ChosenAccel, n_triangles: usize) -> Result<(), OutOfMemory> {
+    /// Refuses a scene's triangles and their structure if they, and the build, do not fit in the host's memory.
+    pub(super) fn require_for_build(&self, accel: ChosenAccel, scene: &Scene) -> Result<(), OutOfMemory> {
         let bytes = match accel.tree_kind().map(|chosen| chosen.value) {
             Some(TreeKind::Fast) => BYTES_OF_FAST_BUILD,
             Some(TreeKind::Best) => BYTES_OF_BEST_BUILD,
             None => BYTES_OF_GRID_BUILD,
         };
-        require(&self.describe(n_triangles), n_triangles as u64 * (size_of::<Triangle>() as u64 + bytes))
+        require(&self.describe(scene), self.n_built(scene) as u64 * (size_of::<Triangle>() as u64 + bytes))
     }
 
-    /// Names the build of a structure, for progress and errors.
-    pub fn describe(&self, n_triangles: usize) -> String {
-        format!("building the {} of {n_triangles} triangles", self.request.accel.name())
+    /// Names the build of a scene's structure and the number of triangles in it, for progress and errors. Of meshes
+    /// that are stored once, each triangle counts once.
+    pub fn describe(&self, scene: &Scene) -> String {
+        format!("building the {} of {} triangles", self.request.accel.name(), self.n_built(scene))
+    }
+
+    fn n_built(&self, scene: &Scene) -> usize {
+        if self.request.instances.keeps(scene) { scene.n_stored() } else { scene.n_triangles() }
     }
 }
 
@@ -85,8 +91,27 @@ fn aovs_bytes(options: &RenderOptions) -> u64 {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
+    use glam::Vec3;
+
     use super::*;
-    use crate::engine::choices::Request;
+    use crate::{
+        engine::choices::Request,
+        scene::{Instance, Mesh},
+        world::instances::Instancing,
+    };
+
+    #[test]
+    fn triangles_that_are_stored_once_are_built_once() {
+        let mut scene = Scene::empty(Path::new("thrice"));
+        scene.meshes = vec![Mesh::of_triangles(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]])];
+        scene.instances = vec![Instance::default(); 3];
+        let described = [Instancing::Keep, Instancing::Flatten].map(|instances| {
+            Builder::new(Processor::Cpu, Request { instances, ..Request::default() }).describe(&scene)
+        });
+        assert_eq!(described, ["building the kd-tree of 1 triangles", "building the kd-tree of 3 triangles"]);
+    }
 
     #[test]
     fn a_pixel_s_buffers_are_counted_and_a_usual_picture_is_not_refused() {

@@ -23,9 +23,6 @@ impl AllHits {
     ///
     /// # Errors
     /// The driver refuses the shader.
-    ///
-    /// # Panics
-    /// The bindings are those of a world of instances.
     pub fn new(
         context: &Arc<Context>,
         bindings: &Arc<BindingLayout>,

@@ -368,7 +368,7 @@ mod tests {
 
     #[test]
     fn every_traversal_has_its_modules() {
-        for (kernel, n_of_each) in [("all_hits", 1), ("cast", 2), ("path_trace", 3), ("shadow", 3), ("trace", 3)] {
+        for (kernel, n_of_each) in [("all_hits", 2), ("cast", 2), ("path_trace", 3), ("shadow", 3), ("trace", 3)] {
             let modules: Vec<_> = modules_of(kernel).map(|module| module.file).collect();
             let n_modules = n_of_each * (Traversal::ALL.len() + 1);
             assert_eq!(modules.len(), n_modules, "{kernel}: those of the grid, too");

@@ -1,4 +1,5 @@
-//! All hits: the hits of each given ray, in the order of t and then of the triangles' indices. Twin of `all_hits.comp`.
+//! All hits: the hits of each given ray, in the order of t and then of the triangles' indices, those of one instance
+//! after those of another. Twin of `all_hits.comp`.
 
 use rayon::prelude::*;
 
@@ -6,8 +7,9 @@ use super::{
     RAYS_PER_TASK,
     cast::{scaled, scales_of},
     inputs::KernelInputs,
+    instances::visit_instances,
     search_ray::SearchRay,
-    traversal_ray::{TraversalRay, near_scene, t_from_origin},
+    traversal_ray::{TraversalRay, min, near_scene, t_from_origin},
     traverser::Traverser,
 };
 use crate::{
@@ -15,8 +17,17 @@ use crate::{
     layout::{Hit, NO_TRIANGLE, Ray},
 };
 
-/// Calls `visit` with the hits of a ray in a world without instances, until it returns false.
+/// Calls `visit` with the hits of a ray. Without instances, the first false that it returns ends that.
 fn visit_hits(inputs: &KernelInputs, tracer: &mut Traverser, ray: &SearchRay, mut visit: impl FnMut(Hit) -> bool) {
+    let Some(instanced) = &inputs.instanced else { return visit_structure(inputs, tracer, ray, visit) };
+    visit_instances(inputs, instanced, ray, |geometry, local, inv_scale| {
+        let in_world = |hit: Hit| Hit { t: min(hit.t / inv_scale, ray.t_max), ..geometry.in_world(&hit) };
+        visit_structure(geometry, tracer, local, |hit| visit(in_world(hit)));
+    });
+}
+
+/// Calls `visit` with the hits of a ray in one structure, until it returns false.
+fn visit_structure(inputs: &KernelInputs, tracer: &mut Traverser, ray: &SearchRay, mut visit: impl FnMut(Hit) -> bool) {
     let (mut near, t_start) = near_scene(inputs, ray);
     let mut last_triangle = NO_TRIANGLE;
     loop {
@@ -32,7 +43,7 @@ fn visit_hits(inputs: &KernelInputs, tracer: &mut Traverser, ray: &SearchRay, mu
     }
 }
 
-/// Appends up to `most` hits of a ray.
+/// Appends up to `most` hits of a ray, which with instances is above their number.
 fn append_hits(inputs: &KernelInputs, tracer: &mut Traverser, ray: &Ray, most: usize, hits: &mut Vec<Hit>) {
     let ([scale, _], end) = (scales_of(ray.direction), hits.len().saturating_add(most));
     if most > 0 {
@@ -56,8 +67,10 @@ pub fn count_hits(inputs: &KernelInputs, traversal: Traversal, rays: &[Ray]) -> 
     rays.par_iter().map_init(|| Traverser::new(inputs, traversal), count).collect()
 }
 
-/// Returns the hits of all rays one after the other, at most `most` of each ray, and where those of each ray end.
+/// Returns the hits of all rays one after the other, at most `most` of each ray, and where those of each ray end. With
+/// instances, all hits of a ray are listed.
 pub fn list_hits(inputs: &KernelInputs, traversal: Traversal, rays: &[Ray], most: usize) -> (Vec<usize>, Vec<Hit>) {
+    let most = if inputs.instanced.is_some() { usize::MAX } else { most };
     let list = |tracer: &mut Traverser, rays: &[Ray]| {
         let mut hits = Vec::new();
         let append = |ray| {

@@ -4,7 +4,8 @@ use rayon::prelude::*;
 
 use super::{
     RAYS_PER_TASK,
-    cast::{MISS, exponent_of},
+    cast::MISS,
+    closest_instances::search_instances,
     distant_cells::{DistantCell, Query},
     inputs::KernelInputs,
     kdtree::is_leaf,
@@ -40,64 +41,70 @@ impl Pending {
 }
 
 /// Descends to the leaf of a cell that is closest to the point.
-fn descend(
-    inputs: &KernelInputs,
-    query: Query,
-    best_squared: f32,
-    mut cell: DistantCell,
-    pending: &mut Pending,
-) -> KdNode {
+fn descend(inputs: &KernelInputs, query: Query, limit: f32, mut cell: DistantCell, pending: &mut Pending) -> KdNode {
     loop {
         let node = inputs.kd_nodes[cell.node_ix as usize];
         if is_leaf(node) {
             return node;
         }
         let [near, far] = cell.split(query, node);
-        pending.push_if_closer(far, best_squared);
+        pending.push_if_closer(far, limit);
         cell = near;
     }
 }
 
 /// Tests a triangle. Of two that are equally close, the one of the lower index counts. `best.t` is the square of the
 /// distance.
-fn test(inputs: &KernelInputs, Query { position, scale }: Query, triangle_ix: u32, best: &mut Hit) {
+fn test(inputs: &KernelInputs, Query { position, scale }: Query, entry: u32, best: &mut Hit) {
+    let triangle_ix = inputs.inside.map_or(entry, |instance| instance.first_triangle + entry);
     let is_hidden = |ix: u32| inputs.triangle_materials[ix as usize] & TRIANGLE_HIDDEN != 0;
     if inputs.filters && is_hidden(triangle_ix) {
         return;
     }
-    let triangle = &inputs.triangles[triangle_ix as usize];
-    let at = closest_on_triangle([triangle.v0, triangle.v1, triangle.v2].map(|v| v * scale - position));
+    let at = closest_on_triangle(inputs.corners(entry).map(|v| v * scale - position));
     if at.squared < best.t || at.squared == best.t && triangle_ix < best.triangle_ix {
         *best = Hit { t: at.squared, triangle_ix, u: at.u, v: at.v };
     }
 }
 
-/// Searches the tree. `best.t` is the square of the distance.
-fn search(inputs: &KernelInputs, query: Query, best: &mut Hit) {
-    let root = DistantCell::root(inputs, query);
-    let mut pending = Pending { cells: [root; KD_MAX_DEPTH as usize], n: 0 };
-    let mut next = Some(root);
-    while let Some(cell) = next {
-        if cell.may_be_closer(best.t) {
-            let leaf = descend(inputs, query, best.t, cell, &mut pending);
-            entries_of(leaf).for_each(|entry_ix| test(inputs, query, inputs.leaf_triangles[entry_ix], best));
+/// A search through a tree: the point in the world and in the tree's space, and what gives the square of the distance
+/// there beyond which no point is as close as the best one. `best.t` is the square of the distance in the world.
+pub(super) struct TreeSearch<L: Fn(f32) -> f32> {
+    pub query: Query,
+    pub in_tree: Query,
+    pub limit_of: L,
+}
+
+impl<L: Fn(f32) -> f32> TreeSearch<L> {
+    pub fn run(&self, inputs: &KernelInputs, best: &mut Hit) {
+        let root = DistantCell::root(inputs, self.in_tree);
+        let mut pending = Pending { cells: [root; KD_MAX_DEPTH as usize], n: 0 };
+        let mut next = Some(root);
+        while let Some(cell) = next {
+            let limit = (self.limit_of)(best.t);
+            if cell.may_be_closer(limit) {
+                let leaf = descend(inputs, self.in_tree, limit, cell, &mut pending);
+                entries_of(leaf).for_each(|entry_ix| test(inputs, self.query, inputs.leaf_triangles[entry_ix], best));
+            }
+            next = pending.pop();
         }
-        next = pending.pop();
     }
 }
 
 /// Returns the closest point of the triangles, for a point that [`is_point`].
 fn find_closest(inputs: &KernelInputs, point: &QueryPoint) -> Hit {
-    let exponents = [point.position, inputs.box_min, inputs.box_max].map(exponent_of);
-    let exponent = exponents.into_iter().fold(1, u32::max).min(253);
-    let [scale, inv_scale] = [254 - exponent, exponent].map(|exponent| f32::from_bits(exponent << 23));
-    let most: f32 = point.t_max * scale;
+    let query = Query::at(point.position, [inputs.box_min, inputs.box_max]);
+    let most: f32 = point.t_max * query.scale;
     let mut best = Hit { t: most * most, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
-    search(inputs, Query { position: point.position * scale, scale }, &mut best);
-    if best.triangle_ix == NO_TRIANGLE { MISS } else { Hit { t: (best.t.sqrt() * inv_scale).min(point.t_max), ..best } }
+    match &inputs.instanced {
+        Some(instanced) => search_instances(inputs, instanced, point.position, query, &mut best),
+        None => TreeSearch { query, in_tree: query, limit_of: |squared| squared }.run(inputs, &mut best),
+    }
+    let to_world = 1.0 / query.scale;
+    if best.triangle_ix == NO_TRIANGLE { MISS } else { Hit { t: (best.t.sqrt() * to_world).min(point.t_max), ..best } }
 }
 
-/// Finds the closest point of each of `points`, through the kd-tree of a flat world, and writes one hit for each: the
+/// Finds the closest point of each of `points`, through the kd-trees, and writes one hit for each: the
 /// distance is `t`. A point without a closest one gets a miss, as a ray does.
 pub fn closest_point(inputs: &KernelInputs, points: &[QueryPoint], hits: &mut [Hit]) {
     points.par_iter().with_min_len(RAYS_PER_TASK).zip(hits).for_each(|(point, hit)| {

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::inputs::KernelInputs;
+use super::{cast::exponent_of, inputs::KernelInputs};
 use crate::layout::{KD_AXIS_MASK, KD_PAIR_SHIFT, KdNode};
 
 /// A point in units of 1 / `scale`, a power of two that brings all coordinates below 4.
@@ -12,6 +12,20 @@ pub(super) struct Query {
     pub scale: f32,
 }
 
+impl Query {
+    /// The query of a point at a box.
+    pub fn at(position: Vec3, bounds: [Vec3; 2]) -> Self {
+        let exponent = bounds.map(exponent_of).into_iter().fold(exponent_of(position), u32::max).clamp(1, 253);
+        let scale = f32::from_bits((254 - exponent) << 23);
+        Self { position: position * scale, scale }
+    }
+
+    /// Returns the distance from the point to a box on each axis.
+    pub fn gap_to(self, [box_min, box_max]: [Vec3; 2]) -> Vec3 {
+        (box_min * self.scale - self.position).max(self.position - box_max * self.scale).max(Vec3::ZERO)
+    }
+}
+
 /// A node, and the distance from the point to the node's cell on each axis, which is 0 within the cell's extent.
 #[derive(Clone, Copy)]
 pub(super) struct DistantCell {
@@ -19,16 +33,21 @@ pub(super) struct DistantCell {
     pub gap: Vec3,
 }
 
+/// Returns whether what is this far away on each axis may be as close as the best point. The kernel's file derives the
+/// share.
+pub(super) fn is_within(gap: Vec3, best_squared: f32) -> bool {
+    const SHARE: f32 = 0.999_999_05; // 1 - 2^-20
+    SHARE * gap.dot(gap) <= best_squared
+}
+
 impl DistantCell {
-    pub fn root(inputs: &KernelInputs, Query { position, scale }: Query) -> Self {
-        let outside = (inputs.box_min * scale - position).max(position - inputs.box_max * scale);
-        Self { node_ix: 0, gap: outside.max(Vec3::ZERO) }
+    pub fn root(inputs: &KernelInputs, query: Query) -> Self {
+        Self { node_ix: 0, gap: query.gap_to([inputs.box_min, inputs.box_max]) }
     }
 
-    /// Returns whether the cell may hold a point that is as close as the best one. The kernel's file derives the share.
+    /// Returns whether the cell may hold a point that is as close as the best one.
     pub fn may_be_closer(&self, best_squared: f32) -> bool {
-        const SHARE: f32 = 0.999_999_05; // 1 - 2^-20
-        SHARE * self.gap.dot(self.gap) <= best_squared
+        is_within(self.gap, best_squared)
     }
 
     /// Returns the children of a split: the one on the point's side of the plane, which is as close as the split's

@@ -159,6 +159,14 @@ impl<'a, R> KernelInputs<'a, R> {
         instance.map_or(self.triangles[row], |it| it.triangle(&self.triangles[row]))
     }
 
+    /// Returns the corners, in the world, of a triangle of the structure that is searched.
+    pub(super) fn corners(&self, triangle_ix: u32) -> [Vec3; 3] {
+        let t = &self.triangles[triangle_ix as usize];
+        let corners = [t.v0, t.v1, t.v2];
+        let Some(instance) = self.inside else { return corners };
+        Stored { row: 0, instance: Some(instance) }.corners(corners.map(|corner| instance.point(corner)))
+    }
+
     /// Returns the index of the material of a triangle of the world.
     #[inline(always)]
     pub fn material_ix_of(&self, triangle_ix: u32) -> u32 {

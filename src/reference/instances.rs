@@ -16,9 +16,9 @@ const MISSES: f32 = 3.0e38;
 /// A node, and the pending siblings above it: bit i belongs to the node i levels above. `NO_TRIANGLE` in place of the
 /// node: nothing is left.
 #[derive(Clone, Copy)]
-struct TopCell {
-    node_ix: u32,
-    pending: u32,
+pub(super) struct TopCell {
+    pub node_ix: u32,
+    pub pending: u32,
 }
 
 /// A ray of the world as boxes see it.
@@ -54,7 +54,7 @@ impl TopRay {
 
 impl TopCell {
     /// Goes up to the nearest pending sibling.
-    fn leave(&mut self, nodes: &[TopNode]) {
+    pub fn leave(&mut self, nodes: &[TopNode]) {
         if self.pending == 0 {
             self.node_ix = NO_TRIANGLE;
             return;
@@ -106,12 +106,15 @@ impl TopCell {
     }
 }
 
+/// Returns v by the rows of the inverse linear map.
+pub(super) fn local_vector(instance: &Instance, v: Vec3) -> Vec3 {
+    let by_row = |row: Vec3| row.x * v.x + row.y * v.y + row.z * v.z;
+    Vec3::new(by_row(instance.local_x), by_row(instance.local_y), by_row(instance.local_z))
+}
+
 /// Returns a ray in the space of an instance's geometry, and the factor by which t is multiplied, a power of two.
 fn in_geometry(instance: &Instance, ray: &SearchRay, t_best: f32) -> (SearchRay, f32) {
-    let local = |v: Vec3| {
-        let by_row = |row: Vec3| row.x * v.x + row.y * v.y + row.z * v.z;
-        Vec3::new(by_row(instance.local_x), by_row(instance.local_y), by_row(instance.local_z))
-    };
+    let local = |v: Vec3| local_vector(instance, v);
     let direction = local(ray.direction);
     let exponent = (direction.abs().max_element().to_bits() >> 23).clamp(1, 253);
     let [scale, inv_scale] = [254 - exponent, exponent].map(|exponent| f32::from_bits(exponent << 23));
@@ -126,6 +129,24 @@ fn in_geometry(instance: &Instance, ray: &SearchRay, t_best: f32) -> (SearchRay,
         alpha_seed: ray.alpha_seed,
     };
     (local, inv_scale)
+}
+
+/// Calls `visit` for each instance that a ray may meet: with the inputs of the search through its geometry, the ray in
+/// its space, and the factor by which t is multiplied there.
+pub fn visit_instances<R: ReadCounter>(
+    inputs: &KernelInputs<R>,
+    instanced: &Instanced,
+    ray: &SearchRay,
+    mut visit: impl FnMut(&KernelInputs<R>, &SearchRay, f32),
+) {
+    let top_ray = TopRay::new(ray, inputs, instanced);
+    let mut at = TopCell { node_ix: 0, pending: 0 };
+    let wanted = (ray.t_max, inputs.kind_of_rays(false));
+    while let Some(instance) = at.find_instance(&top_ray, instanced, wanted, |n| inputs.kd_nodes.count(n)) {
+        let (local, inv_scale) = in_geometry(instance, ray, ray.t_max);
+        visit(&inputs.of_instance(instanced, instance), &local, inv_scale);
+        at.leave(&instanced.two.top().nodes);
+    }
 }
 
 /// Finds a ray's closest hit in all instances, or with `ANY_HIT` one that need not be the closest. `search` finds that

@@ -37,6 +37,7 @@ pub mod cast;
 #[cfg(test)]
 pub(crate) mod chi_square;
 pub mod children;
+mod closest_instances;
 pub mod closest_point;
 pub mod compact;
 pub mod counting;

@@ -132,7 +132,8 @@ fn any_says_what_is_occluded() {
     }
 }
 
-/// The first and the sixth ray go through the edge that the square's triangles share, and so meet both.
+/// The first and the sixth ray go through the edge that the square's triangles share, and so meet both. Kept instances
+/// have the lists of flattened ones.
 #[test]
 fn all_hits_are_counted_and_listed() {
     let directory = with_mesh();
@@ -155,12 +156,18 @@ fn all_hits_are_counted_and_listed() {
         assert_eq!(load(&path("hits.npz"), "ray_splits"), (vec![8], vec![0u64, 1, 2, 2, 3, 3, 4, 4]));
         assert_eq!(load(&path("hits.npz"), "primitive_ids"), (vec![4], vec![2u32, 1, 0, 0]));
     }
-    let placed = |x: u32| format!("[[mesh]]\nfile = 'mesh.obj'\ntransform = {{ translate = [{x}, 0, 0] }}\n");
-    std::fs::write(path("scene.toml"), [0, 10].map(placed).concat()).expect("a scene");
-    for device in ["--validate", "--cpu"] {
-        let args = ["cast", "scene.toml", "rays.npy", "-o", "x.npz", "--count", "--instances", "keep", device];
-        fail(directory.path(), &args, 4, "--instances flatten");
-        assert!(!path("x.npz").exists());
+    let placed = |z: i32| format!("[[mesh]]\nfile = 'mesh.obj'\ntransform = {{ translate = [0, 0, {z}] }}\n");
+    fs::write(path("scene.toml"), [0, -4].map(placed).concat()).expect("a scene");
+    for (device, instances) in [("--validate", "keep"), ("--cpu", "keep"), ("--cpu", "flatten")] {
+        let args =
+            ["cast", "scene.toml", "rays.npy", "-o", "hits.npz", "--all", "-q", device, "--instances", instances];
+        succeed(directory.path(), &args);
+        let ids = |name: &str| load::<u32>(&path("hits.npz"), name).1;
+        assert_eq!(load::<u64>(&path("hits.npz"), "ray_splits").1, [0, 6, 9, 9, 12, 12, 17, 17]);
+        let t_hit = load::<f32>(&path("hits.npz"), "t_hit").1;
+        assert_eq!(t_hit, [1.0, 3.0, 3.0, 5.0, 7.0, 7.0, 1.0, 3.0, 5.0, 0.5, 1.5, 2.5, 3.0, 3.0, 5.0, 7.0, 7.0]);
+        assert_eq!(ids("instance_ids"), [0, 0, 0, 1, 1, 1, 0, 1, 1, 0, 1, 1, 0, 0, 1, 1, 1]);
+        assert_eq!(ids("primitive_ids"), [2, 0, 1, 2, 0, 1, 1, 2, 1, 0, 2, 0, 0, 1, 2, 0, 1]);
     }
 }
 
@@ -250,8 +257,11 @@ fn closest_points_are_found_on_placed_meshes() {
     save(&path("points.npy"), &[[10.25f32, 0.5, 0.5], [21.5, 0.0, 0.0], [-1.0, 0.0, 0.0]]);
     let placed = |x: u32| format!("[[mesh]]\nfile = 'mesh.obj'\ntransform = {{ translate = [{x}, 0, 0] }}\n");
     fs::write(path("scene.toml"), [0, 10, 20].map(placed).concat()).expect("a scene");
-    for device in ["--validate", "--cpu"] {
-        succeed(directory.path(), &["cast", "scene.toml", "points.npy", "-o", "hits.npz", "--closest", "-q", device]);
+    for (device, instances) in
+        [("--validate", "flatten"), ("--validate", "keep"), ("--cpu", "flatten"), ("--cpu", "keep")]
+    {
+        let arguments = ["--closest", "-q", device, "--instances", instances];
+        succeed(directory.path(), &[&["cast", "scene.toml", "points.npy", "-o", "hits.npz"], &arguments[..]].concat());
         assert_eq!(load::<f32>(&path("hits.npz"), "t_hit").1, [0.5, 0.5, 1.0], "{device}");
         assert_eq!(load::<u32>(&path("hits.npz"), "instance_ids").1, [1, 2, 0], "{device}");
         assert_eq!(load::<u32>(&path("hits.npz"), "primitive_ids").1, [1, 0, 0], "{device}");
@@ -283,7 +293,6 @@ fn usage_mistakes_are_refused() {
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--closest", "--any"], "--any"),
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--closest", "--traversal", "mask"], "--traversal"),
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--closest", "--accel", "grid"], "--accel kdtree"),
-        (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--closest", "--instances", "keep"], "--instances flatten"),
     ];
     for (arguments, named) in cases {
         fail(directory.path(), arguments, 2, named);

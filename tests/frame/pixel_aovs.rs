@@ -14,7 +14,7 @@ use super::{
     batches::glass_in_glass,
     studio::{assert_silent, device, identical, on_both, options, world_of},
 };
-use crate::support::{meshes, scenes, world_by};
+use crate::support::{kept, meshes, scenes, world_by};
 
 fn on_device(scene: &FlatScene, options: &RenderOptions) -> Vec<PixelAovs> {
     on_device_by(&world_of(scene), options)
@@ -193,6 +193,9 @@ fn first_hits_of_paths_are_at_the_centres_of_pixels() {
 /// A ray through a tree of one leaf reads the leaf and its triangles. A ray that misses the tree reads nothing.
 #[test]
 fn steps_through_one_leaf_are_known() {
+    if kept::leaves_out("the steps of one tree") {
+        return;
+    }
     let mut scene = scenes::empty();
     scenes::add(&mut scene, scenes::room(0.5)[..2].to_vec(), scenes::diffuse(Vec3::ONE));
     let n_triangles = scene.triangles.len() as u32;

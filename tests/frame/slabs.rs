@@ -14,7 +14,7 @@ use kdray::{
 };
 
 use super::studio::{assert_silent, identical, options};
-use crate::support::{meshes, scenes, with_lanes, world_by, world_of};
+use crate::support::{kept, meshes, scenes, with_lanes, world_by, world_of};
 
 /// Returns a device whose kernels test slabs on every driver.
 fn device() -> Arc<Context> {
@@ -70,6 +70,9 @@ fn slabs_spare_steps_and_change_no_bit() {
 /// Slabs that do not enclose their triangles lose them. This shows that the kernels do test slabs.
 #[test]
 fn slabs_beside_their_surface_lose_it() {
+    if kept::leaves_out("the slabs of one tree") {
+        return;
+    }
     let (scene, context) = (scene(), device());
     let world = world_of(&scene);
     let options = options_of(Traversal::Mask);

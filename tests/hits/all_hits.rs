@@ -2,8 +2,12 @@
 
 use std::sync::Arc;
 
-use crate::support::{MeshWithTree, assert_silent, device, meshes, pretended, random::Random, rays::nasty_ray};
-use glam::{DVec3, Vec3, vec3};
+use crate::support::{
+    MeshWithTree, assert_silent, device, kept, meshes, pretended,
+    random::Random,
+    rays::{met_in_double_precision, nasty_ray},
+};
+use glam::{Vec3, vec3};
 use kdray::{
     accel::{Accel, AccelOptions, Query, grid::GridOptions, kdtree::Traversal},
     cast::{AllHits, CpuCaster, GpuCaster, Hit, NO_TRIANGLE, Ray},
@@ -99,9 +103,9 @@ fn the_cpu_lists_each_triangle_once() {
         assert!(counts_of(&expected).iter().filter(|n| **n > 2).count() > 50);
         let check = |geometry: Geometry, traversal, name: &str| {
             let caster = CpuCaster::new(geometry, traversal);
-            let found = caster.all_hits(&rays, None).expect("lists");
+            let found = caster.all_hits(&rays, None);
             agree(0, &expected, &found).unwrap_or_else(|e| panic!("{name}: {e}"));
-            assert_eq!(caster.count_hits(&rays).expect("counts"), counts_of(&expected), "{name}");
+            assert_eq!(caster.count_hits(&rays), counts_of(&expected), "{name}");
         };
         Traversal::ALL.iter().for_each(|it| check(world.geometry(), *it, &it.to_string()));
         for accel in grids(&world.triangles) {
@@ -114,7 +118,7 @@ fn the_cpu_lists_each_triangle_once() {
 /// Compares what a device finds with its twin.
 fn check_device(context: &Arc<Context>, world: &MeshWithTree, rays: &[Ray], accel: &Accel, traversal: Traversal) {
     let geometry = Geometry::new(&world.triangles, accel).expect("a structure of these triangles");
-    let expected = CpuCaster::new(geometry, traversal).all_hits(rays, None).expect("lists");
+    let expected = CpuCaster::new(geometry, traversal).all_hits(rays, None);
     let mut caster = GpuCaster::new(context, geometry, traversal).expect("a caster");
     let n_outliers = if context.is_software() { 0 } else { rays.len().div_ceil(100) };
     let found = caster.all_hits(rays, None).expect("lists");
@@ -159,33 +163,6 @@ fn interrupted_searches_find_the_same() {
     }
 }
 
-/// Returns the indices of the triangles that a ray meets in double precision, by their t. None if it comes near an
-/// edge or a plane's end, or if the order of two is not clear.
-fn in_double_precision(triangles: &[Triangle], ray: &Ray) -> Option<Vec<u32>> {
-    const NEAR: f64 = 1e-4;
-    let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
-    let mut met: Vec<(f64, u32)> = Vec::new();
-    for (triangle_ix, triangle) in (0..).zip(triangles) {
-        let corners: [DVec3; 3] = [triangle.v0, triangle.v1, triangle.v2].map(|v| v.as_dvec3() - origin);
-        let volume = |i: usize, j: usize| direction.dot(corners[i].cross(corners[j]));
-        let edges = [volume(1, 2), volume(2, 0), volume(0, 1)];
-        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-        let sum = direction.dot(normal);
-        let shares = edges.map(|edge| edge / sum);
-        let least = shares.into_iter().fold(f64::INFINITY, f64::min);
-        let t = corners[0].dot(normal) / sum;
-        if sum.abs() < NEAR * normal.length() || least.abs() < NEAR || t.abs() < NEAR {
-            return None;
-        }
-        if least > 0.0 && t > 0.0 {
-            met.push((t, triangle_ix));
-        }
-    }
-    met.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let is_clear = met.windows(2).all(|pair| pair[1].0 - pair[0].0 > NEAR);
-    is_clear.then(|| met.into_iter().map(|(_, triangle_ix)| triangle_ix).collect())
-}
-
 #[test]
 fn lists_are_those_of_double_precision() {
     let mut random = Random(11);
@@ -193,10 +170,10 @@ fn lists_are_those_of_double_precision() {
     let triangles = (0..60).map(|_| meshes::triangle(side(&mut random), side(&mut random), side(&mut random)));
     let world = MeshWithTree::new(triangles.collect());
     let rays: Vec<_> = (0..2000).map(|_| ray(side(&mut random), random.direction())).collect();
-    let found = CpuCaster::new(world.geometry(), Traversal::Mask).all_hits(&rays, None).expect("lists");
+    let found = CpuCaster::new(world.geometry(), Traversal::Mask).all_hits(&rays, None);
     let mut n_compared = 0;
     for (i, ray) in rays.iter().enumerate() {
-        let Some(expected) = in_double_precision(&world.triangles, ray) else { continue };
+        let Some(expected) = met_in_double_precision(&world.triangles, ray) else { continue };
         assert_eq!(list(&found, i).iter().map(|hit| hit.triangle_ix).collect::<Vec<_>>(), expected, "{ray:?}");
         n_compared += usize::from(expected.len() > 2);
     }
@@ -213,7 +190,7 @@ fn counts_from_inside_are_odd() {
         ray(vec3(around.cos(), 0.0, around.sin()) + 0.1 * random.direction(), random.direction())
     };
     let rays: Vec<_> = (0..3000).map(|_| inside(&mut random)).collect();
-    let counts = CpuCaster::new(world.geometry(), Traversal::Mask).count_hits(&rays).expect("counts");
+    let counts = CpuCaster::new(world.geometry(), Traversal::Mask).count_hits(&rays);
     assert!(counts.iter().all(|count| count % 2 == 1));
     assert!(counts.iter().filter(|count| **count == 3).count() > 50);
 }
@@ -226,7 +203,7 @@ fn edges_and_corners_count_for_all_their_triangles() {
     let down = |x: f32, y: f32| ray(vec3(x, y, 5.0), -Vec3::Z);
     let caster = CpuCaster::new(world.geometry(), Traversal::Mask);
     let rays = [down(0.25, 0.5), down(0.5, 0.5), down(0.0, 0.0)];
-    assert_eq!(caster.count_hits(&rays).expect("counts"), [2, 4, 12]);
+    assert_eq!(caster.count_hits(&rays), [2, 4, 12]);
 }
 
 /// Of rays from afar, different t can be rounded to the same. Between these, the limit chooses by the t before, as the
@@ -238,20 +215,22 @@ fn limits_keep_the_nearest_hits() {
     let context = device();
     let mut on_device = GpuCaster::new(&context, world.geometry(), Traversal::OF_GPUS).expect("a caster");
     let caster = CpuCaster::new(world.geometry(), Traversal::OF_GPUS);
-    let all = caster.all_hits(&rays, None).expect("lists");
+    let all = caster.all_hits(&rays, None);
     let t_of = |lists: &AllHits| lists.hits.iter().map(|hit| hit.t).collect::<Vec<_>>();
     for most in [0, 1, 2, 5, u32::MAX] {
-        let (found, expected) =
-            (caster.all_hits(&rays, Some(most)).expect("lists"), nearest(&all, rays.len(), most as usize));
+        let (found, expected) = (caster.all_hits(&rays, Some(most)), nearest(&all, rays.len(), most as usize));
         assert_eq!(found.ray_splits, expected.ray_splits, "{most}");
         assert_eq!(t_of(&found), t_of(&expected), "{most}");
         let n_outliers = if context.is_software() { 0 } else { 3 };
         let from_device = on_device.all_hits(&rays, Some(most)).expect("lists");
         agree(n_outliers, &found, &from_device).unwrap_or_else(|e| panic!("{most}: {e}"));
     }
+    if kept::leaves_out("lists that are limited before t are rounded") {
+        return;
+    }
     let mut closest = caster.cast(&rays, Query::Closest);
     closest.retain(|hit| hit.triangle_ix != NO_TRIANGLE);
-    assert_eq!(caster.all_hits(&rays, Some(1)).expect("lists").hits, closest);
+    assert_eq!(caster.all_hits(&rays, Some(1)).hits, closest);
 }
 
 #[test]
@@ -270,9 +249,9 @@ fn nothing_is_met_by_invalid_rays_and_in_empty_scenes() {
         let mut on_device = GpuCaster::new(device(), world.geometry(), Traversal::OF_GPUS).expect("a caster");
         let on_cpu = CpuCaster::new(world.geometry(), Traversal::OF_CPU);
         assert_eq!(on_device.count_hits(&invalid).expect("counts"), counts);
-        assert_eq!(on_cpu.count_hits(&invalid).expect("counts"), counts);
+        assert_eq!(on_cpu.count_hits(&invalid), counts);
         assert_eq!(counts_of(&on_device.all_hits(&invalid, None).expect("lists")), counts);
-        assert_eq!(on_cpu.all_hits(&[], None).expect("lists"), all_hits([]));
+        assert_eq!(on_cpu.all_hits(&[], None), all_hits([]));
         assert_eq!(on_device.all_hits(&[], None).expect("lists"), all_hits([]));
     }
 }
@@ -283,11 +262,11 @@ fn hidden_triangles_do_not_count() {
     let world = MeshWithTree::new(meshes::cube(2, 0.0));
     let down = [ray(vec3(0.2, 0.3, 5.0), -Vec3::Z)];
     let caster = CpuCaster::new(world.geometry(), Traversal::OF_CPU);
-    let first = caster.all_hits(&down, Some(1)).expect("lists").hits[0].triangle_ix;
+    let first = caster.all_hits(&down, Some(1)).hits[0].triangle_ix;
     let caster = caster.hiding(&[first]).expect("a triangle");
     let on_device = GpuCaster::new(device(), world.geometry(), Traversal::OF_GPUS).expect("a caster");
     let mut on_device = on_device.hiding(&[first]).expect("a triangle");
-    assert_eq!(caster.count_hits(&down).expect("counts"), [1]);
+    assert_eq!(caster.count_hits(&down), [1]);
     assert_eq!(on_device.count_hits(&down).expect("counts"), [1]);
 }
 

@@ -3,7 +3,9 @@
 #[path = "../support/mod.rs"]
 mod support;
 
+mod all_hits;
 mod casts;
+mod closest_points;
 mod costs;
 mod grids;
 mod margins;

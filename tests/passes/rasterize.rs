@@ -15,7 +15,7 @@ use kdray::{
 };
 
 use super::stage::{FIRST, Stage, options};
-use crate::support::{compare, device, meshes, random::Random, scenes, without_wide_atomics, world_of};
+use crate::support::{compare, device, kept, meshes, random::Random, scenes, without_wide_atomics, world_of};
 
 /// A stage that rasterizes by kernels, and the pass that traces the same rays.
 struct View {
@@ -68,7 +68,13 @@ impl View {
     /// Asserts that both find the same hits. Returns the number of pixels that show a triangle.
     fn check(&self) -> usize {
         let found = self.rasterized();
-        compare::exact(&self.traced(), &found).unwrap();
+        // Searches meet instances in their own space, where hits are rounded otherwise.
+        let agree = if kept::is_asked_for() {
+            compare::hits(found.len() / 100, &self.traced(), &found)
+        } else {
+            compare::exact(&self.traced(), &found)
+        };
+        agree.unwrap();
         found.iter().filter(|hit| hit.t < f32::INFINITY).count()
     }
 }

@@ -16,6 +16,14 @@ pub fn is_asked_for() -> bool {
     std::env::var("KDRAY_TEST_INSTANCES").is_ok_and(|word| word == "keep")
 }
 
+/// Whether a test is left out because instances are asked for. `why`: what it reads, which only flat worlds have.
+pub fn leaves_out(why: &str) -> bool {
+    if is_asked_for() {
+        println!("left out with instances: {why}");
+    }
+    is_asked_for()
+}
+
 /// Returns the scene. If instances are asked for, it has one for each run of triangles of one material. They are scaled
 /// by powers of two, so that all triangles of the world have the same bits. A scene that would be refused is returned
 /// as it is.

@@ -5,6 +5,7 @@
 pub mod animated;
 pub mod arrays;
 pub mod chain;
+pub mod closest;
 pub mod command;
 pub mod compare;
 pub mod devices;

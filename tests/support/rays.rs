@@ -1,8 +1,9 @@
 //! Rays at a mesh: ordinary ones, and those on which traversals are likely to fail. The latter are *nasty*.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use kdray::{
     accel::kdtree::Node,
+    cast::Ray,
     layout::{NO_TRIANGLE, PathRay, Triangle},
 };
 
@@ -97,4 +98,31 @@ pub fn outward_ray(random: &mut Random, triangles: &[Triangle]) -> PathRay {
     let target = if random.below(2) == 0 { t.v0 } else { edge_point(random, triangles) };
     let origin = if random.below(4) == 0 { Vec3::ZERO } else { 0.5 * random.unit() * random.direction() };
     ray(origin, (target - origin).normalize())
+}
+
+/// Returns the indices of the triangles that a ray meets in double precision, by their t. None if it comes near an
+/// edge or a plane's end, or if the order of two is not clear.
+pub fn met_in_double_precision(triangles: &[Triangle], ray: &Ray) -> Option<Vec<u32>> {
+    const NEAR: f64 = 1e-4;
+    let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+    let mut met: Vec<(f64, u32)> = Vec::new();
+    for (triangle_ix, triangle) in (0..).zip(triangles) {
+        let corners: [DVec3; 3] = [triangle.v0, triangle.v1, triangle.v2].map(|v| v.as_dvec3() - origin);
+        let volume = |i: usize, j: usize| direction.dot(corners[i].cross(corners[j]));
+        let edges = [volume(1, 2), volume(2, 0), volume(0, 1)];
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+        let sum = direction.dot(normal);
+        let shares = edges.map(|edge| edge / sum);
+        let least = shares.into_iter().fold(f64::INFINITY, f64::min);
+        let t = corners[0].dot(normal) / sum;
+        if sum.abs() < NEAR * normal.length() || least.abs() < NEAR || t.abs() < NEAR {
+            return None;
+        }
+        if least > 0.0 && t > 0.0 {
+            met.push((t, triangle_ix));
+        }
+    }
+    met.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let is_clear = met.windows(2).all(|pair| pair[1].0 - pair[0].0 > NEAR);
+    is_clear.then(|| met.into_iter().map(|(_, triangle_ix)| triangle_ix).collect())
 }

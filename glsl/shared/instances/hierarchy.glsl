@@ -8,14 +8,10 @@
 // that an instance is entered whenever the transformed ray can have a hit in it.
 //
 // Needs scene.glsl, search/suspended_rays.glsl, search/steps.glsl, search/traversal_ray.glsl, grid/grid.glsl,
-// TESTS_BLENDED and FROM_CAMERA. Provides `TopCell`, `TopRay`, `top_ray`,
-// `top_node_at`, `kind_of_rays`, `find_instance`, `leave_node` and `in_geometry`.
+// TESTS_BLENDED and FROM_CAMERA. Provides `TopRay`, `top_ray`, `kind_of_rays`, `find_instance`, `in_geometry`, and what
+// top_nodes.glsl does.
 
-// A node, and the pending siblings above it. NO_TRIANGLE in place of the node: nothing is left.
-struct TopCell {
-    uint node_ix;
-    uint pending;
-};
+#include "instances/top_nodes.glsl"
 
 // A ray of the world as boxes see it, with halved t, as in TraversalRay. It meets a plane at p at p inv_direction +
 // bias. pad: by how much boxes are too small for a ray from afar (world units).
@@ -37,12 +33,6 @@ TopRay top_ray(PathRay ray, float t_min) {
     return TopRay(inv_direction, -ray.origin * inv_direction, 0.5 * t_min, pad);
 }
 
-TopNode top_node_at(uint node_ix) {
-    vec4 low = load_instance_rows(accel.top_nodes_begin + TOP_NODE_ROWS * node_ix);
-    vec4 high = load_instance_rows(accel.top_nodes_begin + TOP_NODE_ROWS * node_ix + 1u);
-    return TopNode(low.xyz, floatBitsToUint(low.w), high.xyz, floatBitsToUint(high.w));
-}
-
 // The t at which the ray enters a node's box, or MISSES if it misses the box or enters it behind t_best.
 float entry_of(TopRay ray, TopNode node, float t_best) {
     precise vec3 t0 = fma(node.box_min - ray.pad, ray.inv_direction, ray.bias);
@@ -52,21 +42,6 @@ float entry_of(TopRay ray, TopNode node, float t_best) {
     float t_enter = max(max(near.x, near.y), max(near.z, ray.t_min));
     float t_exit = min(min(far.x, far.y), min(far.z, t_best));
     return t_enter <= t_exit ? t_enter : MISSES;
-}
-
-// Goes up to the nearest pending sibling.
-void leave_node(inout TopCell at) {
-    if (at.pending == 0u) {
-        at.node_ix = NO_TRIANGLE;
-        return;
-    }
-    uint n_levels = uint(findLSB(at.pending));
-    for (uint i = 0u; i < n_levels; ++i) {
-        count_iteration();
-        at.node_ix = top_node_at(at.node_ix).parent;
-    }
-    at.node_ix ^= 1u;
-    at.pending = (at.pending >> n_levels) & ~1u;
 }
 
 // Goes down to the child of a pair that the ray enters first. Returns false if it meets neither.
@@ -109,31 +84,15 @@ bool find_instance(TopRay ray, float t_best, uint kind, inout TopCell at, out ui
     return found;
 }
 
-// v by the rows of the inverse linear map.
-vec3 local_vector(uint instance_ix, vec3 v) {
-    vec3 x = instance_row(instance_ix, 4u).xyz, y = instance_row(instance_ix, 5u).xyz;
-    vec3 z = instance_row(instance_ix, 6u).xyz;
-    precise float local_x = x.x * v.x + x.y * v.y + x.z * v.z;
-    precise float local_y = y.x * v.x + y.y * v.y + y.z * v.z;
-    precise float local_z = z.x * v.x + z.y * v.y + z.z * v.z;
-    return vec3(local_x, local_y, local_z);
-}
-
 // Enters an instance: notes which geometry is searched, and returns the ray in its space. The direction is scaled by a
 // power of two to about unit length, so that t is scaled without rounding. inv_scale: what t of the world is multiplied
 // by. t_max is left as it is.
 PathRay in_geometry(uint instance_ix, PathRay ray, out float inv_scale) {
-    set_instance(instance_ix);
-    uint geometry_ix = floatBitsToUint(instance_row(instance_ix, 1u).w);
-    uint at = accel.geometries_begin + GEOMETRY_ROWS * geometry_ix;
-    vec4 low = load_instance_rows(at), high = load_instance_rows(at + 1u), rest = load_instance_rows(at + 2u);
-    entered = Extent(
-        low.xyz, low.w, high.xyz, high.w, floatBitsToUint(rest.x), floatBitsToUint(rest.y), floatBitsToUint(rest.z)
-    );
+    uint at = enter_geometry(instance_ix);
     if (TRAVERSAL == TRAVERSAL_GRID) {
         vec4 grid = load_instance_rows(at + 3u);
-        entered_lattice = Lattice(low.xyz, grid.w, high.xyz, floatBitsToUint(grid.xyz));
-        entered_cell = floatBitsToUint(rest.w);
+        entered_lattice = Lattice(extent().box_min, grid.w, extent().box_max, floatBitsToUint(grid.xyz));
+        entered_cell = floatBitsToUint(load_instance_rows(at + 2u).w);
     }
     precise vec3 offset = ray.origin - instance_row(instance_ix, 3u).xyz;
     ray.origin = local_vector(instance_ix, offset);

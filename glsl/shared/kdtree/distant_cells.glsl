@@ -1,13 +1,28 @@
 // Cells of the kd-tree with their distance from a point, for closest_point.comp. Twin: src/reference/distant_cells.rs.
 //
-// Needs scene.glsl, search/point_triangle.glsl and kd_nodes.glsl. Provides `Query`, `DistantCell`, `root_of`,
-// `may_be_closer`, `split_cell`, and the cells that wait: `push_if_closer` and `pop_pending`.
+// Needs scene.glsl, search/point_triangle.glsl, search/magnitude.glsl, search/traversal_ray.glsl and kd_nodes.glsl.
+// Provides `Query`, `query_at`, `inverse_of`, `DistantCell`, `gap_to`, `root_of`, `may_be_closer`, `split_cell`, and
+// the cells that wait: `push_if_closer` and `pop_pending`.
 
 // The point in units of 1 / scale, a power of two that brings all coordinates below 4: squares do not overflow.
 struct Query {
     vec3 position;
     float scale;
 };
+
+// The query of a point at a box.
+Query query_at(vec3 position, vec3 box_min, vec3 box_max) {
+    uint bits = max(longest_bits(position), max(longest_bits(box_min), longest_bits(box_max)));
+    uint exponent = clamp(bits >> 23, 1u, 253u);
+    float scale = uintBitsToFloat((254u - exponent) << 23); // 2^(127 - exponent)
+    precise vec3 scaled = position * scale;
+    return Query(scaled, scale);
+}
+
+// The reciprocal of a power of two.
+float inverse_of(float scale) {
+    return uintBitsToFloat(0x7f000000u - floatBitsToUint(scale));
+}
 
 // A node, and the distance from the point to the node's cell on each axis, which is 0 within the cell's extent.
 struct DistantCell {
@@ -30,10 +45,15 @@ bool may_be_closer(vec3 gap, float best_squared) {
     return bound <= best_squared;
 }
 
+// The distance from the point to a box on each axis.
+vec3 gap_to(Query query, vec3 box_min, vec3 box_max) {
+    precise vec3 below = box_min * query.scale - query.position;
+    precise vec3 above = query.position - box_max * query.scale;
+    return max(max(below, above), vec3(0.0));
+}
+
 DistantCell root_of(Query query) {
-    precise vec3 below = accel.box_min * query.scale - query.position;
-    precise vec3 above = query.position - accel.box_max * query.scale;
-    return DistantCell(root_offset(), max(max(below, above), vec3(0.0)));
+    return DistantCell(root_offset(), gap_to(query, extent().box_min, extent().box_max));
 }
 
 // The children of a split: the one on the point's side of the plane, which is as close as the split's cell, and the

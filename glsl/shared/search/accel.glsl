@@ -4,7 +4,8 @@
 // worlds of instances WITH_INSTANCES (build.rs); and the constants `bool COUNT_COSTS` (steps.glsl), `bool
 // TESTS_BLENDED` (shading/alpha_test.glsl) and `bool FROM_CAMERA` (shading/back_faces.glsl), which the kernel declares
 // before this file. With the macro NEXT_HITS, which all_hits.comp defines, only hits behind `last_hit` count, which
-// each search sets to the hit that it finds (candidate.glsl). Provides `traverse`, and `traverse_any_length` for
+// each search sets to the hit that it finds (candidate.glsl), and in a world of instances, a search ends at the first
+// instance with such a hit (`next_cell`). Provides `traverse`, and `traverse_any_length` for
 // directions of any length, which are all that a kernel calls to find a hit. Kernels also use `is_suspended` and
 // `runs_in_pass` of suspended_rays.glsl. rays/cast_rays.glsl checks rays by `exponent_of`, `longest_bits` and
 // `magnitude_bits`.
@@ -42,6 +43,12 @@ uint search(TraversalRay ray, bool any_hit, inout Nearest best) {
 }
 
 #include "instances/hierarchy.glsl"
+
+#ifdef NEXT_HITS
+// The place in the hierarchy from which the search goes on: the instance of the last hit, or without one a place from
+// which instances are still to be visited.
+TopCell next_cell = TopCell(0u, 0u);
+#endif
 
 // Stores the state of a ray that is in no instance, and returns the mark for its result.
 uint suspend_between(Nearest best) {
@@ -104,6 +111,10 @@ Hit traverse(PathRay ray_in, float t_min, bool any_hit) {
     TopCell at = TopCell(0u, 0u);
     bool is_inside = false;
     if (INSTANCED) {
+#ifdef NEXT_HITS
+        at = next_cell;
+        is_inside = last_hit.triangle_ix != NO_TRIANGLE;
+#endif
         if (is_resumed()) is_inside = resume_outer(at, best);
         spill_world_ray(ray_in);
     }
@@ -146,6 +157,13 @@ Hit traverse(PathRay ray_in, float t_min, bool any_hit) {
                 float scale = uintBitsToFloat(0x7f000000u - floatBitsToUint(inv_scale));
                 best = Nearest(min((found.t + 0.5 * t_start) * scale, best.t), found.triangle_ix);
             }
+#ifdef NEXT_HITS
+            if (best.triangle_ix != NO_TRIANGLE) {
+                last_hit = Nearest(2.0 * found.t, best.triangle_ix);
+                break;
+            }
+            if (mark == 0u) last_hit = Nearest(0.0, NO_TRIANGLE);
+#endif
             if (searches && mark == 0u) leave_node(at);
             goes_on = mark == 0u && at.node_ix != NO_TRIANGLE && !is_done(any_hit, best);
             if (goes_on && !has_iterations()) {
@@ -158,13 +176,16 @@ Hit traverse(PathRay ray_in, float t_min, bool any_hit) {
         }
         if (!goes_on) break;
     }
+#ifdef NEXT_HITS
+    if (INSTANCED) next_cell = at;
+#endif
     if (CAN_SUSPEND && mark != 0u) return Hit(0.0, mark, 0.0, 0.0);
     vec2 lengths = spilled_pair(LENGTHS_SLOT);
     if (INSTANCED) lengths.x = 0.0;
     if (best.triangle_ix == NO_TRIANGLE) return Hit(lengths.y, NO_TRIANGLE, 0.0, 0.0);
     vec2 weights = spilled_pair(WEIGHTS_SLOT);
 #ifdef NEXT_HITS
-    last_hit = Nearest(2.0 * best.t, best.triangle_ix);
+    if (!INSTANCED) last_hit = Nearest(2.0 * best.t, best.triangle_ix);
 #endif
     // The sum could round to more than t_max.
     return Hit(min(2.0 * best.t + lengths.x, lengths.y), best.triangle_ix, weights.x, weights.y);

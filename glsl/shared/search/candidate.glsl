@@ -19,7 +19,8 @@ struct Nearest {
 
 #ifdef NEXT_HITS
 // The hit that the search goes on from, or NO_TRIANGLE: only hits behind it count, in the order of t and then of the
-// triangles' indices. Its t is that of the ray in traversal_ray.glsl, but not halved (all_hits.comp).
+// triangles' indices. Its t is that of the ray in traversal_ray.glsl, in the space of an instance if there are
+// instances, but not halved (all_hits.comp).
 Nearest last_hit = Nearest(0.0, NO_TRIANGLE);
 #endif
 

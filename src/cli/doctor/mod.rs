@@ -137,7 +137,7 @@ fn examine_scene(
     let engine = processors.iter().find(|it| it.findings.is_ok()).and_then(|it| it.engine.clone());
     let builder = engine.unwrap_or_else(Engine::on_cpu).builder();
     let n_samples = opened.scene.defaults.for_integrator(None).samples;
-    let building = builder.describe(opened.scene.n_triangles());
+    let building = builder.describe(&opened.scene);
     // Whether the picture fits into the memory is a question of each processor.
     let work = engine::Work::Window { n_samples: Some(1) };
     let (loaded, _) = progress.stage(&building, || builder.build(opened, &work));

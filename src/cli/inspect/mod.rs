@@ -38,12 +38,13 @@ pub fn run(args: &InspectArgs) -> Result<(), CliError> {
     let n_triangles = scene.n_triangles();
     let choices = Request { accel: args.accel, build: BuildPolicy::Best, ..Request::default() };
     let builder = Builder::new(Processor::Gpu, choices);
+    let building = builder.describe(&opened.scene);
     let build = || {
         let loaded = builder.build(opened, &Work::Rays(0))?;
         let statistics = loaded.world.statistics(); // builds the structure if it is a grid
         Ok::<_, LoadError>((loaded, statistics))
     };
-    let (built, build_ms) = progress.stage(&builder.describe(n_triangles), build);
+    let (built, build_ms) = progress.stage(&building, build);
     let (Loaded { world, load_ms, .. }, statistics) = built?;
     let scene = world.scene();
     drop(progress);

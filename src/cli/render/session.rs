@@ -241,16 +241,14 @@ impl<'a> Session<'a> {
             n_samples,
             n_at_once: if draws_whole_frames(engine, views) { engine.devices().count() as u32 } else { 1 },
         };
-        let building = engine.builder().describe(n_triangles);
         let asked = args.picture.request();
         let request = if is_animated && args.moves() { asked.for_motion() } else { asked };
         if request != asked {
             progress.note("meshes are kept apart, since some move; --instances flatten stores them as one");
         }
-        let engine = engine
-            .clone()
-            .with_request(request)
-            .with_progress(progress.observer(&building, &[progress::Work::Building]));
+        let engine = engine.clone().with_request(request);
+        let building = engine.builder().describe(&opened.scene);
+        let engine = engine.with_progress(progress.observer(&building, &[progress::Work::Building]));
         let builder = engine.clone();
         let build = move || info_span!("build tree").in_scope(|| builder.build(opened, &work));
         let (built, _) = progress.stage(&building, || deadline.within("building", build));

@@ -202,7 +202,8 @@ impl Request {
     ) -> Result<Methods, GpuError> {
         let n_triangles = world.scene().n_triangles();
         let mut by_rule = self.methods_by_rule(context.map(|context| &**context), n_triangles, workload.size);
-        if workload.traces_paths {
+        let is_crowded = world.scene().instances.is_some() && rule::traces_instances(n_triangles, workload.size);
+        if workload.traces_paths || is_crowded && by_rule.primary.by == Reason::Rule {
             by_rule.primary = Chosen { value: Primary::Trace, by: Reason::Rule };
         }
         let is_gpu = |context: &&Arc<Context>| Processor::of(Some(context)) == Processor::Gpu && !workload.shows_costs;

@@ -26,3 +26,24 @@ pub fn primary_by_rule(context: Option<&Context>, n_triangles: usize, size: (u32
         _ => Primary::suited_to(n_triangles, size, 1),
     }
 }
+
+/// Triangles of instances that compute kernels rasterize in the time in which a ray is traced, about: an H200
+/// rasterizes 10,000 knots of 20,000 triangles in 9.9 ms, and traces the rays of the same picture in 1.3 ms.
+const PLACED_TRIANGLES_PER_RAY: u64 = 16;
+
+/// Returns whether the instances of a world have so many triangles that primary rays are traced through them, whatever
+/// [`primary_by_rule`] says.
+pub(super) fn traces_instances(n_triangles: usize, size: (u32, u32)) -> bool {
+    Primary::suited_to(n_triangles, size, PLACED_TRIANGLES_PER_RAY) == Primary::Trace
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn crowded_instances_are_traced() {
+        let traced = [1, 16 * 64 * 48, 16 * 64 * 48 + 1, 200_000_000].map(|n| traces_instances(n, (64, 48)));
+        assert_eq!(traced, [false, false, true, true]);
+    }
+}
