@@ -9,7 +9,7 @@ use super::{
     inputs::KernelInputs,
     kdtree::is_leaf,
     leaf::entries_of,
-    point_triangle::closest_on_triangle,
+    point_triangle::{PointOnTriangle, closest_on_triangle},
 };
 use crate::layout::{Hit, KD_MAX_DEPTH, KdNode, NO_TRIANGLE, QueryPoint, TRIANGLE_HIDDEN};
 
@@ -58,50 +58,76 @@ fn descend(
     }
 }
 
-/// Tests a triangle. Of two that are equally close, the one of the lower index counts. `best.t` is the square of the
-/// distance.
-fn test(inputs: &KernelInputs, Query { position, scale }: Query, triangle_ix: u32, best: &mut Hit) {
+/// Keeps a point of a triangle in `best` if it is closer and the triangle is not hidden. Of two that are equally close,
+/// the one of the lower index counts. `best.t` is the square of the distance.
+pub fn keep_closest(inputs: &KernelInputs, triangle_ix: u32, at: PointOnTriangle, best: &mut Hit) {
+    let is_closer = at.squared < best.t || at.squared == best.t && triangle_ix < best.triangle_ix;
     let is_hidden = |ix: u32| inputs.triangle_materials[ix as usize] & TRIANGLE_HIDDEN != 0;
-    if inputs.filters && is_hidden(triangle_ix) {
-        return;
-    }
-    let triangle = &inputs.triangles[triangle_ix as usize];
-    let at = closest_on_triangle([triangle.v0, triangle.v1, triangle.v2].map(|v| v * scale - position));
-    if at.squared < best.t || at.squared == best.t && triangle_ix < best.triangle_ix {
+    if is_closer && !(inputs.filters && is_hidden(triangle_ix)) {
         *best = Hit { t: at.squared, triangle_ix, u: at.u, v: at.v };
     }
 }
 
-/// Searches the tree. `best.t` is the square of the distance.
-fn search(inputs: &KernelInputs, query: Query, best: &mut Hit) {
-    let root = DistantCell::root(inputs, query);
-    let mut pending = Pending { cells: [root; KD_MAX_DEPTH as usize], n: 0 };
-    let mut next = Some(root);
-    while let Some(cell) = next {
-        if cell.may_be_closer(best.t) {
-            let leaf = descend(inputs, query, best.t, cell, &mut pending);
-            entries_of(leaf).for_each(|entry_ix| test(inputs, query, inputs.leaf_triangles[entry_ix], best));
+/// Tests a triangle. `best.t` is the square of the distance.
+pub fn test(inputs: &KernelInputs, Query { position, scale }: Query, triangle_ix: u32, best: &mut Hit) {
+    let triangle = &inputs.triangles[triangle_ix as usize];
+    let at = closest_on_triangle([triangle.v0, triangle.v1, triangle.v2].map(|v| v * scale - position));
+    keep_closest(inputs, triangle_ix, at, best);
+}
+
+/// A search for closest points. Each thread has its own.
+pub trait PointSearch {
+    /// Keeps the closest point in `best`, if it is closer. `best.t` is the square of the distance.
+    fn search(&mut self, inputs: &KernelInputs, query: Query, best: &mut Hit);
+}
+
+/// The search through the kd-tree.
+struct TreeSearch;
+
+impl PointSearch for TreeSearch {
+    fn search(&mut self, inputs: &KernelInputs, query: Query, best: &mut Hit) {
+        let root = DistantCell::root(inputs, query);
+        let mut pending = Pending { cells: [root; KD_MAX_DEPTH as usize], n: 0 };
+        let mut next = Some(root);
+        while let Some(cell) = next {
+            if cell.may_be_closer(best.t) {
+                let leaf = descend(inputs, query, best.t, cell, &mut pending);
+                entries_of(leaf).for_each(|entry_ix| test(inputs, query, inputs.leaf_triangles[entry_ix], best));
+            }
+            next = pending.pop();
         }
-        next = pending.pop();
     }
 }
 
 /// Returns the closest point of the triangles, for a point that [`is_point`].
-fn find_closest(inputs: &KernelInputs, point: &QueryPoint) -> Hit {
+fn find_closest(inputs: &KernelInputs, point: &QueryPoint, search: &mut impl PointSearch) -> Hit {
     let exponents = [point.position, inputs.box_min, inputs.box_max].map(exponent_of);
     let exponent = exponents.into_iter().fold(1, u32::max).min(253);
     let [scale, inv_scale] = [254 - exponent, exponent].map(|exponent| f32::from_bits(exponent << 23));
     let most: f32 = point.t_max * scale;
     let mut best = Hit { t: most * most, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
-    search(inputs, Query { position: point.position * scale, scale }, &mut best);
+    search.search(inputs, Query { position: point.position * scale, scale }, &mut best);
     if best.triangle_ix == NO_TRIANGLE { MISS } else { Hit { t: (best.t.sqrt() * inv_scale).min(point.t_max), ..best } }
 }
 
 /// Finds the closest point of each of `points`, through the kd-tree of a flat world, and writes one hit for each: the
 /// distance is `t`. A point without a closest one gets a miss, as a ray does.
 pub fn closest_point(inputs: &KernelInputs, points: &[QueryPoint], hits: &mut [Hit]) {
-    points.par_iter().with_min_len(RAYS_PER_TASK).zip(hits).for_each(|(point, hit)| {
-        let is_any = is_point(point) && !inputs.triangles.is_empty();
-        *hit = if is_any { find_closest(inputs, point) } else { MISS };
+    closest_point_by(inputs, || TreeSearch, points, hits);
+}
+
+/// Does what [`closest_point`] does, by searches that `new_search` makes, at least one for each thread that works.
+pub fn closest_point_by<T: PointSearch>(
+    inputs: &KernelInputs,
+    new_search: impl Fn() -> T + Sync + Send,
+    points: &[QueryPoint],
+    hits: &mut [Hit],
+) {
+    let tasks = points.par_chunks(RAYS_PER_TASK).zip(hits.par_chunks_mut(RAYS_PER_TASK));
+    tasks.for_each_init(new_search, |search, (points, hits)| {
+        for (point, hit) in points.iter().zip(hits) {
+            let is_any = is_point(point) && !inputs.triangles.is_empty();
+            *hit = if is_any { find_closest(inputs, point, search) } else { MISS };
+        }
     });
 }

@@ -7,7 +7,7 @@ use crate::layout::{KD_AXIS_MASK, KD_PAIR_SHIFT, KdNode};
 
 /// A point in units of 1 / `scale`, a power of two that brings all coordinates below 4.
 #[derive(Clone, Copy)]
-pub(super) struct Query {
+pub struct Query {
     pub position: Vec3,
     pub scale: f32,
 }
@@ -19,6 +19,9 @@ pub(super) struct DistantCell {
     pub gap: Vec3,
 }
 
+/// The share of a squared distance that counts, 1 - 2^-20: the square as computed may exceed the real one.
+pub const SHARE: f32 = 0.999_999_05;
+
 impl DistantCell {
     pub fn root(inputs: &KernelInputs, Query { position, scale }: Query) -> Self {
         let outside = (inputs.box_min * scale - position).max(position - inputs.box_max * scale);
@@ -27,7 +30,6 @@ impl DistantCell {
 
     /// Returns whether the cell may hold a point that is as close as the best one. The kernel's file derives the share.
     pub fn may_be_closer(&self, best_squared: f32) -> bool {
-        const SHARE: f32 = 0.999_999_05; // 1 - 2^-20
         SHARE * self.gap.dot(self.gap) <= best_squared
     }
 
