@@ -140,6 +140,19 @@ fn a_missing_triangle_in_a_leaf_is_noticed() {
     assert!(first_difference(&rays, &hits, &one_by_one).is_some());
 }
 
+/// A thread takes several rays by turns, and fewer at the end of its list.
+#[test]
+fn any_number_of_rays_is_traced_by_turns() {
+    let world = MeshWithTree::new(meshes::torus(40, 20));
+    let rays = rays_at(&world);
+    let hits = traced(&world, Traversal::Mask, &rays);
+    let (bvh, inputs) = (WideBvh::new(world.tree(), &world.triangles), world.inputs());
+    for n in 0..20 {
+        let by_turns = traced_one_by_one::<false>(&inputs, &bvh, Level::new(), &rays[..n]);
+        assert_eq!(first_difference(&rays[..n], &hits[..n], &by_turns), None, "{n} rays");
+    }
+}
+
 #[test]
 fn slabs_spare_steps() {
     let world = MeshWithTree::new(meshes::torus(120, 60));

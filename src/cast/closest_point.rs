@@ -9,6 +9,7 @@ use super::{CastResult, CpuCaster, GpuCaster, Hit, QueryPoint, check_repetitions
 use crate::{
     accel::AccelKind,
     buffers::PointResources,
+    cpu,
     frame::BadOptions,
     gpu::{BindingLayout, Commands, GpuError},
     passes, reference,
@@ -60,6 +61,9 @@ impl GpuCaster {
     }
 }
 
+/// The number of scattered rays that gain as much from the wide hierarchy as one point does (docs/experiments.md).
+const RAYS_PER_POINT: usize = 64;
+
 impl CpuCaster<'_> {
     /// Finds the point of the triangles that is closest to each of `points`, as [`GpuCaster::closest_points`] does, on
     /// the current rayon pool.
@@ -69,7 +73,10 @@ impl CpuCaster<'_> {
     pub fn closest_points(&self, points: &[QueryPoint]) -> Result<Vec<Hit>, BadOptions> {
         check_structure(self.geometry().accel().kind())?;
         let mut hits = vec![Hit::zeroed(); points.len()];
-        reference::closest_point::closest_point(&self.inputs(), points, &mut hits);
+        match self.wide_after(points.len().saturating_mul(RAYS_PER_POINT)) {
+            Some(bvh) => cpu::closest_points(&self.inputs(), bvh, points, &mut hits),
+            None => reference::closest_point::closest_point(&self.inputs(), points, &mut hits),
+        }
         Ok(hits)
     }
 }

@@ -377,16 +377,23 @@ impl<'a> CpuCaster<'a> {
         let (geometry, traversal) = (self.geometry(), self.traversal);
         let packets = CpuSearch::from(traversal);
         let n_triangles = geometry.triangles().len();
-        let Some(tree) = geometry.accel().as_kdtree() else { return packets };
         if !cpu::suits_scattered_rays(n_triangles, traversal) || !are_scattered(rays, geometry.accel().bounds()) {
             return packets;
         }
-        let n_scattered = self.n_scattered.fetch_add(rays.len(), Ordering::Relaxed) + rays.len();
+        CpuSearch { wide: self.wide_after(rays.len()), ..packets }
+    }
+
+    /// Returns the wide hierarchy, if it exists or if making it pays after so many more scattered rays. None for a
+    /// grid or instances.
+    fn wide_after(&self, n_rays: usize) -> Option<&WideBvh> {
+        let geometry = self.geometry();
+        let tree = geometry.accel().as_kdtree()?;
+        let n_scattered = self.n_scattered.fetch_add(n_rays, Ordering::Relaxed).saturating_add(n_rays);
         // Two threads may both make it. `get_or_init` could make a thread of rayon wait for itself.
-        if self.wide.get().is_none() && n_scattered >= n_triangles.saturating_mul(RAYS_PER_TRIANGLE) {
+        if self.wide.get().is_none() && n_scattered >= geometry.triangles().len().saturating_mul(RAYS_PER_TRIANGLE) {
             drop(self.wide.set(WideBvh::new(tree, geometry.triangles())));
         }
-        CpuSearch { wide: self.wide.get(), ..packets }
+        self.wide.get()
     }
 }
 
@@ -445,6 +452,19 @@ mod tests {
         };
         let ray = |i| Ray { origin: Vec3::splat(0.5), t_min: 0.0, direction: direction(i), t_max: f32::INFINITY };
         (0..N_TRIANGLES * RAYS_PER_TRIANGLE as u32).map(ray).collect()
+    }
+
+    #[test]
+    fn many_points_take_the_hierarchy_and_find_the_same_points() {
+        let triangles = soup();
+        let accel = Accel::KdTree(KdTree::build(&triangles, &BuildOptions::default()));
+        let caster = CpuCaster::new(Geometry::new(&triangles, &accel).unwrap(), Traversal::OF_CPU);
+        let position = |ray: &Ray| QueryPoint { position: ray.origin + 0.6 * ray.direction, t_max: f32::INFINITY };
+        let points: Vec<_> = rays(true).iter().map(position).collect();
+        let few = caster.closest_points(&points[..100]).unwrap();
+        assert!(caster.wide.get().is_none(), "a hierarchy for few points would not pay");
+        let many = caster.closest_points(&points).unwrap();
+        assert!(caster.wide.get().is_some() && many[..100] == few && few.iter().all(|hit| hit.t.is_finite()));
     }
 
     #[test]

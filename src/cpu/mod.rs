@@ -19,10 +19,14 @@
 //!     direction_bins     collect rays of one class of directions until they fill a packet
 //!     soa                rays and hits as structures of arrays
 //!     packet, packet_triangle, packet_traverser   trace sixteen rays through the tree together
-//!   wide_traverser   traces single rays of paths through a wide hierarchy of boxes
+//!   wide_traverser   traces single rays of paths, several by turns, through a wide hierarchy of boxes
+//!     prefetch       loads into the cache ahead of need
+//! closest_points     the closest points of the triangles, through that hierarchy
+//!   point_triangles  the closest points of sixteen triangles
 //! ```
 
 mod area_lights;
+pub mod closest_points;
 pub mod direction_bins;
 mod environment_samples;
 mod lambertian_steps;
@@ -36,6 +40,8 @@ pub mod packet_triangle;
 mod path_begin;
 mod path_scatter;
 mod paths;
+mod point_triangles;
+mod prefetch;
 mod queue;
 mod render;
 mod sampler;
@@ -48,6 +54,7 @@ mod vec3x16;
 pub mod wide_traverser;
 
 pub use self::{
+    closest_points::closest_points,
     meter::metered_exposure,
     motion_vectors::motion_vectors,
     render::{Batching, CpuRenderer},

@@ -1,24 +1,25 @@
 //! Traversal of single rays through a [`WideBvh`]. Rays that have nothing in common gain nothing from a packet, so each
-//! of them tests sixteen boxes or triangles at once. The hits are those of all other traversals, bit for bit, unless
-//! the length of a ray's direction underflows.
+//! of them tests sixteen boxes or triangles at once. A thread takes several rays by turns: while one waits for memory,
+//! the others go on. The hits are those of all other traversals, bit for bit, unless the length of a ray's direction
+//! underflows.
 
-use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
+use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16, prelude::*, u32x16};
 use glam::Vec3;
 
-use super::{lanes::LaneMask, packet_triangle::Shears, tracer::CpuSearch};
+use super::{lanes::LaneMask, packet_triangle::Shears, prefetch::prefetch, tracer::CpuSearch};
 use crate::{
     accel::{
         kdtree::Traversal,
         wide_bvh::{IS_BLOCK, MOST_LEVELS, TriangleBlock, WIDTH, WideBvh, WideNode},
     },
-    layout::Hit,
+    layout::{Hit, NO_TRIANGLE},
     reference::{
         candidate::HitFilter,
         counting::table::ReadCounter,
         inputs::KernelInputs,
         kdtree::is_done,
         search_ray::SearchRay,
-        traversal_ray::{TraversalRay, hit_from_near},
+        traversal_ray::{TraversalRay, near_scene, t_from_origin},
         traverser::Tracer,
     },
     world::World,
@@ -92,16 +93,33 @@ struct Pending {
 }
 
 /// The stack of pending subtrees. Of one node's children, the nearest one is on top.
-struct Stack {
+pub(super) struct Stack {
     entries: [Pending; MOST_PENDING],
     size: usize,
 }
+
+/// The number of rays that a thread takes by turns. With half as many, scattered rays take a fifth longer, and with
+/// twice as many no shorter (docs/experiments.md).
+const RAYS_IN_FLIGHT: usize = 8;
 
 /// Traces rays through a [`WideBvh`] on one thread, and owns the working memory for that.
 pub struct WideTraverser<'a> {
     bvh: &'a WideBvh,
     level: Level,
-    stack: Stack,
+    /// One for each ray in flight.
+    stacks: Box<[Stack]>,
+}
+
+/// A ray that is on its way.
+struct Flight {
+    ray: TraversalRay,
+    best: Hit,
+    /// The subtree that it visits next.
+    subtree: u32,
+    /// The t by which the origin was moved.
+    t_start: f32,
+    /// The end of the interval, counted from the ray's own origin.
+    t_max: f32,
 }
 
 /// A ray as columns that are the same in all lanes.
@@ -120,13 +138,20 @@ struct RayColumns<S: Simd> {
 /// `max` of a side's NaN, which on x86 return another side, and on ARM NaN. So no box is missed on either.
 #[inline(always)]
 fn entered<S: Simd>(t_enter: f32x16<S>, t_exit: f32x16<S>) -> LaneMask {
-    LaneMask::from(!(t_enter.simd_gt(t_exit).to_bitmask() as u16))
+    lanes_of(!t_enter.simd_gt(t_exit))
 }
 
-/// The children whose boxes a ray meets, and the t at which it enters each box.
-struct Entered {
-    lanes: LaneMask,
-    t_enter: [f32; WIDTH],
+/// Returns the lanes of a mask.
+#[inline(always)]
+pub(super) fn lanes_of<S: Simd>(mask: mask32x16<S>) -> LaneMask {
+    LaneMask::from(mask.to_bitmask() as u16)
+}
+
+/// The children whose boxes a ray meets, and the t at which it enters each box; or those that may hold a point's
+/// closest one, and the squares of their distances.
+pub(super) struct Entered {
+    pub lanes: LaneMask,
+    pub t_enter: [f32; WIDTH],
 }
 
 impl<S: Simd> RayColumns<S> {
@@ -145,10 +170,9 @@ impl<S: Simd> RayColumns<S> {
         }
     }
 
-    /// Returns the t at which the ray meets a side of each box.
+    /// Returns the t at which the ray meets a side of each box. `axis`: that of the side.
     #[inline(always)]
-    fn t_at(&self, node: &WideNode, side: usize) -> f32x16<S> {
-        let axis = if side < 3 { side } else { side - 3 };
+    fn t_at(&self, node: &WideNode, axis: usize, side: usize) -> f32x16<S> {
         f32x16::load_array_ref(self.t_enter.simd, &node.sides[side]) * self.inv_direction[axis] + self.bias[axis]
     }
 
@@ -157,9 +181,9 @@ impl<S: Simd> RayColumns<S> {
     #[inline(always)]
     fn enter(&self, node: &WideNode, t_best: f32) -> Entered {
         let ([near_x, near_y, near_z], [far_x, far_y, far_z]) = (self.near_sides, self.far_sides);
-        let (x, y, z) = (self.t_at(node, near_x), self.t_at(node, near_y), self.t_at(node, near_z));
+        let (x, y, z) = (self.t_at(node, 0, near_x), self.t_at(node, 1, near_y), self.t_at(node, 2, near_z));
         let t_enter = x.max(y).max(z.max(self.t_enter));
-        let (x, y, z) = (self.t_at(node, far_x), self.t_at(node, far_y), self.t_at(node, far_z));
+        let (x, y, z) = (self.t_at(node, 0, far_x), self.t_at(node, 1, far_y), self.t_at(node, 2, far_z));
         let t_exit = x.min(y).min(z.min(f32x16::splat(self.t_enter.simd, t_best)));
         Entered { lanes: entered(t_enter, t_exit), t_enter: t_enter.to_array() }
     }
@@ -189,9 +213,17 @@ impl<S: Simd> RayColumns<S> {
 }
 
 impl Stack {
+    pub fn new() -> Self {
+        Self { entries: [Pending::default(); MOST_PENDING], size: 0 }
+    }
+
+    pub fn clear(&mut self) {
+        self.size = 0;
+    }
+
     /// Makes those children pending that the ray enters, apart from the nearest one, which is returned.
     #[inline(always)]
-    fn push_all_but_nearest(&mut self, node: &WideNode, entered: &Entered) -> Option<u32> {
+    pub fn push_all_but_nearest(&mut self, node: &WideNode, entered: &Entered) -> Option<u32> {
         let mut lanes = entered.lanes;
         let mut next = || {
             let lane = lanes.trailing_zeros() as usize;
@@ -214,9 +246,25 @@ impl Stack {
         Some(nearest.subtree)
     }
 
+    /// Makes those children pending that the ray enters, in any order, apart from one, which is returned.
+    #[inline(always)]
+    fn push_all_but_one(&mut self, node: &WideNode, entered: &Entered) -> Option<u32> {
+        let mut lanes = entered.lanes;
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize;
+            self.entries[self.size] = Pending { t_enter: entered.t_enter[lane], subtree: node.children[lane] };
+            self.size += 1;
+            lanes &= lanes - 1;
+        }
+        (entered.lanes != 0).then(|| {
+            self.size -= 1;
+            self.entries[self.size].subtree
+        })
+    }
+
     /// Returns the next pending subtree that the ray enters no farther than `t_best`, or at NaN.
     #[inline(always)]
-    fn pop(&mut self, t_best: f32) -> Option<u32> {
+    pub fn pop(&mut self, t_best: f32) -> Option<u32> {
         while self.size > 0 {
             self.size -= 1;
             let Pending { t_enter, subtree } = self.entries[self.size];
@@ -229,39 +277,95 @@ impl Stack {
     }
 }
 
+impl Flight {
+    /// Returns the ray at the root, or none if it misses the box of all triangles.
+    #[inline(always)]
+    fn begin(inputs: &KernelInputs<impl ReadCounter>, search_ray: &SearchRay) -> Option<Self> {
+        let (near, t_start) = near_scene(inputs, search_ray);
+        let ray = TraversalRay::new(inputs, &near);
+        // The comparison is not `>`, since a NaN has to miss.
+        let enters = ray.t_enter <= ray.t_exit;
+        enters.then(|| Self { ray, best: near.miss(), subtree: 0, t_start, t_max: search_ray.t_max })
+    }
+
+    /// Visits a node or a block. Returns whether the ray goes on, to `subtree`.
+    #[inline(always)]
+    fn step<S: Simd, const ANY_HIT: bool>(
+        &mut self,
+        simd: S,
+        inputs: &KernelInputs<impl ReadCounter>,
+        (nodes, blocks): (&[WideNode], &[TriangleBlock]),
+        stack: &mut Stack,
+    ) -> bool {
+        let columns = RayColumns::new(simd, &self.ray);
+        let next = if self.subtree & IS_BLOCK != 0 {
+            let block = &blocks[(self.subtree & !IS_BLOCK) as usize];
+            columns.intersect(inputs, &self.ray.hit_filter, block, &mut self.best);
+            if is_done::<ANY_HIT>(&self.best) {
+                return false;
+            }
+            None
+        } else {
+            let node = &nodes[self.subtree as usize];
+            let entered = columns.enter(node, self.best.t);
+            if ANY_HIT { stack.push_all_but_one(node, &entered) } else { stack.push_all_but_nearest(node, &entered) }
+        };
+        let Some(next) = next.or_else(|| stack.pop(self.best.t)) else { return false };
+        if next & IS_BLOCK != 0 {
+            prefetch(simd, &blocks[(next & !IS_BLOCK) as usize]);
+        } else {
+            prefetch(simd, &nodes[next as usize]);
+        }
+        self.subtree = next;
+        true
+    }
+
+    /// Returns the hit with t counted from the ray's own origin. A miss has t = t_max.
+    #[inline(always)]
+    fn hit(&self) -> Hit {
+        let is_miss = self.best.triangle_ix == NO_TRIANGLE;
+        let t = if is_miss { self.t_max } else { t_from_origin(self.best.t, self.t_start, self.t_max) };
+        Hit { t, ..self.best }
+    }
+}
+
 impl<'a> WideTraverser<'a> {
     /// Creates a traverser that uses the instructions of `level`, which the machine must have. The hits are the same at
     /// every level, bit for bit.
     pub fn new(bvh: &'a WideBvh, level: Level) -> Self {
-        Self { bvh, level, stack: Stack { entries: [Pending::default(); MOST_PENDING], size: 0 } }
+        Self { bvh, level, stacks: (0..RAYS_IN_FLIGHT).map(|_| Stack::new()).collect() }
     }
 
-    /// Visits all blocks whose boxes the ray meets, until no nearer hit can follow.
+    /// Takes rays from `search_rays` whenever one has come to its end, until all have.
     #[inline(always)]
-    fn search<S: Simd, const ANY_HIT: bool>(
+    fn trace<S: Simd, const ANY_HIT: bool, Key>(
         &mut self,
         simd: S,
         inputs: &KernelInputs<impl ReadCounter>,
-        ray: &TraversalRay,
-        best: &mut Hit,
+        mut search_rays: impl Iterator<Item = (Key, SearchRay)>,
+        mut found: impl FnMut(Key, Hit),
     ) {
-        let columns = RayColumns::new(simd, ray);
-        let mut subtree = 0;
-        self.stack.size = 0;
-        loop {
-            let nearest = if subtree & IS_BLOCK != 0 {
-                columns.intersect(inputs, &ray.hit_filter, &self.bvh.blocks()[(subtree & !IS_BLOCK) as usize], best);
-                if is_done::<ANY_HIT>(best) {
-                    return;
+        let mut begin = |found: &mut dyn FnMut(Key, Hit)| {
+            for (key, search_ray) in search_rays.by_ref() {
+                if let Some(flight) = Flight::begin(inputs, &search_ray) {
+                    return Some((key, flight));
                 }
-                None
-            } else {
-                let node = &self.bvh.nodes()[subtree as usize];
-                self.stack.push_all_but_nearest(node, &columns.enter(node, best.t))
-            };
-            match nearest.or_else(|| self.stack.pop(best.t)) {
-                Some(next) => subtree = next,
-                None => return,
+                found(key, search_ray.miss());
+            }
+            None
+        };
+        let bvh = (self.bvh.nodes(), self.bvh.blocks());
+        let mut flights: [_; RAYS_IN_FLIGHT] = std::array::from_fn(|_| begin(&mut found));
+        while flights.iter().any(Option::is_some) {
+            for (slot, stack) in flights.iter_mut().zip(&mut self.stacks) {
+                let Some((_, flight)) = slot else { continue };
+                if flight.step::<S, ANY_HIT>(simd, inputs, bvh, stack) {
+                    continue;
+                }
+                stack.clear();
+                if let Some((key, flight)) = std::mem::replace(slot, begin(&mut found)) {
+                    found(key, flight.hit());
+                }
             }
         }
     }
@@ -274,13 +378,19 @@ impl Tracer for WideTraverser<'_> {
         inputs: &KernelInputs<impl ReadCounter>,
         search_ray: &SearchRay,
     ) -> Hit {
-        hit_from_near(inputs, search_ray, |near, best| {
-            let ray = TraversalRay::new(inputs, near);
-            // The comparison is not `>`, since a NaN has to miss.
-            if ray.t_enter <= ray.t_exit {
-                dispatch!(self.level, simd => self.search::<_, ANY_HIT>(simd, inputs, &ray, best));
-            }
-        })
+        let mut hit = search_ray.miss();
+        self.trace_all::<ANY_HIT, _>(inputs, std::iter::once(((), *search_ray)), |(), found| hit = found);
+        hit
+    }
+
+    #[inline]
+    fn trace_all<const ANY_HIT: bool, Key>(
+        &mut self,
+        inputs: &KernelInputs<impl ReadCounter>,
+        search_rays: impl Iterator<Item = (Key, SearchRay)>,
+        found: impl FnMut(Key, Hit),
+    ) {
+        dispatch!(self.level, simd => self.trace::<_, ANY_HIT, Key>(simd, inputs, search_rays, found));
     }
 }
 

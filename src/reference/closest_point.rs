@@ -1,5 +1,6 @@
 //! Closest point: the point of the triangles that is closest to each query point. Twin of `closest_point.comp`.
 
+use glam::Vec3;
 use rayon::prelude::*;
 
 use super::{
@@ -10,7 +11,7 @@ use super::{
     inputs::KernelInputs,
     kdtree::is_leaf,
     leaf::entries_of,
-    point_triangle::closest_on_triangle,
+    point_triangle::{PointOnTriangle, closest_on_triangle},
 };
 use crate::layout::{Hit, KD_MAX_DEPTH, KdNode, NO_TRIANGLE, QueryPoint, TRIANGLE_HIDDEN};
 
@@ -53,18 +54,21 @@ fn descend(inputs: &KernelInputs, query: Query, limit: f32, mut cell: DistantCel
     }
 }
 
-/// Tests a triangle. Of two that are equally close, the one of the lower index counts. `best.t` is the square of the
-/// distance.
-fn test(inputs: &KernelInputs, Query { position, scale }: Query, entry: u32, best: &mut Hit) {
-    let triangle_ix = inputs.inside.map_or(entry, |instance| instance.first_triangle + entry);
+/// Keeps a point of a triangle in `best` if it is closer and the triangle is not hidden. Of two that are equally close,
+/// the one of the lower index counts. `best.t` is the square of the distance.
+pub fn keep_closest(inputs: &KernelInputs, triangle_ix: u32, at: PointOnTriangle, best: &mut Hit) {
+    let is_closer = at.squared < best.t || at.squared == best.t && triangle_ix < best.triangle_ix;
     let is_hidden = |ix: u32| inputs.triangle_materials[ix as usize] & TRIANGLE_HIDDEN != 0;
-    if inputs.filters && is_hidden(triangle_ix) {
-        return;
-    }
-    let at = closest_on_triangle(inputs.corners(entry).map(|v| v * scale - position));
-    if at.squared < best.t || at.squared == best.t && triangle_ix < best.triangle_ix {
+    if is_closer && !(inputs.filters && is_hidden(triangle_ix)) {
         *best = Hit { t: at.squared, triangle_ix, u: at.u, v: at.v };
     }
+}
+
+/// Tests a triangle of an instance or of the world. `best.t` is the square of the distance.
+pub fn test(inputs: &KernelInputs, Query { position, scale }: Query, entry: u32, best: &mut Hit) {
+    let triangle_ix = inputs.inside.map_or(entry, |instance| instance.first_triangle + entry);
+    let at = closest_on_triangle(inputs.corners(entry).map(|v| v * scale - position));
+    keep_closest(inputs, triangle_ix, at, best);
 }
 
 /// A search through a tree: the point in the world and in the tree's space, and what gives the square of the distance
@@ -91,15 +95,31 @@ impl<L: Fn(f32) -> f32> TreeSearch<L> {
     }
 }
 
+/// A search for closest points. Each thread has its own.
+pub trait PointSearch {
+    /// Keeps the closest point in `best`, if it is closer. `point` is the query's point without its scale. `best.t` is
+    /// the square of the distance.
+    fn search(&mut self, inputs: &KernelInputs, point: Vec3, query: Query, best: &mut Hit);
+}
+
+/// The search through the kd-trees, of the world or of its geometries.
+struct Trees;
+
+impl PointSearch for Trees {
+    fn search(&mut self, inputs: &KernelInputs, point: Vec3, query: Query, best: &mut Hit) {
+        match &inputs.instanced {
+            Some(instanced) => search_instances(inputs, instanced, point, query, best),
+            None => TreeSearch { query, in_tree: query, limit_of: |squared| squared }.run(inputs, best),
+        }
+    }
+}
+
 /// Returns the closest point of the triangles, for a point that [`is_point`].
-fn find_closest(inputs: &KernelInputs, point: &QueryPoint) -> Hit {
+fn find_closest(inputs: &KernelInputs, point: &QueryPoint, search: &mut impl PointSearch) -> Hit {
     let query = Query::at(point.position, [inputs.box_min, inputs.box_max]);
     let most: f32 = point.t_max * query.scale;
     let mut best = Hit { t: most * most, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
-    match &inputs.instanced {
-        Some(instanced) => search_instances(inputs, instanced, point.position, query, &mut best),
-        None => TreeSearch { query, in_tree: query, limit_of: |squared| squared }.run(inputs, &mut best),
-    }
+    search.search(inputs, point.position, query, &mut best);
     let to_world = 1.0 / query.scale;
     if best.triangle_ix == NO_TRIANGLE { MISS } else { Hit { t: (best.t.sqrt() * to_world).min(point.t_max), ..best } }
 }
@@ -107,8 +127,21 @@ fn find_closest(inputs: &KernelInputs, point: &QueryPoint) -> Hit {
 /// Finds the closest point of each of `points`, through the kd-trees, and writes one hit for each: the
 /// distance is `t`. A point without a closest one gets a miss, as a ray does.
 pub fn closest_point(inputs: &KernelInputs, points: &[QueryPoint], hits: &mut [Hit]) {
-    points.par_iter().with_min_len(RAYS_PER_TASK).zip(hits).for_each(|(point, hit)| {
-        let is_any = is_point(point) && !inputs.triangles.is_empty();
-        *hit = if is_any { find_closest(inputs, point) } else { MISS };
+    closest_point_by(inputs, || Trees, points, hits);
+}
+
+/// Does what [`closest_point`] does, by searches that `new_search` makes, at least one for each thread that works.
+pub fn closest_point_by<T: PointSearch>(
+    inputs: &KernelInputs,
+    new_search: impl Fn() -> T + Sync + Send,
+    points: &[QueryPoint],
+    hits: &mut [Hit],
+) {
+    let tasks = points.par_chunks(RAYS_PER_TASK).zip(hits.par_chunks_mut(RAYS_PER_TASK));
+    tasks.for_each_init(new_search, |search, (points, hits)| {
+        for (point, hit) in points.iter().zip(hits) {
+            let is_any = is_point(point) && !inputs.triangles.is_empty();
+            *hit = if is_any { find_closest(inputs, point, search) } else { MISS };
+        }
     });
 }

@@ -7,7 +7,7 @@ use crate::layout::{KD_AXIS_MASK, KD_PAIR_SHIFT, KdNode};
 
 /// A point in units of 1 / `scale`, a power of two that brings all coordinates below 4.
 #[derive(Clone, Copy)]
-pub(super) struct Query {
+pub struct Query {
     pub position: Vec3,
     pub scale: f32,
 }
@@ -33,10 +33,12 @@ pub(super) struct DistantCell {
     pub gap: Vec3,
 }
 
-/// Returns whether what is this far away on each axis may be as close as the best point. The kernel's file derives the
-/// share.
+/// The share of a squared distance that counts, 1 - 2^-20: the square as computed may exceed the real one. The kernel's
+/// file derives it.
+pub const SHARE: f32 = 0.999_999_05;
+
+/// Returns whether what is this far away on each axis may be as close as the best point.
 pub(super) fn is_within(gap: Vec3, best_squared: f32) -> bool {
-    const SHARE: f32 = 0.999_999_05; // 1 - 2^-20
     SHARE * gap.dot(gap) <= best_squared
 }
 

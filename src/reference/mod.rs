@@ -44,7 +44,7 @@ pub mod counting;
 pub mod demodulate;
 pub mod denoise;
 pub mod display;
-mod distant_cells;
+pub mod distant_cells;
 pub mod edge;
 pub mod emitters;
 pub mod false_color;

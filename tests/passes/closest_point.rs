@@ -7,16 +7,26 @@ use crate::{
     support::{
         MeshWithTree, assert_silent,
         closest::{MISS, agree, check},
-        device, meshes, pretended,
+        device, meshes,
+        packets::levels,
+        pretended,
         random::Random,
     },
 };
+use fearless_simd::Level;
 use glam::{Vec3, vec3};
 use kdray::{
-    accel::{Accel, AccelOptions, grid::GridOptions, kdtree::Traversal},
+    accel::{
+        Accel, AccelOptions,
+        grid::GridOptions,
+        kdtree::{BuildOptions, KdTree, Traversal},
+        wide_bvh::WideBvh,
+    },
     cast::{CpuCaster, GpuCaster, Hit, NO_TRIANGLE, QueryPoint},
+    cpu::closest_points::WidePointSearch,
     gpu::{Context, DeviceOverrides},
     layout::Triangle,
+    reference::closest_point::{closest_point, closest_point_by},
     world::Geometry,
 };
 
@@ -80,6 +90,21 @@ fn points_of(world: &MeshWithTree, n: usize) -> Vec<QueryPoint> {
     (0..n).map(&mut point).collect()
 }
 
+fn by_twin(world: &MeshWithTree, points: &[QueryPoint]) -> Vec<Hit> {
+    let mut hits = vec![MISS; points.len()];
+    closest_point(&world.inputs(), points, &mut hits);
+    hits
+}
+
+/// Through the wide hierarchy, with the instructions of a level.
+fn by_hierarchy(world: &MeshWithTree, level: Level, points: &[QueryPoint]) -> Vec<Hit> {
+    let bvh = WideBvh::new(world.tree(), &world.triangles);
+    let mut hits = vec![MISS; points.len()];
+    closest_point_by(&world.inputs(), || WidePointSearch::new(&bvh, level), points, &mut hits);
+    hits
+}
+
+/// By a caster, which makes the hierarchy for many points.
 fn on_cpu(world: &MeshWithTree, points: &[QueryPoint]) -> Vec<Hit> {
     CpuCaster::new(world.geometry(), Traversal::Stack).closest_points(points).expect("a kd-tree")
 }
@@ -96,11 +121,43 @@ fn on_device(context: &Arc<Context>, world: &MeshWithTree, points: &[QueryPoint]
 fn twin_finds_what_brute_force_finds() {
     for (i, world) in worlds().iter().enumerate() {
         let points = points_of(world, N_POINTS);
-        let hits = on_cpu(world, &points);
+        let hits = by_twin(world, &points);
         check(&world.triangles, &[], &points, &hits).unwrap_or_else(|what| panic!("world {i}: {what}"));
         let n_hits = hits.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count();
         assert!(n_hits * 10 > 8 * N_POINTS && n_hits < N_POINTS, "world {i}: {n_hits} hits");
     }
+}
+
+/// The hierarchy finds the bits of the twin, unless the twin leaves out a cell whose triangles are as close up to the
+/// rounding of distances.
+#[test]
+fn the_hierarchy_finds_what_the_twin_finds() {
+    for (i, world) in worlds().iter().enumerate() {
+        let points = points_of(world, N_POINTS);
+        let twin = by_twin(world, &points);
+        let hits = by_hierarchy(world, Level::new(), &points);
+        agree(&world.triangles, &points, &twin, &hits).unwrap_or_else(|what| panic!("world {i}: {what}"));
+        check(&world.triangles, &[], &points, &hits).unwrap_or_else(|what| panic!("world {i}: {what}"));
+        let n_same = hits.iter().zip(&twin).filter(|(a, b)| a == b).count();
+        assert!(n_same * 100 >= 99 * N_POINTS, "world {i}: {n_same} of {N_POINTS}");
+        for level in levels() {
+            assert!(by_hierarchy(world, level, &points) == hits, "world {i}, {level:?}");
+        }
+    }
+}
+
+/// A corner of a triangle that the hierarchy lacks is at a distance.
+#[test]
+fn a_block_without_a_triangle_is_noticed() {
+    let mut world = MeshWithTree::new(meshes::torus(24, 12));
+    let points = points_of(&world, N_POINTS);
+    let twin = by_twin(&world, &points);
+    // A tree leaves out triangles that are not finite.
+    let mut without = world.triangles.clone();
+    without.iter_mut().step_by(9).for_each(|triangle| triangle.v0 = Vec3::NAN);
+    world = MeshWithTree::with_tree(world.triangles, KdTree::build(&without, &BuildOptions::default()));
+    let hits = by_hierarchy(&world, Level::new(), &points);
+    agree(&world.triangles, &points, &twin, &hits).expect_err("a missing triangle");
 }
 
 #[test]
@@ -109,7 +166,7 @@ fn kernel_finds_what_its_twin_finds() {
     for (i, world) in worlds().iter().enumerate() {
         let points = points_of(world, N_POINTS);
         let hits = on_device(&context, world, &points);
-        let twin = on_cpu(world, &points);
+        let twin = by_twin(world, &points);
         agree(&world.triangles, &points, &twin, &hits).unwrap_or_else(|what| panic!("world {i}: {what}"));
         check(&world.triangles, &[], &points, &hits).unwrap_or_else(|what| panic!("world {i}: {what}"));
     }
@@ -122,7 +179,7 @@ fn any_number_of_points_is_searched_for() {
     let context = device();
     let world = MeshWithTree::new(meshes::torus(24, 12));
     let points = points_of(&world, 2000);
-    let twin = on_cpu(&world, &points);
+    let twin = by_twin(&world, &points);
     let mut casters = [caster(&context, &world), caster(&context, &world).with_batches_of(50)];
     for n in RAY_COUNTS.map(|n| n as usize) {
         for caster in &mut casters {
@@ -147,7 +204,7 @@ fn corners_are_at_no_distance() {
         let triangles = world.triangles.iter().step_by(5);
         let (points, first): (Vec<_>, Vec<_>) =
             triangles.flat_map(|triangle| [triangle.v0, triangle.v1, triangle.v2]).map(of_corner).unzip();
-        for hits in [on_cpu(&world, &points), on_device(&context, &world, &points)] {
+        for hits in [by_twin(&world, &points), on_cpu(&world, &points), on_device(&context, &world, &points)] {
             for (hit, first) in hits.iter().zip(&first) {
                 // In the soup, another triangle may go through the corner.
                 assert!(hit.t == 0.0 && hit.triangle_ix <= *first, "{hit:?}, not {first}");
@@ -164,7 +221,7 @@ fn the_greatest_distance_counts() {
     let context = device();
     let at = |t_max: f32| QueryPoint { position: vec3(2.0, 3.0, 3.0), t_max };
     let points = [at(3.0), at(3f32.next_down()), at(0.0), at(1e30), at(f32::INFINITY)];
-    for hits in [on_cpu(&world, &points), on_device(&context, &world, &points)] {
+    for hits in [by_twin(&world, &points), on_cpu(&world, &points), on_device(&context, &world, &points)] {
         assert_eq!([0, 3, 4].map(|i| hits[i].t), [3.0; 3]);
         assert_eq!([1, 2].map(|i| hits[i]), [MISS; 2]);
     }
@@ -193,7 +250,7 @@ fn points_that_are_none_miss() {
         assert!(hits[6..].iter().all(|hit| hit.triangle_ix != NO_TRIANGLE), "{hits:?}");
     }
     let nothing = MeshWithTree::new(Vec::new());
-    for hits in [on_cpu(&nothing, &points), on_device(&context, &nothing, &points)] {
+    for hits in [by_twin(&nothing, &points), on_cpu(&nothing, &points), on_device(&context, &nothing, &points)] {
         assert_eq!(hits, [MISS; 8]);
     }
     assert_silent(&context);
@@ -220,7 +277,7 @@ fn suspended_searches_end_as_others_do() {
     let world = MeshWithTree::new(meshes::cube(12, 1.0));
     let mut points = points_of(&world, 300);
     points.extend((0..100).map(|_| QueryPoint { position: Vec3::ZERO, t_max: f32::INFINITY }));
-    let twin = on_cpu(&world, &points);
+    let twin = by_twin(&world, &points);
     for n_suspension_slots in [None, Some(10)] {
         let context =
             pretended(DeviceOverrides { loop_limit: Some(2000), n_suspension_slots, ..DeviceOverrides::default() });
