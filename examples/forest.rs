@@ -214,6 +214,7 @@ fn forest() -> Scene {
             up: Vec3::Y,
             projection: Projection::Perspective { vertical_fov_degrees: 40.0 },
         },
+        chosen_camera: false,
         cameras: Vec::new(),
         animations: Vec::new(),
         ambient: Vec3::ZERO,

@@ -159,8 +159,9 @@ impl AnimatedWorld {
             scene.instances.iter_mut().for_each(|it| it.transform = it.transform.moved(shift));
             scene.origin = first.origin;
         }
-        if scene.cameras.is_empty() {
+        if first.chosen_camera {
             scene.camera = first.camera;
+            scene.chosen_camera = true;
         }
         if first.chosen_light.is_some() {
             scene.lights.clone_from(&first.lights);

@@ -40,6 +40,7 @@ fn scene(instances: Vec<Instance>) -> Scene {
         lights: vec![Light::Point { position: Vec3::Z, intensity: Vec3::ONE }],
         chosen_light: None,
         images: Vec::new(),
+        chosen_camera: false,
         cameras: Vec::new(),
         animations: Vec::new(),
         camera: Camera {

@@ -269,7 +269,9 @@ fn the_worlds_of_a_scene_file_are_those_of_its_scenes() {
         fs::write(&path, text).unwrap();
         path
     };
-    let all = write("all.toml", &with_all("keys = [{ time = 0 }, { time = 3, translate = [0, 1, 0] }]"));
+    let moves_all = with_all("keys = [{ time = 0 }, { time = 3, translate = [0, 1, 0] }]");
+    let of_camera = "target = [0, 0, 0]\nkeys = [{ time = 0, eye = [1, 2, 30] }, { time = 3, eye = [4, 2, 30] }]\n";
+    let all = write("all.toml", &moves_all.replacen("target = [0, 0, 0]\n", of_camera, 1));
     let lines = with_all("transform = { translate = [0, 0, 5] }");
     let by_keys = write("keys.toml", lines.split("[[mesh]]\nfile").next().unwrap());
     let still_light = write("still.toml", &mesh("keys = [{ time = 0 }, { time = 3, scale = [2, 3, 4] }]"));

@@ -28,6 +28,7 @@ pub fn empty() -> Scene {
             up: Vec3::Y,
             projection: Projection::Perspective { vertical_fov_degrees: 45.0 },
         },
+        chosen_camera: false,
         cameras: Vec::new(),
         animations: Vec::new(),
         ambient: Vec3::ZERO,

@@ -55,6 +55,7 @@ pub(crate) fn fill_in(path: &Path, scene: &mut Scene, lacks: Lacks, options: &Lo
             tracing::info!("{}: is shown as a room: it has {signs}; --eye shows it from elsewhere", path.display());
         }
         scene.camera = of_interior.unwrap_or_else(|| framing::camera(scene, &near, &outside));
+        scene.chosen_camera = true;
         if look.eye.is_none() {
             near.warn_of_far(path, scene);
         }

@@ -47,6 +47,8 @@ pub struct Scene {
     pub studio: Option<Vec3>,
     /// The camera that renders the scene unless another one is set.
     pub camera: Camera,
+    /// Whether the camera is kdray's choice, since the file has none.
+    pub chosen_camera: bool,
     /// The cameras of the scene's file with their names, possibly none.
     pub cameras: Vec<(String, Camera)>,
     /// The animations of the scene's file, possibly none.
@@ -200,6 +202,7 @@ impl Scene {
                 up: Vec3::Y,
                 projection: Projection::Perspective { vertical_fov_degrees: 45.0 },
             },
+            chosen_camera: false,
             cameras: Vec::new(),
             animations: Vec::new(),
             ambient: Vec3::ZERO,
