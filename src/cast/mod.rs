@@ -28,7 +28,7 @@ use std::{
     time::Instant,
 };
 
-use bytemuck::{Pod, Zeroable};
+use bytemuck::{Pod, Zeroable, cast_slice_mut};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -223,13 +223,13 @@ impl GpuCaster {
         n_times: u32,
         record: impl Fn(&Commands, u32, ResumePass),
     ) -> Result<(Vec<Hit>, Option<Vec<f64>>), GpuError> {
-        let mut hits = Vec::with_capacity(queries.len());
+        let mut hits = vec![Hit::zeroed(); queries.len()];
         let mut gpu_ms = Some(vec![0.0; n_times as usize]);
-        for batch in queries.chunks(self.rays_per_batch) {
+        for (batch, hits) in queries.chunks(self.rays_per_batch).zip(hits.chunks_mut(self.rays_per_batch)) {
             buffers.0.upload(batch)?;
             let batch_ms = self.run(n_times, |commands, pass| record(commands, batch.len() as u32, pass))?;
             gpu_ms = gpu_ms.zip(batch_ms).map(|(sums, batch)| sums.iter().zip(batch).map(|(a, b)| a + b).collect());
-            hits.extend(buffers.1.download_first(batch.len())?);
+            buffers.1.download_bytes(0, cast_slice_mut(hits))?;
         }
         Ok((hits, gpu_ms))
     }

@@ -153,7 +153,10 @@ impl<T: Pod> Buffer<T> {
     /// The buffer has fewer elements.
     pub fn upload(&self, data: &[T]) -> Result<(), GpuError> {
         assert!(data.len() <= self.len, "`{}` holds {} elements, not {}", self.any.name, self.len, data.len());
-        self.upload_by(data.len(), |first, part| part.copy_from_slice(&data[first..][..part.len()]))
+        self.upload_by(data.len(), |first, part| {
+            let from = &data[first..][..part.len()];
+            copy_by_threads(bytemuck::cast_slice_mut(part), bytemuck::cast_slice(from));
+        })
     }
 
     /// Overwrites the first `len` elements, part by part, and waits for the device. `write` is that of
@@ -225,10 +228,8 @@ impl<T: Pod> Buffer<T> {
                 commands.barrier(Access::TransferWrite, Access::HostRead); // staging
             })?;
             begin += n_bytes;
-            // Fresh pages are mapped one by one when they are first written, which several threads do faster.
             let from = &staging.bytes()[..part.len()];
-            let copied = part.par_chunks_mut(COPIED_BYTES).zip(from.par_chunks(COPIED_BYTES));
-            copied.for_each(|(to, from)| to.copy_from_slice(from));
+            copy_by_threads(part, from);
         }
         Ok(())
     }
@@ -343,6 +344,13 @@ impl Drop for AnyBuffer {
             self.device.free(ManuallyDrop::take(&mut self.allocation));
         }
     }
+}
+
+/// Copies bytes by several threads. One alone does not use the memory's whole bandwidth, and fresh pages are mapped one
+/// by one when they are first written.
+fn copy_by_threads(to: &mut [u8], from: &[u8]) {
+    let parts = to.par_chunks_mut(COPIED_BYTES).zip(from.par_chunks(COPIED_BYTES));
+    parts.for_each(|(to, from)| to.copy_from_slice(from));
 }
 
 /// A host-visible buffer for an upload or a download.
