@@ -10,7 +10,7 @@ use kdray::{
     accel::{Accel, AccelOptions, Query, grid::GridOptions, kdtree::Traversal, wide_bvh::WideBvh},
     cast::{GpuCaster, Hit, NO_TRIANGLE, Ray, cast_on_cpu},
     cpu::wide_traverser::WideTraverser,
-    gpu::Context,
+    gpu::{Context, DeviceOverrides},
     layout::{KD_MAX_DEPTH, KD_WORD_DEPTH, PathRay},
     reference::{cast::cast_by, search_ray::SearchRay, traversal_ray::near_scene},
     world::Geometry,
@@ -19,9 +19,9 @@ use rayon::prelude::*;
 use support::{
     MeshWithTree,
     chain::chain,
-    compare, device, meshes,
+    compare, device, meshes, pretended,
     random::Random,
-    rays::{nasty_ray, ray},
+    rays::{nasty_ray, ray, streamed},
     with_lanes,
 };
 
@@ -201,6 +201,28 @@ fn casts_follow_one_another() {
         let rays = some_rays(&world, n, -1.0..=1.0);
         let cast = caster.cast(&rays, Query::Closest, 1).expect("a cast");
         device.agree(&all_by_brute_force(&world, &rays), &cast.hits).unwrap();
+    }
+}
+
+/// Parts of streams are cast at the same time, and find the hits that a cast finds.
+#[test]
+fn streams_find_the_hits_of_casts() {
+    let limits = DeviceOverrides { loop_limit: Some(100), n_suspension_slots: Some(40), ..Default::default() };
+    for device in [Device::new(), Device(pretended(limits))] {
+        let world = MeshWithTree::new(meshes::torus(40, 20));
+        let rays = some_rays(&world, 1000, 0.0..=0.0);
+        let mut caster = device.caster(&world, Traversal::Mask).with_batches_of(130);
+        for (query, n) in [(Query::Closest, 1000), (Query::Any, 999), (Query::Closest, 3), (Query::Closest, 0)] {
+            let expected = caster.cast(&rays[..n], query, 1).expect("a cast").hits;
+            assert_eq!(streamed(&mut caster, &rays[..n], query), expected, "{query:?} {n}");
+        }
+        let found = streamed(&mut caster, &rays, Query::Closest);
+        assert!(found.iter().filter(|hit| **hit != MISS).count() > 100);
+        let hidden: Vec<u32> = found.iter().map(|hit| hit.triangle_ix).filter(|ix| *ix != NO_TRIANGLE).collect();
+        let mut caster = caster.hiding(&hidden).expect("a caster");
+        let expected = caster.cast(&rays, Query::Closest, 1).expect("a cast").hits;
+        assert_ne!(expected, found);
+        assert_eq!(streamed(&mut caster, &rays, Query::Closest), expected);
     }
 }
 

@@ -14,6 +14,7 @@ pub(crate) mod leaving;
 mod read;
 mod recorded;
 mod rounds;
+mod stream;
 #[cfg(feature = "files")]
 mod write;
 #[cfg(feature = "files")]
@@ -33,7 +34,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 pub(crate) use self::rounds::time_in_turn;
-pub use self::{all_hits::AllHits, closest_point::count_invalid_points, recorded::RecordedCast};
+pub use self::{all_hits::AllHits, closest_point::count_invalid_points, recorded::RecordedCast, stream::RAYS_PER_PART};
 #[doc(hidden)]
 pub use self::{kernel::Kernel, rounds::Contender};
 #[cfg(feature = "files")]
@@ -100,6 +101,8 @@ pub struct GpuCaster {
     /// The kind of the structure, or of that of each geometry.
     accel_kind: AccelKind,
     rays_per_batch: usize,
+    /// What parts of a stream need, made at its first use.
+    lanes: Vec<stream::Lane>,
 }
 
 impl GpuCaster {
@@ -125,6 +128,7 @@ impl GpuCaster {
             any: None,
             point_search: None,
             accel_kind: geometry.accel().kind(),
+            lanes: Vec::new(),
         })
     }
 
@@ -138,6 +142,7 @@ impl GpuCaster {
         self.bindings = CastResources::bindings(&self.context, &self.tree)?;
         self.resources = CastResources::new(&self.context, &self.bindings, &self.tree, 0)?;
         (self.closest, self.any, self.point_search) = (None, None, None);
+        self.lanes.clear();
         Ok(self)
     }
 
@@ -154,6 +159,7 @@ impl GpuCaster {
         self.resources = self.resources.with_accel(&self.bindings, &tree)?;
         self.tree = tree;
         self.point_search = None;
+        self.lanes.clear();
         Ok(())
     }
 
@@ -227,7 +233,8 @@ impl GpuCaster {
         let mut gpu_ms = Some(vec![0.0; n_times as usize]);
         for (batch, hits) in queries.chunks(self.rays_per_batch).zip(hits.chunks_mut(self.rays_per_batch)) {
             buffers.0.upload(batch)?;
-            let batch_ms = self.run(n_times, |commands, pass| record(commands, batch.len() as u32, pass))?;
+            let batch_ms =
+                self.run(&self.tree, n_times, |commands, pass| record(commands, batch.len() as u32, pass))?;
             gpu_ms = gpu_ms.zip(batch_ms).map(|(sums, batch)| sums.iter().zip(batch).map(|(a, b)| a + b).collect());
             buffers.1.download_bytes(0, cast_slice_mut(hits))?;
         }
@@ -236,7 +243,13 @@ impl GpuCaster {
 
     /// Runs the kernel on the uploaded batch, with one command buffer for each repetition. Returns the milliseconds
     /// of each repetition.
-    fn run(&self, n_times: u32, record_kernel: impl Fn(&Commands, ResumePass)) -> Result<Option<Vec<f64>>, GpuError> {
+    /// `tree`: the structure of the kernel's set.
+    fn run(
+        &self,
+        tree: &AccelBuffers,
+        n_times: u32,
+        record_kernel: impl Fn(&Commands, ResumePass),
+    ) -> Result<Option<Vec<f64>>, GpuError> {
         let timer = Timer::new(&self.context, n_times)?;
         let record = |repetition| {
             CommandBuffer::record(&self.context, "cast", Some(&timer), |commands| {
@@ -245,14 +258,14 @@ impl GpuCaster {
                 }
                 // This repetition overwrites what the previous one has written: cast_hits.
                 commands.barrier(Access::ComputeWrite, Access::ComputeUpdate);
-                self.tree.suspended_rays.reset(commands);
+                tree.suspended_rays.reset(commands);
                 record_kernel(commands, ResumePass::Begin);
             })
         };
         let buffers = (0..n_times).map(record).collect::<Result<Vec<_>, _>>()?;
         self.context.wait_for(self.context.submit(buffers)?)?;
         let began_ms = Instant::now();
-        let n_resume_passes = self.tree.suspended_rays.finish(&self.context, record_kernel)?;
+        let n_resume_passes = tree.suspended_rays.finish(&self.context, record_kernel)?;
         // The same rays are suspended in every repetition, but they are resumed only once, after the last repetition.
         // The wall-clock time of resuming them is added to each repetition.
         let suspended_ms = if n_resume_passes > 0 { began_ms.elapsed().as_secs_f64() * 1e3 } else { 0.0 };

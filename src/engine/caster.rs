@@ -82,6 +82,27 @@ impl<'a> Caster<'a> {
         }
     }
 
+    /// Casts rays of which only some are in memory at a time, as
+    /// [`GpuCaster::cast_stream`](cast::GpuCaster::cast_stream) does.
+    ///
+    /// # Errors
+    /// Memory runs out, or a call fails. Then some parts may have been taken.
+    pub fn cast_stream(
+        &mut self,
+        n_rays: usize,
+        query: Query,
+        make: impl Fn(usize, &mut [Ray]) + Sync,
+        take: impl Fn(usize, &[Hit]) + Sync,
+    ) -> Result<(), GpuError> {
+        match &mut self.0 {
+            Backend::Device(caster) => caster.cast_stream(n_rays, query, make, take),
+            Backend::Cpu(caster) => {
+                caster.cast_stream(n_rays, query, make, take);
+                Ok(())
+            }
+        }
+    }
+
     /// Finds the point of the triangles that is closest to each of `points`, as
     /// [`GpuCaster::closest_points`](cast::GpuCaster::closest_points) does.
     ///

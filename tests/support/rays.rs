@@ -1,9 +1,11 @@
 //! Rays at a mesh: ordinary ones, and those on which traversals are likely to fail. The latter are *nasty*.
 
+use std::{collections::BTreeMap, sync::Mutex};
+
 use glam::{DVec3, Vec3};
 use kdray::{
-    accel::kdtree::Node,
-    cast::Ray,
+    accel::{Query, kdtree::Node},
+    cast::{GpuCaster, Hit, Ray},
     layout::{NO_TRIANGLE, PathRay, Triangle},
 };
 
@@ -125,4 +127,13 @@ pub fn met_in_double_precision(triangles: &[Triangle], ray: &Ray) -> Option<Vec<
     met.sort_by(|a, b| a.0.total_cmp(&b.0));
     let is_clear = met.windows(2).all(|pair| pair[1].0 - pair[0].0 > NEAR);
     is_clear.then(|| met.into_iter().map(|(_, triangle_ix)| triangle_ix).collect())
+}
+
+/// Returns the hits of a stream of rays, whose parts come in any order.
+pub fn streamed(caster: &mut GpuCaster, rays: &[Ray], query: Query) -> Vec<Hit> {
+    let parts = Mutex::new(BTreeMap::new());
+    let make = |first: usize, part: &mut [Ray]| part.copy_from_slice(&rays[first..][..part.len()]);
+    let take = |first: usize, hits: &[Hit]| assert!(parts.lock().unwrap().insert(first, hits.to_vec()).is_none());
+    caster.cast_stream(rays.len(), query, make, take).expect("a stream");
+    parts.into_inner().unwrap().into_values().flatten().collect()
 }
