@@ -3,7 +3,7 @@ from numpy.typing import NDArray
 
 _F32 = NDArray[np.float32]
 _U32 = NDArray[np.uint32]
-_Outputs = tuple[_F32, _U32, _U32, _F32, _F32]
+_Outputs = tuple[_F32 | None, _U32 | None, _U32 | None, _F32 | None, _F32 | None, _F32 | None]
 
 def set_threads(n: int) -> None:
     """Sets the number of threads that work for casts and builds with ``nthreads=0``; 0 means one per core."""
@@ -30,4 +30,4 @@ class Core:
     def list(
         self, rays: _F32, range: tuple[_F32, _F32], most_per_ray: int | None, n_threads: int
     ) -> tuple[_U32, _U32, _F32, _U32, _U32, _F32]: ...
-    def closest(self, points: _F32, n_threads: int, outputs: _Outputs, closest: _F32) -> None: ...
+    def closest(self, points: _F32, n_threads: int, outputs: _Outputs) -> None: ...

@@ -15,16 +15,19 @@ from .device import Device, best_gpu
 
 _F32 = NDArray[np.float32]
 _U32 = NDArray[np.uint32]
-_Outputs = tuple[_F32, _U32, _U32, _F32, _F32]
+_Outputs = tuple[_F32 | None, _U32 | None, _U32 | None, _F32 | None, _F32 | None, _F32 | None]
 
-# What `cast_rays` returns, in the order of the compiled part: name, type, shape of a ray's entry.
+# Results in the order of the compiled part: name, type, shape of a ray's or a point's entry.
 _COLUMNS: list[tuple[str, DTypeLike, tuple[int, ...]]] = [
     ("t_hit", np.float32, ()),
     ("geometry_ids", np.uint32, ()),
     ("primitive_ids", np.uint32, ()),
     ("primitive_uvs", np.float32, (2,)),
     ("primitive_normals", np.float32, (3,)),
+    ("points", np.float32, (3,)),
 ]
+# What `cast_rays` returns.
+_OF_RAYS = [name for name, _, _ in _COLUMNS[:5]]
 
 # Beyond this coordinate, single precision has steps of more than 6e-5.
 _NEAR = 1024.0
@@ -163,7 +166,7 @@ class RaycastingScene:
           A miss, or a triangle without an area: 0.
         """
         rows, shape = arrays.rays("rays", rays, self._origin)
-        outputs, results = _outputs(shape, out)
+        outputs, results = _outputs(shape, _OF_RAYS, out)
         self._core.cast(rows, _range(shape, t_min, t_max), self._threads(nthreads), outputs)
         return results
 
@@ -231,8 +234,8 @@ class RaycastingScene:
         """
         query = arrays.floats("query_points", query_points, "(..., 3)", (3,))
         shape = query.shape[:-1]
-        results, inner = self._closest(arrays.relative(query, self._origin), shape, nthreads)
-        points: NDArray[Any] = inner.reshape(*shape, 3)
+        results = self._closest(arrays.relative(query, self._origin), shape, nthreads, [*_OF_RAYS, "points"])
+        points = results.pop("points")
         if self._origin.any():
             points = points + self._origin
             if query.dtype == np.float32:
@@ -243,7 +246,7 @@ class RaycastingScene:
         """Computes the distance of each query point (..., 3) from the triangles: (...) float32."""
         query = arrays.floats("query_points", query_points, "(..., 3)", (3,))
         points = arrays.relative(query, self._origin)
-        return self._closest(points, query.shape[:-1], nthreads)[0]["t_hit"]
+        return self._closest(points, query.shape[:-1], nthreads, ["t_hit"])["t_hit"]
 
     def compute_signed_distance(
         self, query_points: ArrayLike, nthreads: int = 0, nsamples: int = 1
@@ -258,7 +261,7 @@ class RaycastingScene:
         """
         query = arrays.floats("query_points", query_points, "(..., 3)", (3,))
         points, n = arrays.relative(query, self._origin), _n_samples(nsamples)
-        distances = self._closest(points, (len(points),), nthreads)[0]["t_hit"]
+        distances = self._closest(points, (len(points),), nthreads, ["t_hit"])["t_hit"]
         inside = self._is_inside(points, nthreads, n)
         return np.where(inside, -distances, distances).astype(np.float32).reshape(query.shape[:-1])
 
@@ -349,11 +352,12 @@ class RaycastingScene:
     def _threads(self, nthreads: int) -> int:
         return arrays.integer("nthreads", nthreads) or self._nthreads
 
-    def _closest(self, points: _F32, shape: tuple[int, ...], nthreads: int) -> tuple[dict[str, NDArray[Any]], _F32]:
-        outputs, results = _outputs(shape, None)
-        closest = np.empty_like(points)
-        self._core.closest(points, self._threads(nthreads), outputs, closest)
-        return results, closest
+    def _closest(
+        self, points: _F32, shape: tuple[int, ...], nthreads: int, names: list[str]
+    ) -> dict[str, NDArray[Any]]:
+        outputs, results = _outputs(shape, names)
+        self._core.closest(points, self._threads(nthreads), outputs)
+        return results
 
     def _is_inside(self, points: _F32, nthreads: int, n_samples: int) -> NDArray[np.bool_]:
         votes = np.zeros(len(points), np.int64)
@@ -423,22 +427,26 @@ def _range(
 
 
 def _outputs(
-    shape: tuple[int, ...], out: dict[str, NDArray[Any]] | None
+    shape: tuple[int, ...], names: list[str], out: dict[str, NDArray[Any]] | None = None
 ) -> tuple[_Outputs, dict[str, NDArray[Any]]]:
-    """Returns the arrays that hits are written to, as the compiled part and as the caller see them."""
-    names = [name for name, _, _ in _COLUMNS]
+    """Returns the arrays that results are written to, as the compiled part and as the caller see them.
+
+    ``names``: those of all results. Where the caller has given some arrays in ``out``, only they are written.
+    """
     if out is not None and (unknown := set(out) - set(names)):
         raise ValueError(f"out: expected the keys {', '.join(names)}, not {', '.join(map(str, sorted(unknown)))}")
     columns: list[Any] = []
     results = {}
     for name, dtype, entry in _COLUMNS:
-        column = np.empty(shape + entry, dtype) if out is None or name not in out else out[name]
-        if out is not None and name in out:
+        if name not in (names if out is None else out):
+            columns.append(None)
+            continue
+        column = np.empty(shape + entry, dtype) if out is None else out[name]
+        if out is not None:
             _check_out(name, column, np.dtype(dtype), shape + entry)
-        if out is None or name in out:
-            results[name] = column
+        results[name] = column
         columns.append(column.reshape(-1, *entry))
-    return (columns[0], columns[1], columns[2], columns[3], columns[4]), results
+    return (columns[0], columns[1], columns[2], columns[3], columns[4], columns[5]), results
 
 
 def _check_out(name: str, column: Any, dtype: np.dtype[Any], shape: tuple[int, ...]) -> None:

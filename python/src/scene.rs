@@ -6,11 +6,11 @@ use std::{
     thread::{self, ThreadId},
 };
 
-use bytemuck::{cast_slice, cast_slice_mut};
+use bytemuck::{Zeroable, cast_slice};
 use glam::{DMat4, DVec3, DVec4, Vec3};
 use kdray::{
     accel::Query,
-    cast::{NO_TRIANGLE, QueryPoint, Ray},
+    cast::{Hit, NO_TRIANGLE, QueryPoint, RAYS_PER_PART, Ray},
 };
 use numpy::{
     IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyReadwriteArray1, PyReadwriteArray2,
@@ -25,8 +25,8 @@ use super::{
     state::State,
 };
 
-/// Rays that are cast between two looks at Ctrl-C: a batch of a device, or some tenths of a second of the CPU.
-const RAYS_AT_ONCE: [usize; 2] = [1 << 21, 1 << 18];
+/// Rays that are cast between two looks at Ctrl-C, by a GPU or by others: some tenths of a second.
+const RAYS_AT_ONCE: [usize; 2] = [16 * RAYS_PER_PART, RAYS_PER_PART / 2];
 /// The same number of queries that take longer.
 const QUERIES_AT_ONCE: [usize; 2] = [1 << 20, 1 << 16];
 
@@ -40,13 +40,14 @@ pub struct Core {
     device_name: String,
 }
 
-/// t, geometry_ids, primitive_ids, uvs, normals.
+/// t, geometry_ids, primitive_ids, uvs, normals, points.
 type Outputs<'py> = (
-    PyReadwriteArray1<'py, f32>,
-    PyReadwriteArray1<'py, u32>,
-    PyReadwriteArray1<'py, u32>,
-    PyReadwriteArray2<'py, f32>,
-    PyReadwriteArray2<'py, f32>,
+    Option<PyReadwriteArray1<'py, f32>>,
+    Option<PyReadwriteArray1<'py, u32>>,
+    Option<PyReadwriteArray1<'py, u32>>,
+    Option<PyReadwriteArray2<'py, f32>>,
+    Option<PyReadwriteArray2<'py, f32>>,
+    Option<PyReadwriteArray2<'py, f32>>,
 );
 
 /// ray_splits, ray_ids, t_hit, geometry_ids, primitive_ids, uvs.
@@ -81,8 +82,8 @@ impl<'a> Rows<'a> {
         self.rows.len() / self.width
     }
 
-    /// Returns the rays from `first` on, `n` at most.
-    fn rays(&self, first: usize, n: usize) -> Vec<Ray> {
+    /// Writes the rays from `first` on.
+    fn write(&self, first: usize, rays: &mut [Ray]) {
         let at = |values: &[f32], ix: usize| if values.len() == 1 { values[0] } else { values[ix] };
         let ray = |ix: usize| {
             let row = &self.rows[ix * self.width..][..self.width];
@@ -92,7 +93,14 @@ impl<'a> Rows<'a> {
             };
             Ray { origin: Vec3::from_slice(row), t_min, direction: Vec3::from_slice(&row[3..]), t_max }
         };
-        (first..self.len().min(first + n)).into_par_iter().with_min_len(1024).map(ray).collect()
+        rays.par_iter_mut().enumerate().with_min_len(1024).for_each(|(ix, to)| *to = ray(first + ix));
+    }
+
+    /// Returns the rays from `first` on, `n` at most.
+    fn rays(&self, first: usize, n: usize) -> Vec<Ray> {
+        let mut rays = vec![Ray::zeroed(); n.min(self.len() - first)];
+        self.write(first, &mut rays);
+        rays
     }
 }
 
@@ -178,8 +186,8 @@ fn in_chunks(
     Ok(())
 }
 
-fn of_processor([device, cpu]: [usize; 2], state: &State) -> usize {
-    if state.has_device() { device } else { cpu }
+fn of_processor([gpu, others]: [usize; 2], state: &State) -> usize {
+    if state.has_gpu() { gpu } else { others }
 }
 
 #[pymethods]
@@ -271,19 +279,24 @@ impl Core {
         rays: PyReadonlyArray2<f32>,
         range: Range,
         n_threads: usize,
-        outputs: Outputs,
+        mut outputs: Outputs,
     ) -> PyResult<()> {
         let rows = Rows::new(&rays, &range)?;
-        let (mut t, mut geometry_ids, mut primitive_ids, mut uvs, mut normals) = outputs;
-        let mut columns = columns_of(&mut t, &mut geometry_ids, &mut primitive_ids, &mut uvs, &mut normals)?;
+        let mut columns = columns_of(&mut outputs)?;
         let pool = pool(n_threads)?;
         self.with(py, |state| {
             let at_once = of_processor(RAYS_AT_ONCE, state);
             in_chunks(rows.len(), at_once, &pool, |first| {
-                let rays = rows.rays(first, at_once);
-                let hits = state.caster(rows.len())?.cast(&rays, Query::Closest, 1).map_err(failed)?.hits;
-                columns.split_off(rays.len()).write(state.world(), &hits);
-                Ok(())
+                let n = at_once.min(rows.len() - first);
+                let parts: Vec<_> =
+                    columns.split_off_parts(n, RAYS_PER_PART).into_iter().map(|part| Mutex::new(Some(part))).collect();
+                let (caster, placed) = state.caster(rows.len())?;
+                let take = |begin: usize, hits: &[Hit]| {
+                    let part = locked(&parts[begin / RAYS_PER_PART]).take().expect("each part is taken once");
+                    part.write(placed, hits);
+                };
+                let make = |begin: usize, rays: &mut [Ray]| rows.write(first + begin, rays);
+                caster.cast_stream(n, Query::Closest, make, take).map_err(failed)
             })
         })
     }
@@ -303,10 +316,14 @@ impl Core {
         self.with(py, |state| {
             let at_once = of_processor(RAYS_AT_ONCE, state);
             in_chunks(rows.len(), at_once, &pool, |first| {
-                let rays = rows.rays(first, at_once);
-                let hits = state.caster(rows.len())?.cast(&rays, Query::Any, 1).map_err(failed)?.hits;
-                output[first..].iter_mut().zip(&hits).for_each(|(out, hit)| *out = hit.triangle_ix != NO_TRIANGLE);
-                Ok(())
+                let n = at_once.min(rows.len() - first);
+                let parts: Vec<_> = output[first..][..n].chunks_mut(RAYS_PER_PART).map(Mutex::new).collect();
+                let take = |begin: usize, hits: &[Hit]| {
+                    let mut part = locked(&parts[begin / RAYS_PER_PART]);
+                    part.iter_mut().zip(hits).for_each(|(out, hit)| *out = hit.triangle_ix != NO_TRIANGLE);
+                };
+                let make = |begin: usize, rays: &mut [Ray]| rows.write(first + begin, rays);
+                state.caster(rows.len())?.0.cast_stream(n, Query::Any, make, take).map_err(failed)
             })
         })
     }
@@ -327,7 +344,7 @@ impl Core {
             let at_once = of_processor(QUERIES_AT_ONCE, state);
             in_chunks(rows.len(), at_once, &pool, |first| {
                 let rays = rows.rays(first, at_once);
-                let counts = state.caster(rows.len())?.count_hits(&rays).map_err(failed)?;
+                let counts = state.caster(rows.len())?.0.count_hits(&rays).map_err(failed)?;
                 output[first..].iter_mut().zip(&counts).for_each(|(out, count)| *out = *count as i32);
                 Ok(())
             })
@@ -351,7 +368,7 @@ impl Core {
             let at_once = of_processor(QUERIES_AT_ONCE, state);
             in_chunks(rows.len(), at_once, &pool, |first| {
                 let rays = rows.rays(first, at_once);
-                let caster = state.caster(rows.len())?;
+                let (caster, placed) = state.caster(rows.len())?;
                 let all = caster.all_hits(&rays, most_per_ray).map_err(failed)?;
                 let before = t_hit.len() as u64;
                 if before + all.hits.len() as u64 > u64::from(u32::MAX) {
@@ -361,8 +378,7 @@ impl Core {
                 for (ix, ends) in all.ray_splits.windows(2).enumerate() {
                     ray_ids.extend((ends[0]..ends[1]).map(|_| (first + ix) as u32));
                 }
-                let world = state.world();
-                let found: Vec<_> = all.hits.par_iter().with_min_len(1024).map(|hit| Found::of(world, hit)).collect();
+                let found: Vec<_> = all.hits.par_iter().with_min_len(1024).map(|hit| Found::of(placed, hit)).collect();
                 t_hit.extend(all.hits.iter().map(|hit| hit.t));
                 geometry_ids.extend(found.iter().map(|it| it.geometry_id));
                 primitive_ids.extend(found.iter().map(|it| it.primitive_id));
@@ -380,51 +396,46 @@ impl Core {
         ))
     }
 
-    /// Finds the closest points of (N, 3) points. Writes distances and ids into `outputs`, and points into `closest`.
+    /// Finds the closest points of (N, 3) points.
     fn closest(
         &self,
         py: Python,
         points: PyReadonlyArray2<f32>,
         n_threads: usize,
-        outputs: Outputs,
-        mut closest: PyReadwriteArray2<f32>,
+        mut outputs: Outputs,
     ) -> PyResult<()> {
         let points: &[[f32; 3]] = cast_slice(points.as_slice()?);
-        let closest: &mut [[f32; 3]] = cast_slice_mut(closest.as_slice_mut()?);
-        let (mut t, mut geometry_ids, mut primitive_ids, mut uvs, mut normals) = outputs;
-        let mut columns = columns_of(&mut t, &mut geometry_ids, &mut primitive_ids, &mut uvs, &mut normals)?;
+        let mut columns = columns_of(&mut outputs)?;
         let pool = pool(n_threads)?;
         self.with(py, |state| {
             let at_once = of_processor(QUERIES_AT_ONCE, state);
             in_chunks(points.len(), at_once, &pool, |first| {
                 let end = points.len().min(first + at_once);
                 let query = |p: &[f32; 3]| QueryPoint { position: Vec3::from(*p), t_max: f32::INFINITY };
-                let queries: Vec<_> = points[first..end].iter().map(query).collect();
-                let caster = state.caster(points.len())?;
+                let queries: Vec<_> = points[first..end].par_iter().with_min_len(1024).map(query).collect();
+                let (caster, placed) = state.caster(points.len())?;
                 let hits = caster.closest_points(&queries, 1).map_err(failed)?.hits;
-                let world = state.world();
-                let rows = closest[first..end].par_iter_mut().zip(&hits).with_min_len(1024);
-                rows.for_each(|(row, hit)| *row = Found::of(world, hit).point.to_array());
-                columns.split_off(hits.len()).write(world, &hits);
+                columns.split_off(hits.len()).write(placed, &hits);
                 Ok(())
             })
         })
     }
 }
 
-fn columns_of<'a>(
-    t: &'a mut PyReadwriteArray1<f32>,
-    geometry_ids: &'a mut PyReadwriteArray1<u32>,
-    primitive_ids: &'a mut PyReadwriteArray1<u32>,
-    uvs: &'a mut PyReadwriteArray2<f32>,
-    normals: &'a mut PyReadwriteArray2<f32>,
-) -> PyResult<Columns<'a>> {
+fn columns_of<'a>((t, geometry_ids, primitive_ids, uvs, normals, points): &'a mut Outputs) -> PyResult<Columns<'a>> {
+    fn rows<'a, T: numpy::Element, const N: usize>(
+        column: &'a mut Option<PyReadwriteArray2<T>>,
+    ) -> PyResult<Option<&'a mut [[T; N]]>> {
+        let rows = column.as_mut().map(PyReadwriteArray2::as_slice_mut).transpose()?;
+        Ok(rows.map(|rows| rows.as_chunks_mut().0))
+    }
     Ok(Columns {
-        t: t.as_slice_mut()?,
-        geometry_ids: geometry_ids.as_slice_mut()?,
-        primitive_ids: primitive_ids.as_slice_mut()?,
-        uvs: cast_slice_mut(uvs.as_slice_mut()?),
-        normals: cast_slice_mut(normals.as_slice_mut()?),
+        t: t.as_mut().map(PyReadwriteArray1::as_slice_mut).transpose()?,
+        geometry_ids: geometry_ids.as_mut().map(PyReadwriteArray1::as_slice_mut).transpose()?,
+        primitive_ids: primitive_ids.as_mut().map(PyReadwriteArray1::as_slice_mut).transpose()?,
+        uvs: rows(uvs)?,
+        normals: rows(normals)?,
+        points: rows(points)?,
     })
 }
 

@@ -58,6 +58,13 @@ pub struct Ready {
     places_at: u64,
 }
 
+/// What hits are in.
+#[derive(Clone, Copy)]
+pub struct Placed<'a> {
+    pub world: &'a World,
+    pub places: &'a [Place],
+}
+
 /// A scene.
 pub struct State {
     engine: Engine,
@@ -156,24 +163,19 @@ impl State {
         Ok(())
     }
 
-    /// Whether the scene casts on a Vulkan device.
-    pub fn has_device(&self) -> bool {
-        self.engine.device().is_some()
+    /// Whether the scene casts on a GPU.
+    pub fn has_gpu(&self) -> bool {
+        self.engine.device().is_some_and(|device| !device.is_software())
     }
 
-    /// Returns what casts `n` rays or points into the geometries as they are now.
-    pub fn caster(&mut self, n: usize) -> PyResult<&mut Caster<'static>> {
+    /// Returns what casts `n` rays or points into the geometries as they are now, and what their hits are in.
+    pub fn caster(&mut self, n: usize) -> PyResult<(&mut Caster<'static>, Placed<'_>)> {
         if !self.geometries.iter().flatten().any(|geometry| !geometry.faces.is_empty()) {
             return Err(PyRuntimeError::new_err("the scene has no triangles: add_triangles adds some"));
         }
         let before = self.ready.take();
         let ready = self.current(before, n)?;
         self.ready.insert(ready).caster([&self.engine, &self.cpu], n)
-    }
-
-    /// Returns the world of the last caster.
-    pub fn world(&self) -> &Ready {
-        self.ready.as_ref().expect("a caster was asked for")
     }
 
     /// Returns a world of the geometries as they are now. `n_rays`: that are about to be cast.
@@ -249,12 +251,15 @@ impl State {
 
 impl Ready {
     /// Returns what casts `n` rays: the device, or the CPU if they are few. It is made at the first use.
-    fn caster(&mut self, [engine, cpu]: [&Engine; 2], n: usize) -> PyResult<&mut Caster<'static>> {
+    fn caster(&mut self, [engine, cpu]: [&Engine; 2], n: usize) -> PyResult<(&mut Caster<'static>, Placed<'_>)> {
+        let Self { world, places, traversal, on_device, on_cpu, .. } = self;
         let is_small = engine.device().is_some_and(|device| !device.is_software()) && n < SMALL_BATCH;
-        if engine.device().is_none() || is_small {
-            return made(&mut self.on_cpu, || cpu.caster_of_world(&self.world, Traversal::OF_CPU));
-        }
-        made(&mut self.on_device, || engine.caster_of_world(&self.world, self.traversal))
+        let caster = if engine.device().is_none() || is_small {
+            made(on_cpu, || cpu.caster_of_world(world, Traversal::OF_CPU))
+        } else {
+            made(on_device, || engine.caster_of_world(world, *traversal))
+        };
+        Ok((caster?, Placed { world, places }))
     }
 }
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use kdray::{
     accel::{Statistics, grid::DeviceBuild},
-    engine::choices::Choices,
+    engine::{MomentWork, choices::Choices},
     frame::{Denoise, PassTime, Profile, RenderOptions},
 };
 use serde::Serialize;
@@ -56,6 +56,9 @@ pub struct Report {
     /// Times of the grid's build on the device; none if no device has built a grid.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub grid_build: Option<DeviceBuild>,
+    /// What the world of the last moment took; none if nothing moves.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub last_moment: Option<MomentWork>,
     pub load_ms: f64,
     pub build_ms: f64,
     /// Time from the choice of traversal and primary visibility to the pictures in memory, with uploading, compiling

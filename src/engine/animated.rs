@@ -7,6 +7,7 @@ use std::{
 };
 
 use glam::DVec3;
+use serde::Serialize;
 use tracing::dispatcher::{Dispatch, with_default};
 
 use super::load::{LoadError, LoadRequest, Opened};
@@ -38,7 +39,7 @@ pub struct AnimatedWorld {
 }
 
 /// What the world of a moment took.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct MomentWork {
     /// Time of placing what moves and of deforming meshes, or of reading the file if it is read again, milliseconds.
     pub pose_ms: f64,

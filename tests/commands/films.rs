@@ -35,7 +35,10 @@ fn frames_of_an_animation_are_pictures_at_their_times() {
             for (instances, accel) in [("flatten", "kdtree"), ("keep", "kdtree"), ("keep", "grid2")] {
                 let common = [&SMALL[..], &[device, "--instances", instances, "--accel", accel]].concat();
                 let render = |more: &[&str]| succeed(path, &[&["render", "moving.gltf"], &common[..], more].concat());
-                render(&["--frames", "0-4", "--fps", "2", "-o", "f#.png"]);
+                render(&["--frames", "0-4", "--fps", "2", "--profile", "p.json", "-o", "f#.png"]);
+                let profile: Value = serde_json::from_slice(&fs::read(path.join("p.json")).unwrap()).unwrap();
+                let work = &profile["last_moment"];
+                assert_eq!((&work["n_moved"], &work["n_deformed"]), (&json!(1), &json!(u32::from(morphs))), "{work}");
                 render(&["--frames", "3", "--fps", "2", "-o", "alone#.png"]);
                 render(&["--at", "1.5", "-o", "at.png"]);
                 render(&["--frame", "3", "--fps", "2", "-o", "frame.png"]);

@@ -45,11 +45,12 @@ fn n_slabs(tree: &KdTree) -> usize {
     (0..tree.nodes().len() as u32).filter(|&node_ix| tree.slab_of(node_ix).is_some()).count()
 }
 
-/// Whether two slabs are the same but for rounding. Either normal of a surface makes the same slab.
+/// Whether two slabs are the same but for rounding. Either normal of a surface makes the same slab. Half a slab of a
+/// flat surface is some 256 units in the last place of the coordinates thick, of which rounding takes several.
 fn are_near(found: &Slab, expected: &Slab) -> bool {
     let sign = if found.normal.dot(expected.normal) < 0.0 { -1.0 } else { 1.0 };
     (sign * found.normal - expected.normal).length() <= 1e-3 * expected.normal.length()
-        && (sign * found.offset - expected.offset).abs() <= 2e-2 * expected.offset.abs().max(1.0)
+        && (sign * found.offset - expected.offset).abs() <= (2e-2 * expected.offset.abs()).max(0.1)
 }
 
 /// Returns the tree of the triangles with slabs of the device. They are valid and those of the twin, but for nodes that

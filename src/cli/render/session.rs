@@ -175,6 +175,8 @@ impl<'a> Session<'a> {
         let (engine, stage) = ((&ready.engine, &ready.world), (&self.progress, rendering.as_str()));
         let (drawn, _) = self.progress.stage(&rendering, || draw_and_write(&common, engine, &views, stage));
         let DrawnPictures { profiles, n_samples, noise, render_ms } = drawn.map_err(CliError::of_drawing)?;
+        let last_moment = animated.filter(|_| self.args.moves());
+        let last_moment = last_moment.map(|it| it.into_inner().unwrap_or_else(PoisonError::into_inner).work());
         if let Some(file) = one_file {
             file.into_inner().unwrap_or_else(PoisonError::into_inner).finish()?;
         }
@@ -199,6 +201,7 @@ impl<'a> Session<'a> {
             triangles: *n_triangles,
             accel: world.statistics(),
             grid_build: world.grid_build().cloned(),
+            last_moment,
             load_ms: *load_ms,
             build_ms: *build_ms,
             render_ms,
