@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! scene     the class `Core`: a lock, and what Python hands over
-//!   state     geometries, the worlds that are made of them, casters
+//!   state     geometries, the world that is made of them, casters
 //!   columns   hits to the arrays of results
 //! process   the pools of threads, the devices, and the refusal of forked children
 //! ```

@@ -9,8 +9,14 @@ use std::{
     },
 };
 
-use kdray::gpu::{self, ContextOptions, Device, DeviceSelector, GpuError};
-use pyo3::{exceptions::PyRuntimeError, prelude::*};
+use kdray::{
+    engine::Engine,
+    gpu::{self, ContextOptions, Device, DeviceSelector, GpuError},
+};
+use pyo3::{
+    exceptions::{PyRuntimeError, PyValueError},
+    prelude::*,
+};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 /// The process that uses threads or devices. A forked child has neither of them.
@@ -53,8 +59,44 @@ pub fn set_threads(n: usize) {
     N_THREADS.store(n, Ordering::Relaxed);
 }
 
+/// Which device is used.
+#[derive(FromPyObject)]
+pub enum Selector {
+    #[pyo3(transparent)]
+    Index(usize),
+    #[pyo3(transparent)]
+    Name(String),
+}
+
+/// Returns the engine of a device, or of the CPU if there is no selector.
+pub fn engine(py: Python, device: Option<Selector>) -> PyResult<Engine> {
+    check_fork()?;
+    let selector = device.map(|device| match device {
+        Selector::Index(index) => DeviceSelector::Index(index),
+        Selector::Name(name) => DeviceSelector::Name(name),
+    });
+    py.detach(|| match selector {
+        Some(selector) => open(selector).map(Engine::on_device).map_err(failed),
+        None => Ok(Engine::on_cpu()),
+    })
+}
+
+/// Returns the name of an engine's device, or "cpu".
+pub fn name_of(engine: &Engine) -> String {
+    engine.device().map_or("cpu".to_owned(), |device| device.info().name.clone())
+}
+
+/// Returns what Python is told of a failed call.
+pub fn failed(error: GpuError) -> PyErr {
+    let what = error.to_string();
+    match error {
+        GpuError::BadOptions(_) => PyValueError::new_err(what),
+        _ => PyRuntimeError::new_err(what),
+    }
+}
+
 /// Opens a device, or returns the handle of an earlier scene to it.
-pub fn open(selector: DeviceSelector) -> Result<Device, GpuError> {
+fn open(selector: DeviceSelector) -> Result<Device, GpuError> {
     static DEVICES: Mutex<Vec<Device>> = Mutex::new(Vec::new());
     let info = gpu::chosen_device(Some(&selector))?;
     let mut devices = DEVICES.lock().unwrap_or_else(PoisonError::into_inner);

@@ -11,8 +11,6 @@ use glam::{DMat4, DVec3, DVec4, Vec3};
 use kdray::{
     accel::Query,
     cast::{NO_TRIANGLE, QueryPoint, Ray},
-    engine::Engine,
-    gpu::DeviceSelector,
 };
 use numpy::{
     IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyReadwriteArray1, PyReadwriteArray2,
@@ -23,8 +21,8 @@ use rayon::prelude::*;
 
 use super::{
     columns::{Columns, Found},
-    process::{check_fork, is_forked, open, pool},
-    state::{Need, State, failed},
+    process::{Selector, check_fork, engine, failed, is_forked, name_of, pool},
+    state::State,
 };
 
 /// Rays that are cast between two looks at Ctrl-C: a batch of a device, or some tenths of a second of the CPU.
@@ -40,15 +38,6 @@ pub struct Core {
     /// The thread that has locked the state.
     owner: Mutex<Option<ThreadId>>,
     device_name: String,
-}
-
-/// Which device a scene uses.
-#[derive(FromPyObject)]
-pub enum Selector {
-    #[pyo3(transparent)]
-    Index(usize),
-    #[pyo3(transparent)]
-    Name(String),
 }
 
 /// t, geometry_ids, primitive_ids, uvs, normals.
@@ -198,16 +187,8 @@ impl Core {
     /// Opens a device, or uses the CPU if there is no selector.
     #[new]
     fn new(py: Python, device: Option<Selector>) -> PyResult<Self> {
-        check_fork()?;
-        let selector = device.map(|device| match device {
-            Selector::Index(index) => DeviceSelector::Index(index),
-            Selector::Name(name) => DeviceSelector::Name(name),
-        });
-        let engine = py.detach(|| match selector {
-            Some(selector) => open(selector).map(Engine::on_device).map_err(failed),
-            None => Ok(Engine::on_cpu()),
-        })?;
-        let device_name = engine.device().map_or("cpu".to_owned(), |device| device.info().name.clone());
+        let engine = engine(py, device)?;
+        let device_name = name_of(&engine);
         Ok(Self { state: Mutex::new(Some(State::new(engine))), owner: Mutex::default(), device_name })
     }
 
@@ -300,8 +281,8 @@ impl Core {
             let at_once = of_processor(RAYS_AT_ONCE, state);
             in_chunks(rows.len(), at_once, &pool, |first| {
                 let rays = rows.rays(first, at_once);
-                let hits = state.caster(Need::Hits, rows.len())?.cast(&rays, Query::Closest, 1).map_err(failed)?.hits;
-                columns.split_off(rays.len()).write(state.world(Need::Hits), &hits);
+                let hits = state.caster(rows.len())?.cast(&rays, Query::Closest, 1).map_err(failed)?.hits;
+                columns.split_off(rays.len()).write(state.world(), &hits);
                 Ok(())
             })
         })
@@ -323,7 +304,7 @@ impl Core {
             let at_once = of_processor(RAYS_AT_ONCE, state);
             in_chunks(rows.len(), at_once, &pool, |first| {
                 let rays = rows.rays(first, at_once);
-                let hits = state.caster(Need::Hits, rows.len())?.cast(&rays, Query::Any, 1).map_err(failed)?.hits;
+                let hits = state.caster(rows.len())?.cast(&rays, Query::Any, 1).map_err(failed)?.hits;
                 output[first..].iter_mut().zip(&hits).for_each(|(out, hit)| *out = hit.triangle_ix != NO_TRIANGLE);
                 Ok(())
             })
@@ -346,7 +327,7 @@ impl Core {
             let at_once = of_processor(QUERIES_AT_ONCE, state);
             in_chunks(rows.len(), at_once, &pool, |first| {
                 let rays = rows.rays(first, at_once);
-                let counts = state.caster(Need::FlatTree, rows.len())?.count_hits(&rays).map_err(failed)?;
+                let counts = state.caster(rows.len())?.count_hits(&rays).map_err(failed)?;
                 output[first..].iter_mut().zip(&counts).for_each(|(out, count)| *out = *count as i32);
                 Ok(())
             })
@@ -370,7 +351,7 @@ impl Core {
             let at_once = of_processor(QUERIES_AT_ONCE, state);
             in_chunks(rows.len(), at_once, &pool, |first| {
                 let rays = rows.rays(first, at_once);
-                let caster = state.caster(Need::FlatTree, rows.len())?;
+                let caster = state.caster(rows.len())?;
                 let all = caster.all_hits(&rays, most_per_ray).map_err(failed)?;
                 let before = t_hit.len() as u64;
                 if before + all.hits.len() as u64 > u64::from(u32::MAX) {
@@ -380,7 +361,7 @@ impl Core {
                 for (ix, ends) in all.ray_splits.windows(2).enumerate() {
                     ray_ids.extend((ends[0]..ends[1]).map(|_| (first + ix) as u32));
                 }
-                let world = state.world(Need::FlatTree);
+                let world = state.world();
                 let found: Vec<_> = all.hits.par_iter().with_min_len(1024).map(|hit| Found::of(world, hit)).collect();
                 t_hit.extend(all.hits.iter().map(|hit| hit.t));
                 geometry_ids.extend(found.iter().map(|it| it.geometry_id));
@@ -419,9 +400,9 @@ impl Core {
                 let end = points.len().min(first + at_once);
                 let query = |p: &[f32; 3]| QueryPoint { position: Vec3::from(*p), t_max: f32::INFINITY };
                 let queries: Vec<_> = points[first..end].iter().map(query).collect();
-                let caster = state.caster(Need::FlatTree, points.len())?;
+                let caster = state.caster(points.len())?;
                 let hits = caster.closest_points(&queries, 1).map_err(failed)?.hits;
-                let world = state.world(Need::FlatTree);
+                let world = state.world();
                 let rows = closest[first..end].par_iter_mut().zip(&hits).with_min_len(1024);
                 rows.for_each(|(row, hit)| *row = Found::of(world, hit).point.to_array());
                 columns.split_off(hits.len()).write(world, &hits);

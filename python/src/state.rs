@@ -1,4 +1,4 @@
-//! The geometries of a scene, and the worlds that are made of them when rays need them.
+//! The geometries of a scene, and the world that is made of them when rays need it.
 
 use glam::{DMat4, DVec3, Vec3};
 use kdray::{
@@ -16,6 +16,8 @@ use pyo3::{
     prelude::*,
 };
 use rayon::prelude::*;
+
+use super::process::failed;
 
 /// Number of rays for which a structure is built when it is not known how many will follow.
 const EXPECTED_RAYS: u64 = 1 << 24;
@@ -50,17 +52,10 @@ pub struct Ready {
     traversal: Traversal,
     on_device: Option<Caster<'static>>,
     on_cpu: Option<Caster<'static>>,
+    /// Whether each geometry has a structure of its own.
+    keeps: bool,
     shapes_at: u64,
     places_at: u64,
-}
-
-/// What is asked of a world.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub enum Need {
-    /// The nearest hits of rays, or whether there are any.
-    Hits,
-    /// All hits of rays, or closest points, which are not found through kept instances.
-    FlatTree,
 }
 
 /// A scene.
@@ -74,17 +69,15 @@ pub struct State {
     /// The change that last added, removed or deformed a geometry, and the one that last moved one.
     shapes_at: u64,
     places_at: u64,
-    /// The world with the geometries where they are.
-    flat: Option<Ready>,
-    /// The world of geometries that are moved, each with a structure of its own.
-    kept: Option<Ready>,
+    /// The world of the last query.
+    ready: Option<Ready>,
 }
 
 impl State {
     pub fn new(engine: Engine) -> Self {
         let (now, shapes_at, places_at) = Default::default();
         let cpu = Engine::on_cpu();
-        Self { engine, cpu, geometries: Vec::new(), now, shapes_at, places_at, flat: None, kept: None }
+        Self { engine, cpu, geometries: Vec::new(), now, shapes_at, places_at, ready: None }
     }
 
     /// Returns the number of identifiers that were given out.
@@ -169,40 +162,36 @@ impl State {
     }
 
     /// Returns what casts `n` rays or points into the geometries as they are now.
-    pub fn caster(&mut self, need: Need, n: usize) -> PyResult<&mut Caster<'static>> {
-        let keeps = self.keeps(need);
-        self.prepare(keeps, n)?;
-        let ready = if keeps { &mut self.kept } else { &mut self.flat };
-        ready.as_mut().expect("prepared").caster([&self.engine, &self.cpu], n)
-    }
-
-    /// Returns the world of the last caster.
-    pub fn world(&self, need: Need) -> &Ready {
-        let ready = if self.keeps(need) { &self.kept } else { &self.flat };
-        ready.as_ref().expect("a caster was asked for")
-    }
-
-    /// Geometries that never moved are flattened for all queries.
-    fn keeps(&self, need: Need) -> bool {
-        need == Need::Hits && self.places_at > 0
-    }
-
-    /// Makes the world of the geometries as they are now. `n_rays`: that are about to be cast.
-    fn prepare(&mut self, keeps: bool, n_rays: usize) -> PyResult<()> {
+    pub fn caster(&mut self, n: usize) -> PyResult<&mut Caster<'static>> {
         if !self.geometries.iter().flatten().any(|geometry| !geometry.faces.is_empty()) {
             return Err(PyRuntimeError::new_err("the scene has no triangles: add_triangles adds some"));
         }
-        let before = if keeps { self.kept.take() } else { self.flat.take() };
-        let ready = match before {
-            Some(ready) if (ready.shapes_at, ready.places_at) == (self.shapes_at, self.places_at) => ready,
-            Some(ready) if keeps && ready.shapes_at == self.shapes_at => match self.moved(ready) {
-                Ok(ready) => ready,
-                Err(_) => self.build(keeps, n_rays, None)?,
+        let before = self.ready.take();
+        let ready = self.current(before, n)?;
+        self.ready.insert(ready).caster([&self.engine, &self.cpu], n)
+    }
+
+    /// Returns the world of the last caster.
+    pub fn world(&self) -> &Ready {
+        self.ready.as_ref().expect("a caster was asked for")
+    }
+
+    /// Returns a world of the geometries as they are now. `n_rays`: that are about to be cast.
+    fn current(&self, before: Option<Ready>, n_rays: usize) -> PyResult<Ready> {
+        match before {
+            Some(ready) if (ready.shapes_at, ready.places_at) == (self.shapes_at, self.places_at) => Ok(ready),
+            Some(ready) if ready.keeps && ready.shapes_at == self.shapes_at => match self.moved(ready) {
+                Ok(ready) => Ok(ready),
+                Err(_) => self.build(n_rays, None),
             },
-            before => self.build(keeps, n_rays, before)?,
-        };
-        *(if keeps { &mut self.kept } else { &mut self.flat }) = Some(ready);
-        Ok(())
+            // The first move gives geometries structures of their own, which further moves keep.
+            before => self.build(n_rays, before.filter(|before| before.keeps == self.keeps())),
+        }
+    }
+
+    /// Geometries that never moved are flattened: one structure is quicker than many.
+    fn keeps(&self) -> bool {
+        self.places_at > 0
     }
 
     /// Moves the instances of a world to where their geometries are now.
@@ -225,10 +214,11 @@ impl State {
     }
 
     /// Builds a world. `before`: the world that it replaces, which tells that the scene's shapes change.
-    fn build(&self, keeps: bool, n_rays: usize, before: Option<Ready>) -> PyResult<Ready> {
+    fn build(&self, n_rays: usize, before: Option<Ready>) -> PyResult<Ready> {
+        let keeps = self.keeps();
         let n_rays = if before.is_some() { n_rays as u64 } else { EXPECTED_RAYS };
         let pinned = before.map(|before| before.traversal);
-        let (scene, places) = self.scene(keeps)?;
+        let (scene, places) = self.scene();
         let instances = if keeps { Instancing::Keep } else { Instancing::Flatten };
         let engine = self.engine.clone().with_request(Request { instances, ..Request::default() });
         let wrong = |error: &dyn std::error::Error| PyValueError::new_err(error.to_string());
@@ -240,36 +230,20 @@ impl State {
             None => engine.methods(&world, &Workload::of_rays(n_rays)).map_err(failed)?.traversal.value,
         };
         let (shapes_at, places_at) = (self.shapes_at, self.places_at);
-        Ok(Ready { world, places, traversal, on_device: None, on_cpu: None, shapes_at, places_at })
+        Ok(Ready { world, places, traversal, on_device: None, on_cpu: None, keeps, shapes_at, places_at })
     }
 
-    /// Returns the geometries as a scene: each moved by its instance, or in its place.
-    fn scene(&self, keeps: bool) -> PyResult<(Scene, Vec<Place>)> {
+    /// Returns the geometries as a scene, each moved by its instance.
+    fn scene(&self) -> (Scene, Vec<Place>) {
         let (mut meshes, mut instances, mut places) = (Vec::new(), Vec::new(), Vec::new());
         for (id, geometry) in self.geometries.iter().enumerate() {
             let Some(geometry) = geometry.as_ref().filter(|geometry| !geometry.faces.is_empty()) else { continue };
             let transform = Transform::of_affine(geometry.transform).expect("checked when it was set");
-            let (vertices, transform) = match keeps {
-                true => (geometry.vertices.clone(), transform),
-                false => (geometry.placed(id)?, Transform::IDENTITY),
-            };
             places.push(Place { geometry_id: id as u32, mirrors: transform.mirrors() });
             instances.push(Instance { mesh_ix: meshes.len(), transform, materials: vec![0], ..Instance::default() });
-            meshes.push(Mesh::of_triangles(vertices, geometry.faces.clone()));
+            meshes.push(Mesh::of_triangles(geometry.vertices.clone(), geometry.faces.clone()));
         }
-        Ok((scene_of(meshes, instances), places))
-    }
-}
-
-impl Geometry {
-    /// Returns the vertices in the world. `id`: what an error names.
-    fn placed(&self, id: usize) -> PyResult<Vec<Vec3>> {
-        if self.transform == DMat4::IDENTITY {
-            return Ok(self.vertices.clone());
-        }
-        let mesh = Mesh { positions: self.vertices.clone(), ..Mesh::default() };
-        let transform = Transform::of_affine(self.transform).expect("checked when it was set");
-        mesh.placed(&transform).map_err(|what| PyValueError::new_err(format!("geometry {id}: {what}")))
+        (scene_of(meshes, instances), places)
     }
 }
 
@@ -289,11 +263,6 @@ fn made<T>(place: &mut Option<T>, make: impl FnOnce() -> Result<T, GpuError>) ->
         Some(caster) => Ok(caster),
         None => Ok(place.insert(make().map_err(failed)?)),
     }
-}
-
-/// Returns what Python is told of a failed call.
-pub fn failed(error: GpuError) -> PyErr {
-    PyRuntimeError::new_err(error.to_string())
 }
 
 fn check_finite(name: &str, vertices: &[Vec3]) -> PyResult<()> {

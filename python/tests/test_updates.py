@@ -21,6 +21,24 @@ def placed(vertices, transform):
     return (vertices @ transform[:, :3].T + transform[:, 3]).astype(np.float32)
 
 
+def assert_same_lists(ours, expected):
+    """Compares the hits of rays that have equally many. Hits at the same t may come in another order."""
+    counts = [np.diff(it["ray_splits"]) for it in (ours, expected)]
+    agree = counts[0] == counts[1]
+    assert np.mean(agree) > 0.999
+    lists = []
+    for it in (ours, expected):
+        order = np.lexsort([it["primitive_ids"], it["geometry_ids"], it["ray_ids"]])
+        order = order[agree[it["ray_ids"][order]]]
+        lists.append({key: it[key][order] for key in ["geometry_ids", "primitive_ids", "t_hit", "primitive_uvs"]})
+    same = (lists[0]["geometry_ids"] == lists[1]["geometry_ids"]) & (
+        lists[0]["primitive_ids"] == lists[1]["primitive_ids"]
+    )
+    assert np.mean(same) > 0.999
+    for key in ["t_hit", "primitive_uvs"]:
+        assert np.mean(np.abs(lists[0][key] - lists[1][key])[same] < 2e-3) > 0.999
+
+
 @pytest.mark.parametrize("mirrors", [False, True])
 def test_transforms(device, random, mirrors):
     parts = [soup(random, 40) for _ in range(8)]
@@ -34,10 +52,15 @@ def test_transforms(device, random, mirrors):
         again = fresh(device, moved)
         assert_same_hits(scene.cast_rays(rays), again.cast_rays(rays))
         assert np.mean(scene.test_occlusions(rays) == again.test_occlusions(rays)) > 0.999
-        assert np.mean(scene.count_intersections(rays) == again.count_intersections(rays)) > 0.999
-        np.testing.assert_allclose(
-            scene.compute_distance(rays[:, :3]), again.compute_distance(rays[:, :3]), atol=1e-5
-        )
+        assert_same_lists(scene.list_intersections(rays), again.list_intersections(rays))
+        assert (np.diff(scene.list_intersections(rays)["ray_splits"]) == scene.count_intersections(rays)).all()
+        closest, expected = (it.compute_closest_points(rays[:, :3]) for it in (scene, again))
+        np.testing.assert_allclose(closest["distances"], expected["distances"], atol=1e-5)
+        same = closest["primitive_ids"] == expected["primitive_ids"]
+        assert np.mean(same) > 0.99
+        np.testing.assert_allclose(closest["points"][same], expected["points"][same], atol=1e-4)
+        near = np.abs(closest["primitive_uvs"] - expected["primitive_uvs"])[same]
+        assert np.mean(near < 1e-3) > 0.99
 
 
 def test_vertices(device, random):
@@ -75,8 +98,11 @@ def test_a_stale_scene_would_be_noticed(device, random):
     parts = [soup(random, 40), soup(random, 60)]
     scene, rays = fresh(device, parts), random_rays(random, 5000)
     parts[1][0][:9] += 0.3
+    again = fresh(device, parts)
     with pytest.raises(AssertionError):
-        assert_same_hits(scene.cast_rays(rays), fresh(device, parts).cast_rays(rays))
+        assert_same_hits(scene.cast_rays(rays), again.cast_rays(rays))
+    with pytest.raises(AssertionError):
+        assert_same_lists(scene.list_intersections(rays), again.list_intersections(rays))
 
 
 def test_memory_stays_constant(random):
@@ -87,6 +113,8 @@ def test_memory_stays_constant(random):
         for _ in range(n):
             scene.update_transforms(ids, random_transforms(random, 10))
             scene.cast_rays(rays)
+            scene.compute_closest_points(rays[:, :3])
+            scene.count_intersections(rays)
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
     before = updates(500)
