@@ -98,8 +98,11 @@ def test_a_stale_scene_would_be_noticed(device, random):
     parts = [soup(random, 40), soup(random, 60)]
     scene, rays = fresh(device, parts), random_rays(random, 5000)
     parts[1][0][:9] += 0.3
+    again = fresh(device, parts)
     with pytest.raises(AssertionError):
-        assert_same_hits(scene.cast_rays(rays), fresh(device, parts).cast_rays(rays))
+        assert_same_hits(scene.cast_rays(rays), again.cast_rays(rays))
+    with pytest.raises(AssertionError):
+        assert_same_lists(scene.list_intersections(rays), again.list_intersections(rays))
 
 
 def test_memory_stays_constant(random):
