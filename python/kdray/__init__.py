@@ -11,6 +11,7 @@ array([2.], dtype=float32)
 from . import trimesh
 from ._kdray import set_threads
 from .device import Device, devices
+from .pictures import Scene, load, render
 from .scene import RaycastingScene
 
-__all__ = ["Device", "RaycastingScene", "devices", "set_threads", "trimesh"]
+__all__ = ["Device", "RaycastingScene", "Scene", "devices", "load", "render", "set_threads", "trimesh"]

@@ -1,3 +1,5 @@
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,3 +33,14 @@ class Core:
         self, rays: _F32, range: tuple[_F32, _F32], most_per_ray: int | None, n_threads: int
     ) -> tuple[_U32, _U32, _F32, _U32, _U32, _F32]: ...
     def closest(self, points: _F32, n_threads: int, outputs: _Outputs, closest: _F32) -> None: ...
+
+class CoreScene:
+    def __new__(cls, path: str, device: int | str | None, choices: dict[str, Any]) -> CoreScene: ...
+    @property
+    def device_name(self) -> str: ...
+    def facts(
+        self, choices: dict[str, Any]
+    ) -> tuple[int, tuple[float, float, float], tuple[float, float, float], list[str]]: ...
+    def render(
+        self, choices: dict[str, Any], view: dict[str, Any], n_samples: int | None
+    ) -> dict[str, NDArray[Any]]: ...

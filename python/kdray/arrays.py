@@ -70,6 +70,14 @@ def integer(name: str, value: Any, least: int = 0) -> int:
     return number
 
 
+def vector(name: str, value: Any) -> NDArray[np.float64]:
+    """Returns three finite numbers (3,)."""
+    array = as_array(name, value).astype(np.float64)
+    if array.shape != (3,) or not np.isfinite(array).all():
+        raise ValueError(f"{name}: expected three finite numbers, not {value!r}")
+    return array
+
+
 def relative(points: NDArray[Any], origin: NDArray[np.float64]) -> NDArray[np.float32]:
     """Returns points (..., 3) relative to an origin, which are rounded after the subtraction: (K, 3) float32."""
     if origin.any():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass
 
-from . import _kdray
+from . import _kdray, arrays
 
 
 @dataclass(frozen=True)
@@ -50,3 +50,16 @@ def best_gpu() -> int | None:
             stacklevel=4,
         )
     return None
+
+
+def selector(device: int | str | Device | None) -> int | str | None:
+    """Returns how the compiled part names a device: None is the CPU."""
+    if device is None:
+        return best_gpu()
+    if isinstance(device, Device):
+        return device.index
+    if isinstance(device, str):
+        return None if device.lower() in ("cpu", "cpu:0") else device
+    if isinstance(device, int) and not isinstance(device, bool):
+        return arrays.integer("device", device)
+    raise TypeError(f'device: expected None, "cpu", an index or a name, not {type(device).__name__}')

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from . import arrays, pinhole
 from ._kdray import Core
-from .device import Device, best_gpu
+from .device import Device, selector
 
 _F32 = NDArray[np.float32]
 _U32 = NDArray[np.uint32]
@@ -59,11 +59,11 @@ class RaycastingScene:
     ) -> None:
         self._nthreads = arrays.integer("nthreads", nthreads)
         self._device = device
-        self._core = Core(_selector(device))
+        self._core = Core(selector(device))
         self._origin: NDArray[np.float64] = np.zeros(3)
         self._has_origin = origin is not None
         if origin is not None:
-            self._origin = _vector("origin", origin)
+            self._origin = arrays.vector("origin", origin)
 
     @property
     def device(self) -> str:
@@ -372,19 +372,6 @@ class RaycastingScene:
         return votes > n_samples // 2
 
 
-def _selector(device: int | str | Device | None) -> int | str | None:
-    """Returns how the compiled part names a device: None is the CPU."""
-    if device is None:
-        return best_gpu()
-    if isinstance(device, Device):
-        return device.index
-    if isinstance(device, str):
-        return None if device.lower() in ("cpu", "cpu:0") else device
-    if isinstance(device, int) and not isinstance(device, bool):
-        return arrays.integer("device", device)
-    raise TypeError(f'device: expected None, "cpu", an index or a name, not {type(device).__name__}')
-
-
 def _parts_of_mesh(mesh: Any) -> tuple[Any, Any]:
     if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
         return mesh.vertices, mesh.faces
@@ -398,13 +385,6 @@ def _matrix_of_points(name: str, value: Any) -> NDArray[Any]:
     if points.ndim != 2:
         raise ValueError(f"{name}: expected the shape (N, 3), not {points.shape}")
     return points
-
-
-def _vector(name: str, value: ArrayLike) -> NDArray[np.float64]:
-    vector = arrays.as_array(name, value).astype(np.float64)
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise ValueError(f"{name}: expected three finite numbers, not {value!r}")
-    return vector
 
 
 def _origin_of(vertices: NDArray[Any]) -> NDArray[np.float64]:

@@ -5,10 +5,12 @@
 //! scene     the class `Core`: a lock, and what Python hands over
 //!   state     geometries, the world that is made of them, casters
 //!   columns   hits to the arrays of results
+//! pictures  the class `CoreScene`: a file that is rendered
 //! process   the pools of threads, the devices, and the refusal of forked children
 //! ```
 
 mod columns;
+mod pictures;
 mod process;
 mod scene;
 mod state;
@@ -18,6 +20,7 @@ mod state;
 mod _kdray {
     #[pymodule_export]
     use super::{
+        pictures::CoreScene,
         process::{devices, set_threads},
         scene::Core,
     };

@@ -77,24 +77,25 @@ def test_pickles(make, device, random):
 def test_a_forked_child_is_told_to_spawn(device, random):
     scene = fresh(device, [ball(6)])
     scene.cast_rays(random_rays(random, 10))
+    cornell = kdray.load(Path(__file__).parents[2] / "scenes" / "cornell.toml", size=(8, 8), device=device)
     reader, writer = os.pipe()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)
         child = os.fork()
     if child == 0:
         try:
-            for call in [lambda: scene.cast_rays(np.zeros((1, 6))), scene.close, kdray.devices]:
+            for call in [lambda: scene.cast_rays(np.zeros((1, 6))), scene.close, cornell.render, kdray.devices]:
                 try:
                     call()
                     os.write(writer, b"no error;")
                 except RuntimeError as error:
                     os.write(writer, b"spawn;" if "spawn" in str(error) else repr(error).encode())
-            del scene
+            del scene, cornell
         finally:
             os._exit(0)
     os.close(writer)
     with os.fdopen(reader) as said:
-        assert said.read() == "spawn;spawn;spawn;"
+        assert said.read() == "spawn;" * 4
     assert os.waitpid(child, 0)[1] == 0
 
 
@@ -210,17 +211,21 @@ def test_docstrings():
     import doctest
 
     assert doctest.testmod(kdray).failed == 0
-    public = [kdray.RaycastingScene, kdray.Device, kdray.devices, kdray.set_threads]
-    members = [getattr(kdray.RaycastingScene, name) for name in dir(kdray.RaycastingScene) if name[0] != "_"]
+    classes = [kdray.RaycastingScene, kdray.Scene, kdray.Device]
+    public = [*classes, kdray.devices, kdray.load, kdray.render, kdray.set_threads]
+    members = [getattr(it, name) for it in classes[:2] for name in dir(it) if name[0] != "_"]
     assert all(it.__doc__ for it in public + members if not isinstance(it, int))
 
 
+@pytest.mark.filterwarnings("ignore:kdray finds no GPU")
 @pytest.mark.parametrize("document", ["README.md", "docs/python.md"])
-def test_examples_of_documents(document):
-    text = (Path(__file__).parents[2] / document).read_text()
-    code = text.split("```python\n")[1].split("```")[0].replace("RaycastingScene()", 'RaycastingScene(device="cpu")')
+def test_examples_of_documents(document, monkeypatch):
+    monkeypatch.chdir(Path(__file__).parents[2])
+    code = "".join(part.split("```")[0] for part in Path(document).read_text().split("```python\n")[1:])
     vertices, triangles = ball(6)
     mesh = trimesh.Trimesh(vertices, triangles)
     names = {"vertices": vertices, "triangles": triangles, "points": vertices, "mesh": mesh, "poses": [np.eye(4)]}
+    names["eyes"] = [[3, 3, 9], [-3, 3, 9]]
     exec(code, names)
     assert 0.01 < np.mean(names["depth"] < np.inf) < 1
+    assert 0.5 < np.mean(names["layers"]["depth"] < np.inf) <= 1
