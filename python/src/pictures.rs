@@ -1,7 +1,7 @@
 //! The class `CoreScene`: a scene of a file, and its pictures.
 
 use std::{
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::{
         Arc, Mutex, PoisonError,
         atomic::{AtomicBool, Ordering},
@@ -56,6 +56,9 @@ pub struct View {
     vertical_fov: Option<f32>,
 }
 
+/// The number of triangles, the minimum and the maximum corner, and what was assumed about the file.
+type Facts = (usize, [f64; 3], [f64; 3], Vec<String>);
+
 /// A scene that was loaded.
 struct Shown {
     choices: Choices,
@@ -104,7 +107,7 @@ impl View {
 }
 
 impl Shown {
-    fn load(engine: &Engine, path: &PathBuf, choices: &Choices) -> PyResult<Self> {
+    fn load(engine: &Engine, path: &Path, choices: &Choices) -> PyResult<Self> {
         let request = choices.request()?;
         let mut opened = Opened::read(path, &request).map_err(|error| refused(error.into()))?;
         opened.options.check().map_err(|error| failed(error.into()))?;
@@ -197,8 +200,7 @@ impl CoreScene {
         name_of(&self.engine)
     }
 
-    /// The number of triangles, the minimum and the maximum corner, and what was assumed about the file.
-    fn facts(&self, py: Python, choices: Choices) -> PyResult<(usize, [f64; 3], [f64; 3], Vec<String>)> {
+    fn facts(&self, py: Python, choices: Choices) -> PyResult<Facts> {
         let shown = self.shown(py, &choices)?;
         let (Loaded { world, bounds, notes, .. }, origin) = (&shown.loaded, shown.loaded.world.scene().origin);
         let [low, high] = [bounds.0, bounds.1].map(|corner| (corner.as_dvec3() + origin).to_array());
