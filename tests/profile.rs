@@ -207,7 +207,7 @@ fn the_trace_has_a_slice_for_each_pass_within_its_bounce() {
         let (profile, trace) = measure(directory.path(), more);
         let slices = slices(&trace);
         assert_eq!([1, 2].map(|track| fault(&slices, track)), [None, None], "{more:?}");
-        assert_eq!(profile["schema"], 2);
+        assert_eq!(profile["schema"], 3);
         let passes = profile["passes"].as_array().unwrap();
         let is_pass = |slice: &&Slice| slice.track == 2 && passes.iter().any(|pass| pass["name"] == slice.name);
         let of_passes: Vec<_> = slices.iter().filter(is_pass).collect();

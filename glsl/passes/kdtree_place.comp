@@ -3,7 +3,8 @@
 // Kd-tree, place: writes the nodes of a level into the finished tree, in depth-first order: a pair, then all pairs
 // below its first node, then those below its second. One workgroup per block of pairs of the level; an invocation
 // writes one pair per row.
-// Reads build, levels, built_nodes, built_parents, below; updates places; writes nodes, parents.
+// The invocation of the root's pair also writes what the computation of slabs needs to know of the tree.
+// Reads build, levels, built_nodes, built_parents, below; updates places; writes nodes, parents, tree.
 #include "kdtree_build/kd_build.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;
@@ -13,6 +14,7 @@ layout(std430, set = 0, binding = BIND_KD_BELOW) readonly buffer BelowBlock { uv
 layout(std430, set = 0, binding = BIND_KD_PLACES) buffer PlacesBlock { uvec2 places[]; };
 layout(std430, set = 0, binding = BIND_KD_NODES) writeonly buffer NodesBlock { KdNode nodes[]; };
 layout(std430, set = 0, binding = BIND_KD_PARENTS) writeonly buffer ParentsBlock { uint parents[]; };
+layout(std430, set = 0, binding = BIND_KD_SLAB_TREE) writeonly buffer TreeBlock { KdSlabTree tree; };
 
 // Writes a node. place: the pair of its children, if it has any, and its first entry.
 void write_node(uint built_ix, uint node_ix, uvec2 place) {
@@ -27,6 +29,17 @@ void write_node(uint built_ix, uint node_ix, uvec2 place) {
     places[built_ix] = place;
 }
 
+void write_tree() {
+    tree.box_min = build.box_min;
+    tree.n_nodes = 2u * build.n_pairs;
+    tree.box_max = build.box_max;
+    tree.n_entries = build.n_entries;
+    tree.largest = build.largest;
+    tree.margin = build.margin;
+    tree.finest_scale = build.finest;
+    tree.reserved = 0u;
+}
+
 void main() {
     KdLevel level = levels[stage.level_ix];
     uint begin = index_of_group() * KD_BLOCK_SIZE + gl_LocalInvocationIndex;
@@ -38,6 +51,7 @@ void main() {
             write_node(0u, 0u, uvec2(1u, 0u));
             nodes[1] = KdNode(0u, KD_LEAF);
             parents[0] = 0u;
+            write_tree();
             continue;
         }
         uvec2 place = places[built_parents[built_ix]];

@@ -20,7 +20,9 @@ impl BottomLevel {
     /// Builds the structure on the current rayon pool, and reports the progress of a kd-tree's build.
     pub fn build(triangles: &[Triangle], options: &AccelOptions, progress: &Progress) -> Self {
         match options {
-            AccelOptions::KdTree(options) => Self::KdTree(KdTree::build_observed(triangles, options, progress)),
+            AccelOptions::KdTree(options) | AccelOptions::LazyTree(options) => {
+                Self::KdTree(KdTree::build_observed(triangles, options, progress))
+            }
             AccelOptions::Grid(options) => Self::Grid(Grid::build(triangles, options)),
         }
     }

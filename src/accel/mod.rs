@@ -5,6 +5,7 @@ pub(crate) mod bottom_level;
 pub(crate) mod bounds;
 pub mod grid;
 pub mod kdtree;
+mod lazy;
 mod query;
 mod search;
 mod statistics;
@@ -16,10 +17,15 @@ use glam::Vec3;
 
 use self::{
     grid::{GridLevels, GridOptions, LazyGrid},
-    kdtree::{BuildOptions, KdTree},
+    kdtree::{BuildOptions, KdTree, LazyTree},
     two_level::{StructuresId, TwoLevel},
 };
-pub use self::{query::Query, search::Search, statistics::Statistics};
+pub use self::{
+    lazy::{BuildStage, DeviceBuild, Lazy, Structure},
+    query::Query,
+    search::Search,
+    statistics::Statistics,
+};
 use crate::layout::Triangle;
 pub use crate::layout::{Hit, NO_TRIANGLE, Ray};
 use crate::util::progress::Progress;
@@ -29,7 +35,9 @@ use crate::util::progress::Progress;
 pub enum Accel {
     /// A kd-tree, which the host builds.
     KdTree(KdTree),
-    /// A grid. Each device builds its own grid. The host builds a grid only at the first [`LazyGrid::get`].
+    /// A kd-tree. Each device builds its own tree. The host builds a tree only at the first [`Lazy::get`].
+    LazyTree(LazyTree),
+    /// A grid. Each device builds its own grid. The host builds a grid only at the first [`Lazy::get`].
     Grid(LazyGrid),
     /// A kd-tree or a grid for each geometry, and a hierarchy over the instances, which the host builds.
     TwoLevel(Box<TwoLevel>),
@@ -38,8 +46,11 @@ pub enum Accel {
 /// Build options of an acceleration structure.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AccelOptions {
-    /// Options of a kd-tree.
+    /// Options of a kd-tree that the host builds.
     KdTree(BuildOptions),
+    /// Options of a kd-tree that each device builds, of at most 32 levels. The trees of instances are those of
+    /// [`AccelOptions::KdTree`].
+    LazyTree(BuildOptions),
     /// Options of a grid.
     Grid(GridOptions),
 }
@@ -54,7 +65,7 @@ impl AccelOptions {
         };
         let density = |name: &str, value: f32| within(name, value, f32::MIN_POSITIVE, MOST_DENSITY);
         match self {
-            Self::KdTree(options) => {
+            Self::KdTree(options) | Self::LazyTree(options) => {
                 within("traversal_cost", options.traversal_cost, 0.0, f32::MAX)?;
                 within("intersection_cost", options.intersection_cost, 0.0, f32::MAX)?;
                 within("empty_bonus", options.empty_bonus, 0.0, 1.0)
@@ -86,7 +97,7 @@ pub enum AccelKind {
 }
 
 named_enum!(AccelKind {
-    KdTree = "kdtree": "a kd-tree by the surface area heuristic: rays are fastest; the CPU builds it",
+    KdTree = "kdtree": "a kd-tree by the surface area heuristic: rays are fastest; the CPU builds it, or the device",
     Grid = "grid": "a uniform grid: the device builds it in about a millisecond; rays are 2 to 10 times slower",
     Grid2 = "grid2": "a grid of two levels: built in about two milliseconds; rays are 2 to 5 times slower",
 });
@@ -112,8 +123,8 @@ impl AccelKind {
 }
 
 impl Accel {
-    /// Builds a structure over triangles on the current rayon pool. For a grid, this only keeps the options: the grid
-    /// is built at its first use ([`LazyGrid`]).
+    /// Builds a structure over triangles on the current rayon pool. For a structure that devices build, this only keeps
+    /// the options: it is built at its first use ([`Lazy`]).
     pub fn new(triangles: &[Triangle], options: &AccelOptions) -> Self {
         Self::new_observed(triangles, options, &Progress::default())
     }
@@ -122,15 +133,27 @@ impl Accel {
     pub fn new_observed(triangles: &[Triangle], options: &AccelOptions, progress: &Progress) -> Self {
         match options {
             AccelOptions::KdTree(options) => Self::KdTree(KdTree::build_observed(triangles, options, progress)),
+            AccelOptions::LazyTree(options) => Self::LazyTree(LazyTree::new(triangles, options.clone())),
             AccelOptions::Grid(options) => Self::Grid(LazyGrid::new(triangles, options.clone())),
         }
     }
 
-    /// The only kd-tree, or none if the structure is a grid or has two levels.
-    pub fn as_kdtree(&self) -> Option<&KdTree> {
+    /// The only kd-tree, which the host builds unless it has done so already; none if the structure is a grid or has
+    /// two levels. `triangles`: those of the structure.
+    pub fn as_kdtree(&self, triangles: &[Triangle]) -> Option<&KdTree> {
         match self {
             Self::KdTree(tree) => Some(tree),
+            Self::LazyTree(tree) => Some(tree.get(triangles)),
             Self::Grid(_) | Self::TwoLevel(_) => None,
+        }
+    }
+
+    /// The report of the first device that has built the structure, if there is one.
+    pub fn device_build(&self) -> Option<&DeviceBuild> {
+        match self {
+            Self::KdTree(_) | Self::TwoLevel(_) => None,
+            Self::LazyTree(tree) => tree.device_build(),
+            Self::Grid(grid) => grid.device_build(),
         }
     }
 
@@ -142,7 +165,7 @@ impl Accel {
     /// The kind of the structure, or of that of each geometry.
     pub fn kind(&self) -> AccelKind {
         match self {
-            Self::KdTree(_) => AccelKind::KdTree,
+            Self::KdTree(_) | Self::LazyTree(_) => AccelKind::KdTree,
             Self::Grid(grid) => AccelKind::of_grid_levels(grid.options().levels.n_levels()),
             Self::TwoLevel(two) => AccelKind::of_grid_levels(two.n_grid_levels()),
         }
@@ -152,6 +175,7 @@ impl Accel {
     pub fn n_triangles(&self) -> usize {
         match self {
             Self::KdTree(tree) => tree.n_triangles(),
+            Self::LazyTree(tree) => tree.n_triangles(),
             Self::Grid(grid) => grid.n_triangles(),
             Self::TwoLevel(two) => two.n_stored(),
         }
@@ -161,6 +185,7 @@ impl Accel {
     pub fn bounds(&self) -> [Vec3; 2] {
         match self {
             Self::KdTree(tree) => tree.bounds(),
+            Self::LazyTree(tree) => tree.bounds(),
             Self::Grid(grid) => grid.bounds(),
             Self::TwoLevel(two) => two.bounds(),
         }
@@ -171,6 +196,7 @@ impl Accel {
     pub fn origin_reach(&self) -> f32 {
         match self {
             Self::KdTree(tree) => tree.constants().origin_reach,
+            Self::LazyTree(tree) => tree.origin_reach(),
             Self::Grid(grid) => grid.origin_reach(),
             Self::TwoLevel(two) => two.origin_reach(),
         }

@@ -64,12 +64,12 @@ impl Statistics {
             Self::KdTree(tree) => vec![
                 ("nodes", tree.n_nodes.to_string()),
                 ("leaves", tree.n_leaves.to_string()),
-                ("empty leaves", tree.n_empty_leaves.to_string()),
-                ("slabs", tree.n_slabs.to_string()),
+                ("empty leaves", number(tree.n_empty_leaves)),
+                ("slabs", number(tree.n_slabs)),
                 ("depth", tree.depth.to_string()),
                 ("references", tree.n_references.to_string()),
                 ("references a triangle", format!("{:.2}", tree.references_per_triangle)),
-                ("SAH cost", format!("{:.2}", tree.sah_cost)),
+                ("SAH cost", tree.sah_cost.map_or_else(unknown, |cost| format!("{cost:.2}"))),
             ],
             Self::Grid(grid) => vec![
                 ("resolution", resolution(grid)),
@@ -81,6 +81,14 @@ impl Statistics {
             ],
         }
     }
+}
+
+fn unknown() -> String {
+    "-".to_owned()
+}
+
+fn number(n: Option<u64>) -> String {
+    n.map_or_else(unknown, |n| n.to_string())
 }
 
 /// Formats the number of cells of the upper level along each axis.

@@ -1,6 +1,9 @@
 //! The structure of a world of instances: a kd-tree or a grid for each geometry, and a hierarchy over the instances.
 
-use std::sync::{Arc, Weak};
+use std::{
+    ops::AddAssign,
+    sync::{Arc, Weak},
+};
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -153,7 +156,9 @@ impl TwoLevel {
     /// Computes the statistics of all structures together. `options`: those that they were built with.
     pub fn statistics(&self, options: &AccelOptions) -> Statistics {
         match options {
-            AccelOptions::KdTree(options) => Statistics::KdTree(self.tree_statistics(options)),
+            AccelOptions::KdTree(options) | AccelOptions::LazyTree(options) => {
+                Statistics::KdTree(self.tree_statistics(options))
+            }
             AccelOptions::Grid(_) => Statistics::Grid(self.grid_statistics()),
         }
     }
@@ -166,10 +171,10 @@ impl TwoLevel {
             let own = tree.statistics(tree.n_triangles(), options);
             all.n_nodes += own.n_nodes;
             all.n_leaves += own.n_leaves;
-            all.n_empty_leaves += own.n_empty_leaves;
-            all.n_slabs += own.n_slabs;
+            add(&mut all.n_empty_leaves, own.n_empty_leaves);
+            add(&mut all.n_slabs, own.n_slabs);
             all.n_references += own.n_references;
-            all.sah_cost += own.sah_cost * tree.n_triangles() as f64 / n_stored;
+            add(&mut all.sah_cost, own.sah_cost.map(|cost| cost * tree.n_triangles() as f64 / n_stored));
             all.bytes += own.bytes;
         }
         all.references_per_triangle = all.n_references as f64 / n_stored;
@@ -247,4 +252,9 @@ fn begins(lens: impl Iterator<Item = usize>) -> Vec<usize> {
         Some(*sum)
     });
     std::iter::once(0).chain(sums).collect()
+}
+
+/// Adds a figure that is known.
+fn add<T: Default + AddAssign>(sum: &mut Option<T>, figure: Option<T>) {
+    *sum.get_or_insert_default() += figure.unwrap_or_default();
 }

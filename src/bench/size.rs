@@ -95,7 +95,9 @@ impl KnotStage {
         let grid_ms = begin.elapsed().as_secs_f64() * 1e3;
         let build_ms = match self.stage.geometry(variant).accel() {
             Accel::KdTree(_) | Accel::TwoLevel(_) => self.stage.tree_build_ms,
-            Accel::Grid(grid) => grid.device_build().and_then(|build| build.ms).unwrap_or(grid_ms),
+            accel @ (Accel::LazyTree(_) | Accel::Grid(_)) => {
+                accel.device_build().and_then(|build| build.ms).unwrap_or(grid_ms)
+            }
         };
         let rays = sets.iter().map(|set| Ok(RayCost::new(&tracers.measure(set, n_times)?)));
         Ok(Row {

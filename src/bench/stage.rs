@@ -12,7 +12,7 @@ use crate::{
         kdtree::{self, BuildOptions, KdTree, TraversalLinks},
     },
     frame::RenderOptions,
-    layout::{FLAT_NORMAL, Frame, LIGHT_DIRECTIONAL, LIGHT_POINT, Light, Triangle},
+    layout::{FLAT_NORMAL, Frame, KD_WORD_DEPTH, LIGHT_DIRECTIONAL, LIGHT_POINT, Light, Triangle},
     reference::inputs::KernelInputs,
     scene::{Camera, Projection},
     world::{FlatScene, Geometry, World},
@@ -33,6 +33,8 @@ pub struct Stage {
     pub links: TraversalLinks,
     /// The uniform grid and the grid of two levels.
     grids: [Accel; 2],
+    /// A kd-tree with the options of the scene's, which a device builds.
+    device_tree: Accel,
     /// The camera's constants. `queue_capacity` is 0: there is no queue.
     pub frame: Frame,
     /// Light to which shadow rays go.
@@ -55,7 +57,9 @@ impl Stage {
         let frame = world.frame_constants(&options);
         let grids = [GridOptions::uniform(), GridOptions::two_level()]
             .map(|options| Accel::new(&world.scene().triangles, &AccelOptions::Grid(options)));
-        Self { links: TraversalLinks::all(world.tree()), world, grids, tree_build_ms, frame, light }
+        let tree_options = BuildOptions { max_depth: Some(KD_WORD_DEPTH), ..build_options.clone() };
+        let device_tree = Accel::new(&world.scene().triangles, &AccelOptions::LazyTree(tree_options));
+        Self { links: TraversalLinks::all(world.tree()), world, grids, device_tree, tree_build_ms, frame, light }
     }
 
     /// Makes a stage of a scene just above the floor of a closed room, seen from inside the room, with a point light
@@ -97,12 +101,18 @@ impl Stage {
         Geometry::new(&self.scene().triangles, accel).expect("a grid of these triangles")
     }
 
+    /// Returns the triangles with a kd-tree that a device builds.
+    pub fn geometry_of_device_tree(&self) -> Geometry<'_> {
+        Geometry::new(&self.scene().triangles, &self.device_tree).expect("a tree of these triangles")
+    }
+
     /// Returns the statistics of the structure that a variant searches. If no device has built the grid, the host
     /// builds it.
     pub fn statistics(&self, variant: Search) -> Statistics {
         match self.geometry(variant).accel() {
             Accel::KdTree(_) | Accel::TwoLevel(_) => self.world.statistics(),
-            Accel::Grid(grid) => Statistics::Grid(grid.statistics(&self.scene().triangles)),
+            Accel::LazyTree(tree) => tree.statistics(&self.scene().triangles),
+            Accel::Grid(grid) => grid.statistics(&self.scene().triangles),
         }
     }
 

@@ -92,7 +92,7 @@ impl<'a> Tracers<'a> {
             if let (Some(device), Some(casters)) = (device, &mut self.casters) {
                 casters.push(GpuCaster::new(device, world.geometry(), search.traversal())?);
             }
-            let links = TraversalLinks::of(world.accel(), search.traversal());
+            let links = TraversalLinks::of(world.accel(), &world.scene().triangles, search.traversal());
             self.variants.push(Variant { search, kept: Some(Kept { world, links }) });
         }
         Ok(self)

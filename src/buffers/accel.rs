@@ -16,7 +16,7 @@ use crate::{
     accel::{
         Accel, AccelKind,
         grid::{Grid, LazyGrid},
-        kdtree::{KdTree, Traversal, TraversalLinks},
+        kdtree::{BuildOptions, KdTree, LazyTree, Traversal, TraversalLinks},
         two_level::TwoLevel,
     },
     gpu::{Binding, Buffer, BufferUse, Constants, Context, GpuError, Timer},
@@ -24,7 +24,10 @@ use crate::{
         AccelConstants, BIND_ACCEL, BIND_SUSPENDED_RAYS, BRUTE_MAX_TRIANGLES, KD_WORD_DEPTH, KdRope, LeafTriangle,
         NO_WORDS, Slab, TRIANGLE_HIDDEN, Triangle, constants,
     },
-    passes::grid::GridBuilder,
+    passes::{
+        grid::GridBuilder,
+        kdtree::{BuiltTree, KdTreeBuilder, KdTreeBuilderOptions},
+    },
     world::{Emitters, Geometry, Instances, World},
 };
 
@@ -125,6 +128,13 @@ impl AccelBuffers {
         let common = || Contents::of_triangles(triangles, n_texture_words);
         let mut made = match geometry.accel() {
             Accel::KdTree(tree) => Self::of_tree(context, triangles, tree, common()),
+            Accel::LazyTree(tree) => match Self::of_device_tree(context, triangles, tree, common) {
+                Err(error) if error.is_lack_of_room() => {
+                    tracing::warn!("the host builds the kd-tree, since the device has too little room: {error}");
+                    Self::of_tree(context, triangles, tree.get(triangles), common())
+                }
+                made => made,
+            },
             Accel::Grid(grid) if GridBuilder::has_room(context, triangles.len()) => {
                 Self::of_device_grid(context, triangles, grid, common())
             }
@@ -206,6 +216,40 @@ impl AccelBuffers {
         Self::with(context, contents, &tree.constants(), Structure::KdTree { mask_words })
     }
 
+    /// Uploads triangles, whose kd-tree the device builds. `common`: returns the contents without a structure.
+    fn of_device_tree<'a>(
+        context: &Arc<Context>,
+        triangles: &'a [Triangle],
+        tree: &LazyTree,
+        common: impl Fn() -> Contents<'a>,
+    ) -> Result<Self, GpuError> {
+        let on_device = Buffer::with(context, "triangles", triangles, BufferUse::Texels)?;
+        let slabs = tree.options().slabs && !context.predicates_branches();
+        let tree_options = BuildOptions { slabs, ..tree.options().clone() };
+        let options = KdTreeBuilderOptions { tree: tree_options, ..KdTreeBuilderOptions::default() };
+        let builder = KdTreeBuilder::new(context, &on_device, &options)?;
+        let timer = Timer::new(context, builder.n_stages())?;
+        let built = builder.build(Some(&timer))?;
+        let usage = SceneAccess::of(context, &with_room_for(&built, common())).buffer_use();
+        let arrays = builder.copy(&built, usage)?;
+        drop(builder); // its memory is larger than the tree's
+        tree.note(built.report(triangles.len()));
+        let contents = Contents {
+            kd_nodes: Content::OnDevice(arrays.nodes, usage),
+            kd_parents: Content::OnDevice(arrays.parents, usage),
+            leaf_triangles: Content::OnDevice(arrays.leaf_triangles, usage),
+            leaf_planes: Content::OnDevice(arrays.leaf_planes, usage),
+            kd_slabs: Content::OnDevice(arrays.slabs, usage),
+            ..with_room_for(&built, common())
+        };
+        // Triangles that are read by address are uploaded once more.
+        let contents = match usage {
+            BufferUse::Texels => Contents { triangles: Content::OnDevice(on_device, usage), ..contents },
+            _ => contents,
+        };
+        Self::with(context, contents, &tree.constants(), Structure::KdTree { mask_words: 1 })
+    }
+
     /// Uploads triangles, whose grid the device builds.
     fn of_device_grid(
         context: &Arc<Context>,
@@ -222,10 +266,10 @@ impl AccelBuffers {
         let constants = built.constants(grid.origin_reach());
         let structure = Structure::Grid { n_levels: built.n_levels };
         let contents = Contents {
-            triangles: Content::OnDevice(on_device),
-            grid_cells: Content::OnDevice(built.cells),
-            leaf_triangles: Content::OnDevice(built.leaf_triangles),
-            leaf_planes: Content::OnDevice(built.leaf_planes),
+            triangles: Content::OnDevice(on_device, BufferUse::Texels),
+            grid_cells: Content::OnDevice(built.cells, BufferUse::Texels),
+            leaf_triangles: Content::OnDevice(built.leaf_triangles, BufferUse::Texels),
+            leaf_planes: Content::OnDevice(built.leaf_planes, BufferUse::Texels),
             ..common
         };
         Self::with(context, contents, &constants, structure)
@@ -329,7 +373,14 @@ impl AccelBuffers {
         if traversal == Traversal::Brute && value > limit {
             return Err(GpuError::Limit { what: "triangles without a tree", value, limit });
         }
-        let mut links = TraversalLinks::of(accel, traversal);
+        let mut links = match accel {
+            // The nodes may be the device's own.
+            Accel::LazyTree(tree) if traversal.needs_boxes() || traversal.needs_ropes() => {
+                tree.links_of(self.arrays.kd_nodes.download()?, traversal)
+            }
+            Accel::LazyTree(_) => TraversalLinks::default(),
+            _ => TraversalLinks::of(accel, geometry.triangles(), traversal),
+        };
         let joined = match (accel, instances) {
             (Accel::TwoLevel(two), Some(instances)) => Some(Joined::new(two, instances)),
             _ => None,
@@ -339,7 +390,8 @@ impl AccelBuffers {
         }
         let mut next = self.clone();
         if traversal.needs_parents() && self.arrays.kd_parents.is_empty() {
-            let write = |first: usize, part: &mut [u32]| match (&joined, accel.as_kdtree()) {
+            let tree = accel.as_kdtree(geometry.triangles());
+            let write = |first: usize, part: &mut [u32]| match (&joined, tree) {
                 (Some(joined), _) => joined.write_parents(first, part),
                 (None, Some(tree)) => part.copy_from_slice(&tree.parents()[first..][..part.len()]),
                 (None, None) => unreachable!("a grid has no links"),
@@ -455,6 +507,20 @@ pub(crate) fn hidden_words(n_triangles: usize, hidden: &[u32]) -> Vec<u32> {
     let mut words = vec![0; n_triangles];
     hidden.iter().for_each(|&triangle_ix| words[triangle_ix as usize] = TRIANGLE_HIDDEN);
     words
+}
+
+/// Returns the contents with room for the tree and for its links.
+fn with_room_for<'a>(built: &BuiltTree, contents: Contents<'a>) -> Contents<'a> {
+    let (n_nodes, n_entries) = (built.n_nodes as usize, built.n_entries as usize);
+    Contents {
+        kd_nodes: Content::Reserved(n_nodes),
+        kd_parents: Content::Reserved(n_nodes / 2),
+        leaf_triangles: Content::Reserved(n_entries),
+        leaf_planes: Content::Reserved(n_entries),
+        kd_slabs: Content::Reserved(if built.has_slabs { n_nodes } else { 0 }),
+        kd_links: Content::Reserved(6 * n_nodes),
+        ..contents
+    }
 }
 
 /// Returns the tree's slabs, or an empty slice for a device that predicates branches, since its kernels do not read

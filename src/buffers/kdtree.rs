@@ -10,14 +10,14 @@ use crate::{
         BIND_KD_ABOVE, BIND_KD_BELOW, BIND_KD_BINS, BIND_KD_BUILD, BIND_KD_BUILT_NODES, BIND_KD_BUILT_PARENTS,
         BIND_KD_CELLS_FROM, BIND_KD_CELLS_TO, BIND_KD_LEAF_PLANES, BIND_KD_LEAF_REFERENCES, BIND_KD_LEAF_TRIANGLES,
         BIND_KD_LEVELS, BIND_KD_NODES, BIND_KD_PARENTS, BIND_KD_PLACES, BIND_KD_REFERENCES_FROM, BIND_KD_REFERENCES_TO,
-        BIND_KD_SCALE_COUNTS, BIND_KD_SCAN_BLOCKS, BIND_KD_SIDES, BIND_KD_TRIANGLES, KD_BIN_BLOCK, KD_BIN_WORDS,
-        KD_BLOCK_SIZE, KD_LEVEL_RECORDS, KD_MOST_ENTRIES, KD_SCALES, KD_WORD_DEPTH, KdBuild, KdCell, KdLevel, KdNode,
-        KdReference, KdStage, LeafTriangle, Plane, Triangle,
+        BIND_KD_SCALE_COUNTS, BIND_KD_SCAN_BLOCKS, BIND_KD_SIDES, BIND_KD_SLAB_TREE, BIND_KD_TRIANGLES, KD_BIN_BLOCK,
+        KD_BIN_WORDS, KD_BLOCK_SIZE, KD_LEVEL_RECORDS, KD_MOST_ENTRIES, KD_SCALES, KD_WORD_DEPTH, KdBuild, KdCell,
+        KdLevel, KdNode, KdReference, KdSlabTree, KdStage, LeafTriangle, Plane, Triangle,
     },
 };
 
 /// The bindings of the descriptor sets of a build.
-const BINDINGS: [u32; 21] = [
+const BINDINGS: [u32; 22] = [
     BIND_KD_BUILD,
     BIND_KD_LEVELS,
     BIND_KD_TRIANGLES,
@@ -39,6 +39,7 @@ const BINDINGS: [u32; 21] = [
     BIND_KD_PARENTS,
     BIND_KD_LEAF_TRIANGLES,
     BIND_KD_LEAF_PLANES,
+    BIND_KD_SLAB_TREE,
 ];
 
 /// Entries by which each capacity may exceed a multiple of the number of triangles.
@@ -85,7 +86,8 @@ pub struct KdTreeRoom {
     pub cells: u32,
 }
 
-/// Meshes have some 3 entries, 2.5 pairs and less than one cell of a level per triangle.
+/// Meshes have some 3 entries, 2.5 pairs and less than one cell of a level per triangle. With these capacities, a build
+/// takes 2.6 kB per triangle, and 1.6 kB without slabs.
 impl Default for KdTreeRoom {
     fn default() -> Self {
         Self { references: 6, pairs: 5, cells: 2 }
@@ -108,6 +110,8 @@ pub struct KdTreeBuffers {
     pub leaf_triangles: Buffer<LeafTriangle>,
     /// The plane of each of `leaf_triangles`.
     pub leaf_planes: Buffer<Plane>,
+    /// What the computation of slabs needs to know of the finished tree: one element.
+    pub slab_tree: Buffer<KdSlabTree>,
     /// The sets for even and for odd levels.
     sets: [BindingSet; 2],
     initial: KdBuild,
@@ -161,6 +165,7 @@ impl KdTreeBuffers {
         let (finished, parents) = (nodes("kd_build_nodes")?, words("kd_build_parents", n_pairs)?);
         let leaf_triangles = Buffer::new(context, "kd_build_leaf_triangles", n_references, storage)?;
         let leaf_planes = Buffer::new(context, "kd_build_leaf_planes", n_references, storage)?;
+        let slab_tree = Buffer::new(context, "kd_build_slab_tree", 1, storage)?;
         let set = |references: [&Buffer<KdReference>; 2], cells: [&Buffer<KdCell>; 2]| {
             let objects = [
                 build.any(),
@@ -184,6 +189,7 @@ impl KdTreeBuffers {
                 parents.any(),
                 leaf_triangles.any(),
                 leaf_planes.any(),
+                slab_tree.any(),
             ];
             let objects: Vec<_> = BINDINGS.into_iter().zip(objects.map(Binding::Buffer)).collect();
             BindingSet::new(bindings, "kdtree", &objects)
@@ -200,6 +206,7 @@ impl KdTreeBuffers {
             parents,
             leaf_triangles,
             leaf_planes,
+            slab_tree,
             sets,
             initial,
         })

@@ -47,7 +47,7 @@ impl SceneAccess {
     }
 
     /// The use of buffers that are read in this way.
-    fn buffer_use(self) -> BufferUse {
+    pub fn buffer_use(self) -> BufferUse {
         if self == Self::Address { BufferUse::Address } else { BufferUse::Texels }
     }
 }
@@ -58,8 +58,8 @@ pub enum Content<'a, T> {
     Elements(&'a [T]),
     /// `len` elements, which `write(first, part)` makes in parts: `part` is the elements from `first` on.
     Written { len: usize, write: &'a dyn Fn(usize, &mut [T]) },
-    /// The elements of a buffer, which must have been made for [`BufferUse::Texels`].
-    OnDevice(Buffer<T>),
+    /// The elements of a buffer, and what it has been made for: [`SceneAccess::buffer_use`] of the scene.
+    OnDevice(Buffer<T>, BufferUse),
     /// No elements. Later the array may be replaced by one of up to this many elements.
     Reserved(usize),
 }
@@ -75,7 +75,7 @@ impl<T: Pod> Content<'_, T> {
         let len = match self {
             Self::Elements(elements) => elements.len(),
             Self::Written { len, .. } | Self::Reserved(len) => *len,
-            Self::OnDevice(buffer) => buffer.len(),
+            Self::OnDevice(buffer, _) => buffer.len(),
         };
         let bytes = (len * size_of::<T>()) as u64;
         Size { bytes, n_texels: bytes / texel_bytes::<T>() }
@@ -90,8 +90,8 @@ impl<T: Pod> Content<'_, T> {
         match self {
             Self::Elements(elements) => Buffer::with(context, name, elements, usage),
             Self::Written { len, write } => Buffer::written_by(context, name, len, usage, write),
-            Self::OnDevice(buffer) => {
-                assert_eq!(usage, BufferUse::Texels, "what was made on the device is not read by address");
+            Self::OnDevice(buffer, made_for) => {
+                assert_eq!(usage, made_for, "what was made on the device is read as it was made for");
                 Ok(buffer)
             }
             Self::Reserved(_) => Buffer::new(context, name, 0, usage),

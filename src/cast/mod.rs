@@ -336,7 +336,7 @@ impl<'a> CpuCaster<'a> {
     }
 
     fn of_held(held: Held<'a>, geometry: Geometry, traversal: Traversal) -> Self {
-        let links = TraversalLinks::of(geometry.accel(), traversal);
+        let links = TraversalLinks::of(geometry.accel(), geometry.triangles(), traversal);
         Self { held, traversal, links, wide: OnceLock::new(), n_scattered: AtomicUsize::new(0), hidden: None }
     }
 
@@ -400,7 +400,7 @@ impl<'a> CpuCaster<'a> {
     /// grid or instances.
     fn wide_after(&self, n_rays: usize) -> Option<&WideBvh> {
         let geometry = self.geometry();
-        let tree = geometry.accel().as_kdtree()?;
+        let tree = geometry.accel().as_kdtree(geometry.triangles())?;
         let n_scattered = self.n_scattered.fetch_add(n_rays, Ordering::Relaxed).saturating_add(n_rays);
         // Two threads may both make it. `get_or_init` could make a thread of rayon wait for itself.
         if self.wide.get().is_none() && n_scattered >= geometry.triangles().len().saturating_mul(RAYS_PER_TRIANGLE) {

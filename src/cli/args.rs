@@ -33,8 +33,8 @@ use super::{
     openjd::ProgressKind,
     or_auto::OrAuto,
     picture_args::{
-        PictureArgs, accel_help, accel_long_help, build_help, build_long_help, check_accel, instances_help, listed,
-        traversal_help, traversal_long_help, with_words,
+        PictureArgs, accel_help, accel_long_help, build_help, build_long_help, check_accel, check_build,
+        instances_help, listed, traversal_help, traversal_long_help, with_words,
     },
     render::{Seed, Shutter},
 };
@@ -379,6 +379,7 @@ impl RenderArgs {
     /// Refuses arguments that contradict each other.
     pub fn check(&self) -> Result<(), CliError> {
         self.picture.check()?;
+        check_build(self.picture.build, self.cpu)?;
         if self.trace.is_some() && (self.spp.is_some_and(|n| n > 1) || self.is_film()) {
             return Err(CliError::Usage(
                 "--trace cannot be combined with --spp or with films: it shows a single sample".into(),
@@ -546,6 +547,7 @@ impl CastArgs {
     /// Refuses arguments that contradict each other.
     pub fn check(&self) -> Result<(), CliError> {
         check_accel(self.accel, self.traversal, self.build)?;
+        check_build(self.build, self.cpu)?;
         if self.closest && self.accel != AccelKind::KdTree {
             let reason = "--closest searches kd-trees: use --accel kdtree";
             return Err(CliError::Usage(reason.to_owned()));

@@ -69,7 +69,7 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
         device: engine.device_name(),
         triangles: n_triangles,
         accel: world.statistics(),
-        grid_build: world.grid_build().cloned(),
+        device_build: world.device_build().cloned(),
         n_rays: totals.n_rays,
         n_hits: totals.n_hits,
         n_invalid: totals.n_invalid,

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use kdray::{
-    accel::{Statistics, grid::DeviceBuild},
+    accel::{DeviceBuild, Statistics},
     engine::choices::Choices,
 };
 use serde::Serialize;
@@ -30,9 +30,9 @@ pub struct CastReport {
     /// Statistics of the acceleration structure, serialized under the key `tree` or `grid`.
     #[serde(flatten)]
     pub accel: Statistics,
-    /// Times of the grid's build on the device; none if no device has built a grid.
+    /// Times of the structure's build on the device; none if no device has built one.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub grid_build: Option<DeviceBuild>,
+    pub device_build: Option<DeviceBuild>,
     pub n_rays: u64,
     pub n_hits: u64,
     /// Number of rays or points that can only miss. Those are points that are not finite or have a `t_max` that is NaN
@@ -91,7 +91,7 @@ impl CastReport {
              {n_rays} {noun}, {n_hits} hits{invalid}\n\
              wrote {}\n",
             self.accel.kind().name(),
-            built_in(*build_ms, self.grid_build.as_ref()),
+            built_in(*build_ms, self.device_build.as_ref()),
             self.hits.display()
         )
     }

@@ -132,6 +132,16 @@ pub fn check_accel(accel: AccelKind, traversal: OrAuto<Traversal>, build: BuildP
     Ok(())
 }
 
+/// Refuses a tree of devices if there is none.
+pub fn check_build(build: BuildPolicy, on_cpu: bool) -> Result<(), CliError> {
+    match (build, on_cpu) {
+        (BuildPolicy::Gpu, true) => {
+            Err(CliError::Usage("--build gpu lets the device build the kd-tree: with --cpu, there is none".to_owned()))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Refuses a kd-tree traversal if the structure is a grid.
 pub fn check_traversal(accel: AccelKind, traversal: Option<Traversal>) -> Result<(), CliError> {
     if accel != AccelKind::KdTree && traversal.is_some() {

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use kdray::{
-    accel::{Statistics, grid::DeviceBuild},
+    accel::{DeviceBuild, Statistics},
     engine::{MomentWork, choices::Choices},
     frame::{Denoise, PassTime, Profile, RenderOptions},
 };
@@ -22,8 +22,8 @@ pub fn built_in(on_host: f64, on_device: Option<&DeviceBuild>) -> String {
 
 /// Version of the names in the JSON of `--profile` and of `inspect`. 2: passes and terms have the field's names
 /// (`pixel_aovs`, `auxiliary`, `atrous_filter` in place of `features`, `guides`, `edge_filter`; opacity is `opaque`,
-/// `blend` or `mask`, as in glTF).
-pub const SCHEMA: u32 = 2;
+/// `blend` or `mask`, as in glTF). 3: `device_build` in place of `grid_build`.
+pub const SCHEMA: u32 = 3;
 
 /// The report: the scene, the files, the options and choices, and the times and rays of the frame.
 #[derive(Serialize)]
@@ -53,9 +53,9 @@ pub struct Report {
     /// Statistics of the acceleration structure, serialized under the key `tree` or `grid`.
     #[serde(flatten)]
     pub accel: Statistics,
-    /// Times of the grid's build on the device; none if no device has built a grid.
+    /// Times of the structure's build on a device; none if no device has built one.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub grid_build: Option<DeviceBuild>,
+    pub device_build: Option<DeviceBuild>,
     /// What the world of the last moment took; none if nothing moves.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub last_moment: Option<MomentWork>,
@@ -263,7 +263,7 @@ impl Report {
             _ => String::new(),
         };
         let mut text = format!("{}: {} triangles, loaded in {:.0} ms\n", self.scene, self.triangles, self.load_ms);
-        text += &format!("{}, {}\n", self.accel, built_in(self.build_ms, self.grid_build.as_ref()));
+        text += &format!("{}, {}\n", self.accel, built_in(self.build_ms, self.device_build.as_ref()));
         text += &format!(
             "{width}x{height}{crop}{samples} on {}: picture after {:.0} ms\n{}\n\n",
             self.frame.device, self.render_ms, self.choices

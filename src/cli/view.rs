@@ -17,6 +17,7 @@ use super::{
     device_args::software_note,
     error::CliError,
     file_roles::FileRoles,
+    picture_args::check_build,
     print, print_line,
     progress::Progress,
     render::set_threads,
@@ -31,6 +32,7 @@ const SAMPLES_AT_REST: u32 = 256;
 /// checked before the work that an error would waste.
 pub fn run(args: &ViewArgs) -> Result<(), CliError> {
     args.picture.check()?;
+    check_build(args.picture.build, args.cpu)?;
     check_scene(args)?;
     check_shaders(args)?;
     check_outputs(args)?;

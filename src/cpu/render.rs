@@ -119,7 +119,7 @@ impl CpuRenderer {
             world: world.clone(),
             options: options.clone(),
             batching,
-            links: TraversalLinks::of(world.accel(), options.traversal),
+            links: TraversalLinks::of(world.accel(), &world.scene().triangles, options.traversal),
             frame,
             triangle_ids: vec![0; n_pixels],
             pixel_radiance: vec![[0.0; 4]; n_pixels],

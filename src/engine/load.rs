@@ -21,7 +21,7 @@ use super::{
     first_view,
 };
 use crate::{
-    accel::AccelKind,
+    accel::{Accel, AccelKind},
     cpu::metered_exposure,
     frame::RenderOptions,
     gpu::GpuError,
@@ -262,7 +262,9 @@ impl Builder {
         let begin = Instant::now();
         let world = World::with_accel_observed(flat, &accel.options(self.processor), &self.progress)?;
         let build_ms = begin.elapsed().as_secs_f64() * 1e3;
-        if let (Work::Pictures { .. }, AccelKind::KdTree) = (work, world.geometry().accel().kind()) {
+        // A structure that devices build is not built here, too, for some warnings.
+        let is_built = matches!(world.accel(), Accel::KdTree(_)) || world.scene().instances.is_some();
+        if let (Work::Pictures { .. }, AccelKind::KdTree, true) = (work, world.accel().kind(), is_built) {
             first_view::warn(&world, &options);
         }
         if is_metered {

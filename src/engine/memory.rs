@@ -52,7 +52,7 @@ impl Builder {
     pub(super) fn require_for_build(&self, accel: ChosenAccel, scene: &Scene) -> Result<(), OutOfMemory> {
         let bytes = match accel.tree_kind().map(|chosen| chosen.value) {
             Some(TreeKind::Fast) => BYTES_OF_FAST_BUILD,
-            Some(TreeKind::Best) => BYTES_OF_BEST_BUILD,
+            Some(TreeKind::Best | TreeKind::Gpu) => BYTES_OF_BEST_BUILD,
             None => BYTES_OF_GRID_BUILD,
         };
         require(&self.describe(scene), self.n_built(scene) as u64 * (size_of::<Triangle>() as u64 + bytes))

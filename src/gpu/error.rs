@@ -147,6 +147,11 @@ impl GpuError {
         }
     }
 
+    /// Whether there is too little memory, or a buffer or image is larger than the device allows.
+    pub(crate) fn is_lack_of_room(&self) -> bool {
+        self.is_out_of_memory() || matches!(self, Self::TooLarge { .. })
+    }
+
     /// Returns a function that turns the result of `call` on `object` into an error.
     pub(crate) fn call(call: &'static str, object: &str) -> impl FnOnce(vk::Result) -> GpuError {
         let object = object.to_owned();

@@ -38,6 +38,7 @@ mod closest_point;
 mod compact;
 mod demodulate;
 mod denoise;
+mod device_build;
 mod false_color;
 mod frame_passes;
 pub mod grid;

@@ -239,12 +239,13 @@ impl<'a> KernelInputs<'a> {
         }
     }
 
-    /// The inputs of a search, without materials and lights. If the structure is a grid, the host builds it unless it
-    /// has done so already.
+    /// The inputs of a search, without materials and lights. If devices build the structure, the host builds it,
+    /// too, unless it has done so already.
     pub fn of_geometry(geometry: Geometry<'a>) -> Self {
         let triangles = geometry.triangles();
         match geometry.accel() {
             Accel::KdTree(tree) => Self::of_tree(triangles, tree),
+            Accel::LazyTree(tree) => Self::of_tree(triangles, tree.get(triangles)),
             Accel::Grid(grid) => Self::of_grid(triangles, grid.get(triangles)),
             Accel::TwoLevel(two) => {
                 let [box_min, box_max] = two.bounds();

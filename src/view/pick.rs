@@ -61,7 +61,7 @@ pub struct PickedHit {
 /// the size of the picture in which the pixel is counted.
 pub fn pick(world: &World, options: &RenderOptions, camera: &Camera, pixel: UVec2) -> Picked {
     let scene = world.scene();
-    let links = TraversalLinks::of(world.accel(), options.traversal);
+    let links = TraversalLinks::of(world.accel(), &world.scene().triangles, options.traversal);
     let mut frame = world.frame_constants(options);
     frame.set_view(camera, world.bounds(), 0);
     let bindings = KernelInputs::new(world, &frame).with_links(&links);

@@ -50,14 +50,13 @@ pub use self::{
 };
 use crate::{
     accel::{
-        Accel, AccelOptions, Statistics,
-        grid::DeviceBuild,
+        Accel, AccelOptions, DeviceBuild, Statistics,
         kdtree::{BuildOptions, KdTree},
         two_level::TwoLevel,
         wide_bvh::WideBvh,
     },
     scene::{Scene, Up},
-    util::progress::Progress,
+    util::{once::made_once, progress::Progress},
 };
 
 /// A scene and its acceleration structure.
@@ -79,17 +78,6 @@ struct Parts {
     wide_bvh: OnceLock<Option<WideBvh>>,
     /// The ambient light that stands for light of which only paths know, for each axis that may point up.
     ambient_approximations: [OnceLock<AmbientApproximation>; 2],
-}
-
-/// Returns the cell's value, computed by `make` if the cell is empty. Does not block: `OnceLock::get_or_init` could
-/// deadlock when rayon steals a task that initializes the same cell. Two threads may compute the value; the first
-/// result is kept.
-fn made_once<T>(cell: &OnceLock<T>, make: impl FnOnce() -> T) -> &T {
-    if let Some(made) = cell.get() {
-        return made;
-    }
-    let made = make();
-    cell.get_or_init(|| made)
 }
 
 impl World {
@@ -173,7 +161,8 @@ impl World {
     /// The wide hierarchy, made from the kd-tree, through which the CPU traces single rays. There is none for a grid.
     /// It is made at the first call, on the current rayon pool.
     pub fn wide_bvh(&self) -> Option<&WideBvh> {
-        let make = || Some(WideBvh::new(self.0.accel.as_kdtree()?, &self.0.scene.triangles));
+        let triangles = &self.0.scene.triangles;
+        let make = || Some(WideBvh::new(self.0.accel.as_kdtree(triangles)?, triangles));
         made_once(&self.0.wide_bvh, make).as_ref()
     }
 
@@ -189,12 +178,12 @@ impl World {
         &self.0.accel
     }
 
-    /// The kd-tree over the scene's triangles.
+    /// The kd-tree over the scene's triangles, which the host builds unless it has done so already.
     ///
     /// # Panics
     /// The acceleration structure is a grid.
     pub fn tree(&self) -> &KdTree {
-        self.0.accel.as_kdtree().expect("the world has a kd-tree")
+        self.0.accel.as_kdtree(&self.0.scene.triangles).expect("the world has a kd-tree")
     }
 
     /// The least and the greatest corner of a box that holds all triangles, world units.
@@ -207,8 +196,8 @@ impl World {
         &self.0.accel_options
     }
 
-    /// Computes the statistics of the acceleration structure. If the structure is a grid that no device has built,
-    /// the host builds the grid first.
+    /// Computes the statistics of the acceleration structure. If devices build the structure, and none has done so,
+    /// the host builds it first.
     pub fn statistics(&self) -> Statistics {
         let Parts { scene, accel, accel_options, .. } = &*self.0;
         match (accel, accel_options) {
@@ -216,20 +205,18 @@ impl World {
                 Statistics::KdTree(tree.statistics(scene.triangles.len(), options))
             }
             (Accel::TwoLevel(two), options) => two.statistics(options),
-            (Accel::Grid(grid), _) => Statistics::Grid(grid.statistics(&scene.triangles)),
-            (Accel::KdTree(_), AccelOptions::Grid(_)) => {
+            (Accel::LazyTree(tree), _) => tree.statistics(&scene.triangles),
+            (Accel::Grid(grid), _) => grid.statistics(&scene.triangles),
+            (Accel::KdTree(_), AccelOptions::LazyTree(_) | AccelOptions::Grid(_)) => {
                 unreachable!("a world's structure is of its options' kind")
             }
         }
     }
 
-    /// The report of the first device that has built the world's grid, if there is one. The host builds the grids of
-    /// instances.
-    pub fn grid_build(&self) -> Option<&DeviceBuild> {
-        match &self.0.accel {
-            Accel::KdTree(_) | Accel::TwoLevel(_) => None,
-            Accel::Grid(grid) => grid.device_build(),
-        }
+    /// The report of the first device that has built the world's structure, if there is one. The host builds the
+    /// structures of instances.
+    pub fn device_build(&self) -> Option<&DeviceBuild> {
+        self.0.accel.device_build()
     }
 
     /// The triangles and their acceleration structure, which are all that a cast of rays needs.

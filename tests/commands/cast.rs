@@ -289,6 +289,7 @@ fn usage_mistakes_are_refused() {
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--accel", "bvh"], "kdtree, grid, grid2"),
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--accel", "grid", "--traversal", "mask"], "--accel grid"),
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--accel", "grid2", "--build", "fast"], "--accel grid2"),
+        (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--cpu", "--build", "gpu"], "with --cpu, there is none"),
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--cpu", "--validate"], "--cpu"),
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--closest", "--any"], "--any"),
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--closest", "--traversal", "mask"], "--traversal"),

@@ -285,7 +285,7 @@ fn inspect_lists_what_a_scene_consists_of() {
     assert_eq!((wood["name"].as_str(), wood["model"].as_str()), (Some("wood"), Some("phong")));
     assert_eq!((wood["terms"]["Ns"].as_f64(), wood["maps"]["base colour"].as_str()), (Some(9.0), Some("a.png")));
     assert!(wood["terms"]["Ni"].is_null() && wood["opacity"] == "blend" && wood["double_sided"] == true);
-    assert_eq!(json["schema"], 2);
+    assert_eq!(json["schema"], 3);
     let image = &json["images"][0];
     assert_eq!(
         (image["width"].as_u64(), image["height"].as_u64(), image["bytes"].as_u64()),

@@ -12,6 +12,7 @@ mod blended;
 mod closed_forms;
 mod compiler;
 mod crop;
+mod device_trees;
 mod edge;
 mod grids;
 mod lamps;

@@ -5,18 +5,30 @@ use std::{f32::consts::TAU, sync::Arc};
 
 use glam::{Vec3, vec3};
 use kdray::{
-    accel::kdtree::{BuildOptions, KdTree, Parts},
+    accel::{
+        Statistics,
+        kdtree::{self, BuildOptions, KdTree, Parts},
+    },
     buffers::KdTreeRoom,
     gpu::{Buffer, BufferUse, Context, Timer},
-    layout::{KD_BIN_BLOCK, KD_BLOCK_SIZE, KD_SMALL_CELL, KD_WORD_DEPTH, Triangle},
+    layout::{KD_BIN_BLOCK, KD_BLOCK_SIZE, KD_HAS_SLAB, KD_SMALL_CELL, KD_WORD_DEPTH, KdNode, Slab, Triangle},
     passes::kdtree::{BuiltTree, KdTreeBuilder, KdTreeBuilderOptions},
-    reference::kdtree_build::{Tree, kdtree_build},
+    reference::{
+        kd_slabs::kd_slabs,
+        kdtree_build::{Tree, kdtree_build},
+    },
 };
 
 use crate::support::{assert_silent, device, meshes};
 
 /// The most by which a device's tree may cost more than the host's.
 const MOST_COST: f64 = 1.02;
+
+/// Options of a tree without slabs.
+fn bare() -> KdTreeBuilderOptions {
+    let tree = BuildOptions { slabs: false, ..BuildOptions::default() };
+    KdTreeBuilderOptions { tree, ..KdTreeBuilderOptions::default() }
+}
 
 fn builder(context: &Arc<Context>, triangles: &[Triangle], options: &KdTreeBuilderOptions) -> KdTreeBuilder {
     let buffer = Buffer::with(context, "triangles", triangles, BufferUse::Storage).expect("triangles");
@@ -32,8 +44,8 @@ fn built(builder: &KdTreeBuilder) -> (BuiltTree, Parts) {
 /// Returns the cost of a tree as a multiple of that of the host's tree.
 fn relative_cost(tree: &KdTree, triangles: &[Triangle]) -> f64 {
     let host = BuildOptions { slabs: false, max_depth: Some(KD_WORD_DEPTH), ..BuildOptions::default() };
-    let [cost, expected] =
-        [tree, &KdTree::build(triangles, &host)].map(|tree| tree.statistics(triangles.len(), &host).sah_cost);
+    let [cost, expected] = [tree, &KdTree::build(triangles, &host)]
+        .map(|tree| tree.statistics(triangles.len(), &host).sah_cost.expect("a cost"));
     if expected > 0.0 { cost / expected } else { 1.0 + cost }
 }
 
@@ -48,8 +60,7 @@ fn check_twin(context: &Context, name: &str, triangles: &[Triangle], (found, par
 
 /// Builds a tree twice and checks it.
 fn check(context: &Arc<Context>, name: &str, triangles: &[Triangle]) {
-    let options = KdTreeBuilderOptions::default();
-    let builder = builder(context, triangles, &options);
+    let builder = builder(context, triangles, &bare());
     let (found, parts) = built(&builder);
     assert_eq!(found.n_limited, 0, "{name}");
     assert_eq!(built(&builder).1, parts, "{name}, again");
@@ -79,6 +90,15 @@ fn knot(n_along: usize, n_around: usize) -> Vec<Triangle> {
         [meshes::triangle(a, b, c), meshes::triangle(a, c, d)]
     };
     (0..n_along).flat_map(|i| (0..n_around).map(move |k| (i, k))).flat_map(quad).collect()
+}
+
+/// Needles through the origin.
+fn needles() -> Vec<Triangle> {
+    let needle = |i: usize| {
+        let at = vec3(i as f32 * 0.01, (i as f32 * 1.7).sin(), (i as f32 * 0.9).cos());
+        meshes::triangle(-3.0 * at, 3.0 * at, 3.0 * at + vec3(1e-4, 0.0, 0.0))
+    };
+    (0..300).map(needle).collect()
 }
 
 #[test]
@@ -112,11 +132,7 @@ fn degenerate_triangles_have_valid_trees() {
         meshes::triangle(corner, corner + Vec3::X, corner + Vec3::Y)
     };
     check(&context, "sheet", &(0..400).map(sheet).collect::<Vec<_>>());
-    let needle = |i: usize| {
-        let at = vec3(i as f32 * 0.01, (i as f32 * 1.7).sin(), (i as f32 * 0.9).cos());
-        meshes::triangle(-3.0 * at, 3.0 * at, 3.0 * at + vec3(1e-4, 0.0, 0.0))
-    };
-    check(&context, "needles", &(0..300).map(needle).collect::<Vec<_>>());
+    check(&context, "needles", &needles());
     let mut holed = meshes::torus(30, 20);
     holed[7].v0.x = f32::NAN;
     holed[500].v1.y = f32::INFINITY;
@@ -167,7 +183,7 @@ fn a_build_without_room_ends_in_leaves() {
         KdTreeRoom { references: 1, pairs: 0, cells: 0 },
     ];
     for room in rooms {
-        let options = KdTreeBuilderOptions { room, ..KdTreeBuilderOptions::default() };
+        let options = KdTreeBuilderOptions { room, ..bare() };
         let builder = builder(&context, &triangles, &options);
         let (found, parts) = built(&builder);
         let capacities = builder.buffers().capacities;
@@ -201,12 +217,45 @@ fn trees_of_limited_depth_are_valid_and_cost_more() {
     let context = device();
     let triangles = meshes::torus(30, 20);
     for max_depth in [0, 1, 5] {
-        let tree = BuildOptions { max_depth: Some(max_depth), ..BuildOptions::default() };
+        let tree = BuildOptions { max_depth: Some(max_depth), ..bare().tree };
         let options = KdTreeBuilderOptions { tree, ..KdTreeBuilderOptions::default() };
         let (found, parts) = built(&builder(&context, &triangles, &options));
         assert_eq!(found.depth, max_depth);
         let tree = KdTree::from_parts(parts, &triangles).expect("a valid tree");
         assert!(relative_cost(&tree, &triangles) > MOST_COST, "{max_depth} levels");
     }
+    assert_silent(&context);
+}
+
+/// Builds a whole tree with slabs twice, and checks that it is the bare tree with slabs in many nodes.
+fn check_slabs(context: &Arc<Context>, name: &str, triangles: &[Triangle]) {
+    let bare = built(&builder(context, triangles, &bare())).1;
+    let builder = builder(context, triangles, &KdTreeBuilderOptions::default());
+    let (found, parts) = built(&builder);
+    assert_eq!(built(&builder).1, parts, "{name}, again");
+    let without = |node: &KdNode| KdNode { axis_and_child: node.axis_and_child & !KD_HAS_SLAB, ..*node };
+    let nodes: Vec<KdNode> = parts.nodes.iter().map(without).collect();
+    let n_slabs = parts.nodes.iter().zip(&nodes).filter(|(marked, bare)| marked != bare).count();
+    assert_eq!(Parts { nodes, slabs: Vec::new(), ..parts.clone() }, bare, "{name}");
+    let tree = KdTree::from_parts(parts, triangles).unwrap_or_else(|invalid| panic!("{name}: {invalid}"));
+    let twin = kd_slabs(&KdTree::from_parts(bare, triangles).expect("a tree"), triangles);
+    let of_twin = twin.iter().filter(|slab| **slab != Slab::default()).count();
+    println!("{name}: {n_slabs} slabs, the twin has {of_twin}");
+    assert!(n_slabs.abs_diff(of_twin) <= 1 + of_twin / 100, "{name}: {n_slabs} slabs, not {of_twin}");
+    let options = BuildOptions::default();
+    let Statistics::KdTree(known) = found.report(triangles.len()).statistics else { panic!("a tree") };
+    let walked = tree.statistics(triangles.len(), &options);
+    assert_eq!(kdtree::Statistics { n_slabs: None, n_empty_leaves: None, sah_cost: None, ..walked }, known, "{name}");
+}
+
+#[test]
+fn whole_trees_have_slabs() {
+    let context = device();
+    check_slabs(&context, "none", &[]);
+    check_slabs(&context, "one", &[meshes::triangle(Vec3::X, Vec3::Y, Vec3::Z)]);
+    check_slabs(&context, "knot", &knot(120, 16));
+    check_slabs(&context, "soup", &meshes::soup(1200, 7));
+    check_slabs(&context, "needles", &needles());
+    check_slabs(&context, "far", &meshes::placed(meshes::torus(40, 20), 0.3, vec3(1000.0, -70.0, 3.0)));
     assert_silent(&context);
 }

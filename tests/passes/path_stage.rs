@@ -61,7 +61,7 @@ impl PathStage {
         constants.set_view(&world.scene().camera, world.bounds(), 0);
         let needs = Needs { constants: &constants, options: &options, n_bounces: constants.max_depth as usize };
         let resources = Resources::new(&context, &world, &needs).expect("resources");
-        let links = TraversalLinks::of(world.accel(), options.traversal);
+        let links = TraversalLinks::of(world.accel(), &world.scene().triangles, options.traversal);
         let passes = PathPasses::new(&context, &resources.bindings, &options).expect("passes");
         let materials = path_materials(world.scene());
         Self { world, materials, links, options, resources, passes, context }

@@ -56,7 +56,7 @@ impl Stage {
         let constants = Frame { queue_capacity: capacity, ..world.frame_constants(&options) };
         let needs = Needs { constants: &constants, options: &options, n_bounces: constants.max_depth as usize };
         let resources = Resources::new(&context, &world, &needs).expect("resources");
-        let links = TraversalLinks::of(world.accel(), options.traversal);
+        let links = TraversalLinks::of(world.accel(), &world.scene().triangles, options.traversal);
         let passes = Passes::new(&context, &resources.bindings, &options).expect("passes");
         Self { world, links, options, resources, passes, context, expects_messages: Cell::new(false) }
     }

@@ -72,7 +72,7 @@ impl MeshWithTree {
     }
 
     pub fn tree(&self) -> &KdTree {
-        self.accel.as_kdtree().expect("a mesh with a kd-tree")
+        self.accel.as_kdtree(&self.triangles).expect("a mesh with a kd-tree")
     }
 
     pub fn inputs(&self) -> KernelInputs<'_> {

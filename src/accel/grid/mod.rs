@@ -17,18 +17,14 @@
 
 mod build;
 mod lattice;
-mod lazy;
 mod overlap;
 mod planes;
 mod statistics;
 
 use glam::Vec3;
 
-pub use self::{
-    lattice::Lattice,
-    lazy::{BuildStage, DeviceBuild, LazyGrid},
-    statistics::Statistics,
-};
+pub use self::{lattice::Lattice, statistics::Statistics};
+use crate::accel::Lazy;
 use crate::layout::{AccelConstants, GRID_COLUMNS_PER_REFERENCE, GRID_MAX_COUNT, GridCell, Plane};
 
 /// A grid over triangles, as the kernels read it. Only [`Grid::build`] makes one, and nothing can change it
@@ -44,6 +40,9 @@ pub struct Grid {
     n_coarser: u32,
     origin_reach: f32,
 }
+
+/// A grid that each device builds for itself.
+pub type LazyGrid = Lazy<Grid>;
 
 /// Build options of a grid.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,7 +4,7 @@
 use super::KdTree;
 use crate::{
     accel::{Accel, kdtree::Traversal},
-    layout::{KdBox, KdRope},
+    layout::{KdBox, KdRope, Triangle},
 };
 
 /// Arrays of a tree that only some traversals read. An array that the traversal does not read is empty.
@@ -18,10 +18,12 @@ pub struct TraversalLinks {
 
 impl TraversalLinks {
     /// Returns the arrays that the traversal reads in addition to the scene's structure. For a grid, all are empty.
+    /// If a kd-tree is still to be built, the host builds it. `triangles`: those of the structure.
     /// With several trees, those of each tree follow those of the one before.
-    pub fn of(accel: &Accel, traversal: Traversal) -> Self {
+    pub fn of(accel: &Accel, triangles: &[Triangle], traversal: Traversal) -> Self {
         match accel {
             Accel::KdTree(tree) => Self::new(tree, traversal),
+            Accel::LazyTree(tree) => Self::new(tree.get(triangles), traversal),
             Accel::Grid(_) => Self::default(),
             Accel::TwoLevel(two) => {
                 let mut all = Self::default();

@@ -31,6 +31,9 @@ mod subtree;
 mod traversal;
 mod validate;
 
+use glam::Vec3;
+
+use crate::accel::Lazy;
 use crate::layout::{
     AccelConstants, KD_AXIS_MASK, KD_LEAF, KD_MAX_DEPTH, KD_PAIR_SHIFT, KD_PLANE_EPSILON, KdNode, Triangle,
 };
@@ -57,16 +60,41 @@ pub struct KdTree {
 impl KdTree {
     /// Returns the uniform constants that kernels need in addition to the tree's arrays. All other members are 0.
     pub fn constants(&self) -> AccelConstants {
-        let Parts { box_min, box_max, .. } = self.parts;
-        let largest_coordinate = box_min.abs().max(box_max.abs()).max_element();
-        let plane_epsilon = KD_PLANE_EPSILON * largest_coordinate;
-        let origin_reach = self.scales.origin_reach(largest_coordinate);
-        AccelConstants { box_min, box_max, plane_epsilon, origin_reach, ..AccelConstants::default() }
+        let bounds = self.bounds();
+        constants(bounds, self.scales.origin_reach(largest_coordinate(bounds)))
     }
 
     /// Returns the distance from a cell within which a triangle counts as inside the cell, world units.
     pub(super) fn margin_of(&self, triangle: &Triangle) -> f32 {
         self.scales.margin_of(triangle)
+    }
+}
+
+fn largest_coordinate([min, max]: [Vec3; 2]) -> f32 {
+    min.abs().max(max.abs()).max_element()
+}
+
+/// Returns the constants of a tree whose root has this cell.
+fn constants(bounds: [Vec3; 2], origin_reach: f32) -> AccelConstants {
+    let [box_min, box_max] = bounds;
+    let plane_epsilon = KD_PLANE_EPSILON * largest_coordinate(bounds);
+    AccelConstants { box_min, box_max, plane_epsilon, origin_reach, ..AccelConstants::default() }
+}
+
+/// A kd-tree that each device builds for itself.
+pub type LazyTree = Lazy<KdTree>;
+
+impl LazyTree {
+    /// Returns the same constants as [`KdTree::constants`].
+    pub(crate) fn constants(&self) -> AccelConstants {
+        constants(self.bounds(), self.origin_reach())
+    }
+
+    /// Returns what a traversal reads beside the tree, for any nodes of a tree over the triangles.
+    pub(crate) fn links_of(&self, nodes: Vec<KdNode>, traversal: Traversal) -> TraversalLinks {
+        let [box_min, box_max] = self.bounds();
+        let parts = Parts { nodes, box_min, box_max, ..Parts::default() };
+        TraversalLinks::new(&KdTree { parts, n_triangles: self.n_triangles(), scales: Scales::default() }, traversal)
     }
 }
 

@@ -7,7 +7,7 @@ use crate::accel::bounds::Bounds;
 use crate::layout::{KdNode, Plane, Slab, Triangle};
 
 /// Arrays of a kd-tree and the cell of its root.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Parts {
     /// The nodes. Node 0 is the root, and node 1 is unused (an empty leaf). The two children of a split are
     /// neighbours, the first one at an even index. The order is depth-first: a pair of children, then all nodes below

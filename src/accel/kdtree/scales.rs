@@ -52,7 +52,7 @@ const NEEDY_SHARE: usize = 16;
 const LIMITS: [f32; 2] = [f32::from_bits((127 - 80) << 23), f32::from_bits((127 + 60) << 23)];
 
 /// The scales of a tree.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Scales {
     /// The largest coordinate of all triangles, world units.
     largest: f32,

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::{BuildOptions, KdTree, Node};
+use crate::layout::{KdNode, Plane, Slab};
 
 /// Statistics of a kd-tree.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -11,10 +12,12 @@ pub struct Statistics {
     pub n_nodes: u64,
     /// Leaves, including the empty ones.
     pub n_leaves: u64,
-    /// Leaves without triangles.
-    pub n_empty_leaves: u64,
+    /// Leaves without triangles. Like the other figures that may be missing, none if a device has built the tree.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub n_empty_leaves: Option<u64>,
     /// Nodes with a slab around their triangles.
-    pub n_slabs: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub n_slabs: Option<u64>,
     /// The number of levels below the root.
     pub depth: u32,
     /// References: entries of all leaves.
@@ -23,7 +26,8 @@ pub struct Statistics {
     pub references_per_triangle: f64,
     /// Expected cost of a ray that crosses the root's cell, in the unit of the build's costs (MacDonald and Booth
     /// 1990). It is the sum over all nodes of the node's own cost times its cell's share of the root's surface.
-    pub sah_cost: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sah_cost: Option<f64>,
     /// Size on the host of nodes, parents, leaves with their planes, and slabs, bytes.
     pub bytes: u64,
 }
@@ -44,20 +48,21 @@ impl KdTree {
         };
         let root = (self.box_min().as_dvec3().to_array(), self.box_max().as_dvec3().to_array());
         let root_area = half_area(&root.0, &root.1);
+        let (mut n_slabs, mut n_empty_leaves, mut sah_cost) = (0, 0, 0.0);
         let mut stack = vec![(0, root)];
         while let Some((node_ix, (min, max))) = stack.pop() {
             // If the root's cell has no surface (a point, a line), all cells count like the root.
             let share = if root_area > 0.0 { half_area(&min, &max) / root_area } else { 1.0 };
             statistics.n_nodes += 1;
-            statistics.n_slabs += u64::from(self.has_slab(node_ix));
+            n_slabs += u64::from(self.has_slab(node_ix));
             match self.node(node_ix) {
                 Node::Leaf { count, .. } => {
                     statistics.n_leaves += 1;
-                    statistics.n_empty_leaves += u64::from(count == 0);
-                    statistics.sah_cost += f64::from(options.intersection_cost) * f64::from(count) * share;
+                    n_empty_leaves += u64::from(count == 0);
+                    sah_cost += f64::from(options.intersection_cost) * f64::from(count) * share;
                 }
                 Node::Split { axis, position, child } => {
-                    statistics.sah_cost += f64::from(options.traversal_cost) * share;
+                    sah_cost += f64::from(options.traversal_cost) * share;
                     let (mut below_max, mut above_min) = (max, min);
                     below_max[axis] = f64::from(position);
                     above_min[axis] = f64::from(position);
@@ -66,7 +71,31 @@ impl KdTree {
                 }
             }
         }
-        statistics
+        let (n_slabs, n_empty_leaves, sah_cost) = (Some(n_slabs), Some(n_empty_leaves), Some(sah_cost));
+        Statistics { n_slabs, n_empty_leaves, sah_cost, ..statistics }
+    }
+}
+
+impl Statistics {
+    /// Returns what is known of a tree by its numbers of nodes, with the unused node 1, and of references.
+    /// `has_slabs`: whether there is room for slabs.
+    pub(crate) fn of_device(
+        n_triangles: usize,
+        [n_nodes, n_references]: [u64; 2],
+        depth: u32,
+        has_slabs: bool,
+    ) -> Self {
+        let node_bytes = 2 * size_of::<KdNode>() + size_of::<u32>() + if has_slabs { 2 * size_of::<Slab>() } else { 0 };
+        let reference_bytes = size_of::<u32>() + size_of::<Plane>();
+        Self {
+            n_nodes: n_nodes - 1,
+            n_leaves: n_nodes / 2,
+            depth,
+            n_references,
+            references_per_triangle: n_references as f64 / n_triangles.max(1) as f64,
+            bytes: n_nodes / 2 * node_bytes as u64 + n_references * reference_bytes as u64,
+            ..Self::default()
+        }
     }
 }
 

@@ -5,13 +5,14 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use crate::{
-    accel::{
-        Search,
-        grid::{BuildStage, GridOptions},
-    },
+    accel::{AccelKind, BuildStage, DeviceBuild, grid::GridOptions},
     bench::{Spread, stage::Stage, warm_up},
     gpu::{Buffer, BufferUse, Context, DriverAccel, GpuError, Timer},
-    passes::grid::GridBuilder,
+    layout::Triangle,
+    passes::{
+        grid::GridBuilder,
+        kdtree::{KdTreeBuilder, KdTreeBuilderOptions},
+    },
 };
 
 /// Number of timed builds of each structure on the GPU.
@@ -26,16 +27,17 @@ pub struct Builds {
     pub n_threads: usize,
     /// Time of the driver's structure on the GPU; none where the device has no timestamps.
     pub bvh_ms: Option<Spread>,
-    /// Number of timed builds of each structure on the GPU, the driver's and the grids.
+    /// Number of timed builds of each structure on the GPU, the driver's and kdray's.
     pub n_bvh_builds: usize,
-    /// Times of kdray's grids on the GPU.
-    pub grids: Vec<GridBuilds>,
+    /// Times of kdray's kd-tree, with slabs, and grids on the GPU. There is no kd-tree where the device has too little
+    /// room to build it.
+    pub on_device: Vec<DeviceBuilds>,
 }
 
-/// Times of building one kind of grid.
+/// Times of building one kind of structure on the GPU.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct GridBuilds {
-    /// `grid` or `grid2`.
+pub struct DeviceBuilds {
+    /// `kdtree`, `grid` or `grid2`.
     pub accel: String,
     /// Time from the beginning of the first kernel to the end of the last one; none where the device has no
     /// timestamps.
@@ -45,7 +47,7 @@ pub struct GridBuilds {
 }
 
 impl Builds {
-    /// Builds the driver's structure and both grids. Returns the times and the driver's structure.
+    /// Builds the driver's structure, and kdray's on the GPU. Returns the times and the driver's structure.
     ///
     /// # Errors
     /// A structure exceeds the device's limits or memory.
@@ -58,36 +60,53 @@ impl Builds {
             driver_accel = DriverAccel::new(context, triangles)?;
             bvh_ms.push(driver_accel.build_ms());
         }
-        let grids = [(Search::Grid, GridOptions::uniform()), (Search::Grid2, GridOptions::two_level())];
+        let grids = [(AccelKind::Grid, GridOptions::uniform()), (AccelKind::Grid2, GridOptions::two_level())];
+        let mut on_device: Vec<_> = DeviceBuilds::of_tree(context, triangles)?.into_iter().collect();
+        for (kind, options) in &grids {
+            on_device.push(DeviceBuilds::of_grid(context, triangles, *kind, options)?);
+        }
         let builds = Self {
             tree_ms: stage.tree_build_ms,
             n_threads: rayon::current_num_threads(),
             bvh_ms: Spread::of(bvh_ms.into_iter().flatten()),
             n_bvh_builds: N_BUILDS,
-            grids: (grids.iter())
-                .map(|(variant, options)| GridBuilds::measure(context, stage, *variant, options))
-                .collect::<Result<_, _>>()?,
+            on_device,
         };
         Ok((builds, driver_accel))
     }
 }
 
-impl GridBuilds {
-    fn measure(
+impl DeviceBuilds {
+    /// Builds the kd-tree. Returns none if the device has too little room.
+    fn of_tree(context: &Arc<Context>, triangles: &[Triangle]) -> Result<Option<Self>, GpuError> {
+        let on_device = Buffer::with(context, "triangles", triangles, BufferUse::Texels)?;
+        let builder = match KdTreeBuilder::new(context, &on_device, &KdTreeBuilderOptions::default()) {
+            Err(error) if error.is_lack_of_room() => return Ok(None),
+            builder => builder?,
+        };
+        let timer = Timer::new(context, builder.n_stages())?;
+        let build = || Ok(builder.build(Some(&timer))?.report(triangles.len()));
+        Self::measure(AccelKind::KdTree, build).map(Some)
+    }
+
+    fn of_grid(
         context: &Arc<Context>,
-        stage: &Stage,
-        variant: Search,
+        triangles: &[Triangle],
+        kind: AccelKind,
         options: &GridOptions,
     ) -> Result<Self, GpuError> {
-        let triangles = &stage.scene().triangles;
         let on_device = Buffer::with(context, "triangles", triangles, BufferUse::Texels)?;
         let builder = GridBuilder::new(context, &on_device, options)?;
         let timer = Timer::new(context, builder.n_stages())?;
-        let build = || Ok::<_, GpuError>(builder.build(Some(&timer), BufferUse::Texels)?.report(triangles.len()));
+        Self::measure(kind, || Ok(builder.build(Some(&timer), BufferUse::Texels)?.report(triangles.len())))
+    }
+
+    /// Builds a structure several times. `build` builds it once.
+    fn measure(kind: AccelKind, build: impl Fn() -> Result<DeviceBuild, GpuError>) -> Result<Self, GpuError> {
         warm_up(|| build().map(drop))?;
         let reports = (0..N_BUILDS).map(|_| build()).collect::<Result<Vec<_>, _>>()?;
         let ms = Spread::of(reports.iter().filter_map(|report| report.ms));
         let stages = reports.into_iter().next_back().map_or_else(Vec::new, |report| report.stages);
-        Ok(Self { accel: variant.to_string(), ms, stages })
+        Ok(Self { accel: kind.to_string(), ms, stages })
     }
 }

@@ -33,6 +33,7 @@ use crate::{
     buffers::{AccelBuffers, CastResources},
     cast::{Contender, Kernel, Ray, cast_ray},
     gpu::{BindingLayout, Context, Device, DriverAccel, GpuError},
+    world::Geometry,
 };
 
 /// The searches of kdray that are measured. Three of them traverse the kd-tree: the first is the default one, the
@@ -47,7 +48,8 @@ pub const VARIANTS: [Search; 5] = [
 
 /// One of kdray's structures on the device, with all data that the searches of [`VARIANTS`] read.
 struct Structure {
-    kind: AccelKind,
+    /// The searches, each with its name.
+    searches: Vec<(Search, String)>,
     buffers: AccelBuffers,
     bindings: Arc<BindingLayout>,
 }
@@ -59,11 +61,23 @@ struct Contenders {
 }
 
 impl Structure {
-    fn new(context: &Arc<Context>, stage: &Stage, variant: Search) -> Result<Self, GpuError> {
-        let geometry = stage.geometry(variant);
+    /// Uploads the structure of a kind that the host has built, or a grid of the device.
+    fn of_kind(context: &Arc<Context>, stage: &Stage, kind: AccelKind) -> Result<Self, GpuError> {
+        let of_kind = VARIANTS.into_iter().filter(|variant| variant.accel() == kind);
+        let geometry = stage.geometry(Search::of(kind, Traversal::Mask));
+        Self::new(context, geometry, of_kind.map(|variant| (variant, variant.to_string())).collect())
+    }
+
+    /// Lets the device build a kd-tree, for the default traversal.
+    fn of_device_tree(context: &Arc<Context>, stage: &Stage) -> Result<Self, GpuError> {
+        let name = format!("{}, GPU's tree", VARIANTS[0]);
+        Self::new(context, stage.geometry_of_device_tree(), vec![(VARIANTS[0], name)])
+    }
+
+    fn new(context: &Arc<Context>, geometry: Geometry, searches: Vec<(Search, String)>) -> Result<Self, GpuError> {
         let mut buffers = AccelBuffers::new(context, geometry)?;
         buffers.add_links(context, geometry, Traversal::Ropes)?;
-        Ok(Self { kind: variant.accel(), bindings: CastResources::bindings(context, &buffers)?, buffers })
+        Ok(Self { searches, bindings: CastResources::bindings(context, &buffers)?, buffers })
     }
 
     /// Uploads the rays and returns the searches through the structure that trace them.
@@ -71,9 +85,9 @@ impl Structure {
         let resources = Rc::new(CastResources::new(context, &self.bindings, &self.buffers, rays.len())?);
         resources.cast_rays.upload(rays)?;
         let mut contenders: Vec<Box<dyn Contender>> = Vec::new();
-        for variant in VARIANTS.into_iter().filter(|variant| variant.accel() == self.kind) {
+        for (variant, name) in &self.searches {
             let kernel = Kernel::new(context, &self.bindings, &resources, (variant.traversal(), query))?;
-            contenders.push(Box::new(kernel.named(variant.to_string())));
+            contenders.push(Box::new(kernel.named(name.clone())));
         }
         Ok(Contenders { resources, contenders })
     }
@@ -100,10 +114,13 @@ impl DeviceStage {
     pub fn new(device: &Device, stage: &Stage) -> Result<Self, GpuError> {
         let context = device.inner();
         let (builds, driver_accel) = Builds::measure(context, stage)?;
-        let structures = [VARIANTS[0], Search::Grid, Search::Grid2];
-        let structures = structures.map(|variant| Structure::new(context, stage, variant));
+        let mut structures =
+            vec![Structure::of_kind(context, stage, AccelKind::KdTree)?, Structure::of_device_tree(context, stage)?];
+        for kind in [AccelKind::Grid, AccelKind::Grid2] {
+            structures.push(Structure::of_kind(context, stage, kind)?);
+        }
         Ok(Self {
-            structures: structures.into_iter().collect::<Result<_, _>>()?,
+            structures,
             driver_accel: Rc::new(driver_accel),
             rasters: Raster::all(context, stage)?,
             builds,

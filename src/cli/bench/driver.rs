@@ -130,14 +130,14 @@ fn passes_text(raster: &RasterResult) -> String {
 }
 
 fn builds_text(builds: &Builds) -> String {
-    let Builds { tree_ms, n_threads, bvh_ms, n_bvh_builds, grids } = builds;
+    let Builds { tree_ms, n_threads, bvh_ms, n_bvh_builds, on_device } = builds;
     let bvh_ms = decimal(bvh_ms.map(|ms| ms.median), 3);
     let mut text = format!(
         "Built: the driver's tree in {bvh_ms} ms of the GPU (median of {n_bvh_builds}), the kd-tree in {tree_ms:.0} ms \
          of {n_threads} CPU threads"
     );
-    for grid in grids {
-        text += &format!(", `{}` in {} ms of the GPU", grid.accel, decimal(grid.ms.map(|ms| ms.median), 3));
+    for built in on_device {
+        text += &format!(", `{}` in {} ms of the GPU", built.accel, decimal(built.ms.map(|ms| ms.median), 3));
     }
     text + ".\n"
 }
@@ -161,7 +161,7 @@ mod tests {
         accel::kdtree::KdTree,
         bench::{
             Spread,
-            driver::{builds::GridBuilds, contest::ContenderResult, report::PassSpread},
+            driver::{builds::DeviceBuilds, contest::ContenderResult, report::PassSpread},
         },
         cast::Hit,
     };
@@ -202,7 +202,7 @@ mod tests {
                 n_threads: 2,
                 bvh_ms: ms(1.5),
                 n_bvh_builds: 5,
-                grids: vec![GridBuilds { accel: "grid".to_owned(), ms: ms(0.5), stages: Vec::new() }],
+                on_device: vec![DeviceBuilds { accel: "grid".to_owned(), ms: ms(0.5), stages: Vec::new() }],
             },
             raster: vec![
                 RasterResult::new(

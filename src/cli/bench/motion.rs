@@ -11,6 +11,7 @@ use super::args::MotionArgs;
 use crate::cli::{
     device_args::open_device,
     error::CliError,
+    picture_args::check_build,
     print,
     progress::Progress,
     table::{decimal, table},
@@ -20,6 +21,7 @@ use crate::cli::{
 pub fn run(args: &MotionArgs) -> Result<(), CliError> {
     args.files.check(&[&args.scene], &args.load.options())?;
     args.picture.check()?;
+    check_build(args.picture.build, args.cpu)?;
     let progress = Progress::new(false, 3);
     let (scene, n_frames) = (args.scene.display(), args.frames);
     let mut request = args.load.pictures(&args.picture, &args.look, Default::default());

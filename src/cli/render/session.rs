@@ -200,7 +200,7 @@ impl<'a> Session<'a> {
             whole_frames: draws_whole_frames(engine, &views),
             triangles: *n_triangles,
             accel: world.statistics(),
-            grid_build: world.grid_build().cloned(),
+            device_build: world.device_build().cloned(),
             last_moment,
             load_ms: *load_ms,
             build_ms: *build_ms,

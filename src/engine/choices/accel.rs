@@ -18,6 +18,7 @@ impl ChosenAccel {
     /// Returns the options for building the structure for a processor.
     pub fn options(self, processor: Processor) -> AccelOptions {
         match self {
+            Self::KdTree(Chosen { value: kind @ TreeKind::Gpu, .. }) => AccelOptions::LazyTree(kind.options(processor)),
             Self::KdTree(tree_kind) => AccelOptions::KdTree(tree_kind.value.options(processor)),
             Self::Grid => AccelOptions::Grid(GridOptions::uniform()),
             Self::Grid2 => AccelOptions::Grid(GridOptions::two_level()),

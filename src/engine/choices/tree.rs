@@ -1,7 +1,7 @@
 //! The choice of the kd-tree: how much build work pays off for the rays to be traced.
 
 use super::Processor;
-use crate::accel::kdtree::BuildOptions;
+use crate::{accel::kdtree::BuildOptions, layout::KD_WORD_DEPTH};
 
 /// How much work goes into the tree, as the user specifies it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -14,12 +14,15 @@ pub enum BuildPolicy {
     Fast,
     /// The tree that traces fastest.
     Best,
+    /// The tree that each device builds for itself.
+    Gpu,
 }
 
 named_enum!(BuildPolicy {
     Auto = "auto": "the tree with which building and tracing take the least time together",
     Fast = "fast": "built in half of the time; rays take up to a tenth longer on the CPU, up to twice as long on a GPU",
     Best = "best": "the tree through which rays are fastest",
+    Gpu = "gpu": "the device builds its own tree; with kept instances, the trees are those of best",
 });
 
 impl BuildPolicy {
@@ -29,6 +32,7 @@ impl BuildPolicy {
             Self::Auto => None,
             Self::Fast => Some(TreeKind::Fast),
             Self::Best => Some(TreeKind::Best),
+            Self::Gpu => Some(TreeKind::Gpu),
         }
     }
 }
@@ -41,9 +45,12 @@ pub enum TreeKind {
     Fast,
     /// The tree that traces fastest.
     Best,
+    /// The tree that each device builds for itself, with costs as low as those of the best one. What the host traces
+    /// goes through the best tree, which is built when it is first needed.
+    Gpu,
 }
 
-named_enum!(TreeKind { Fast = "fast", Best = "best" });
+named_enum!(TreeKind { Fast = "fast", Best = "best", Gpu = "gpu" });
 
 /// Number of rays per triangle from which the best tree pays off on the CPU. Its build takes longer than that of the
 /// fast tree: by about 1 us per triangle, and with slabs by a third of 1 us more. It saves some 10 to 25 ns per ray
@@ -64,9 +71,11 @@ impl TreeKind {
 
     /// Returns the options for building the tree for a processor. The kernels that software drivers run use no slabs.
     pub fn options(self, processor: Processor) -> BuildOptions {
+        let best = BuildOptions { slabs: processor != Processor::SoftwareDriver, ..BuildOptions::default() };
         match self {
             Self::Fast => BuildOptions::fast(),
-            Self::Best => BuildOptions { slabs: processor != Processor::SoftwareDriver, ..BuildOptions::default() },
+            Self::Best => best,
+            Self::Gpu => BuildOptions { max_depth: Some(KD_WORD_DEPTH), ..best },
         }
     }
 }

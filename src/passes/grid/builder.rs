@@ -7,8 +7,9 @@ use super::GridPasses;
 use crate::{
     accel::grid::{GridOptions, Lattice},
     buffers::GridBuffers,
-    gpu::{Access, Buffer, BufferUse, CommandBuffer, Context, GpuError, Timer, TimerRow},
+    gpu::{Buffer, BufferUse, CommandBuffer, Context, GpuError, Timer, TimerRow},
     layout::{GRID_IS_COUNTED, GridBuild, GridCell, LeafTriangle, Plane, Triangle},
+    passes::device_build,
 };
 
 /// Kernels and memory that build the grid of an array of triangles. A build can be repeated any number of times.
@@ -135,12 +136,6 @@ impl GridBuilder {
             ),
             (self.buffers.leaf_planes.any(), grid.leaf_planes.any(), grid.leaf_planes.len() * size_of::<Plane>()),
         ];
-        self.context.run("grid_copy", |commands| {
-            commands.barrier(Access::ComputeWrite, Access::TransferRead); // the build's arrays
-            for (from, to, bytes) in copies.into_iter().filter(|(.., bytes)| *bytes > 0) {
-                commands.copy_buffer(from, to, bytes as u64);
-            }
-            commands.barrier(Access::TransferWrite, Access::AnyUse); // the grid
-        })
+        device_build::copy(&self.context, "grid_copy", &copies)
     }
 }

@@ -2,9 +2,9 @@
 
 use super::DeviceGrid;
 use crate::{
-    accel::grid::{BuildStage, DeviceBuild, Statistics},
-    gpu::TimerRow,
+    accel::{self, DeviceBuild, grid::Statistics},
     layout::AccelConstants,
+    passes::device_build,
 };
 
 impl DeviceGrid {
@@ -40,26 +40,6 @@ impl DeviceGrid {
 
     /// Returns the grid's statistics and the times of its build, by kernel.
     pub fn report(&self, n_triangles: usize) -> DeviceBuild {
-        let span = |row: &TimerRow| row.span_ms;
-        let begin = self.stages.first().and_then(span).map(|(begin, _)| begin);
-        let end = self.stages.last().and_then(span).map(|(_, end)| end);
-        DeviceBuild {
-            statistics: self.statistics(n_triangles),
-            ms: begin.zip(end).map(|(begin, end)| end - begin),
-            stages: stages_of(&self.stages),
-        }
+        device_build::report(accel::Statistics::Grid(self.statistics(n_triangles)), &self.stages)
     }
-}
-
-/// Returns the sum of the times of all rows of a name, for each name in the order in which it first occurs.
-fn stages_of(rows: &[TimerRow]) -> Vec<BuildStage> {
-    let mut stages: Vec<BuildStage> = Vec::new();
-    for row in rows {
-        let ms = row.span_ms.map(|(begin, end)| end - begin);
-        match stages.iter_mut().find(|stage| stage.name == row.name) {
-            Some(stage) => stage.ms = stage.ms.zip(ms).map(|(sum, ms)| sum + ms),
-            None => stages.push(BuildStage { name: row.name, ms }),
-        }
-    }
-    stages
 }

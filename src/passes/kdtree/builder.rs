@@ -4,17 +4,21 @@ use std::sync::Arc;
 
 use super::{KdTreePasses, then};
 use crate::{
-    accel::kdtree::{BuildOptions, Parts},
-    buffers::{KdTreeBuffers, KdTreeRoom},
-    gpu::{Buffer, CommandBuffer, Commands, Context, GpuError, Timer, TimerRow},
-    layout::{KD_MOST_ENTRIES, KdBuild, LeafTriangle, Triangle},
+    accel::{
+        self, DeviceBuild,
+        kdtree::{BuildOptions, Parts, Statistics},
+    },
+    buffers::{KdTreeBuffers, KdTreeRoom, TreeBuffers},
+    gpu::{Buffer, BufferUse, CommandBuffer, Commands, Context, GpuError, Timer, TimerRow},
+    layout::{KD_MOST_ENTRIES, KdBuild, KdNode, LeafTriangle, Plane, Slab, Triangle},
+    passes::{device_build, kd_slabs::SlabBuilder},
 };
 
 /// Options of a [`KdTreeBuilder`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct KdTreeBuilderOptions {
-    /// The costs and the depth of the tree. The tree has no more than 32 levels below the root and no slabs. Its
-    /// capacities are those of `room`, and `exact_planes` has no effect.
+    /// The costs and the depth of the tree, and whether it has slabs. The tree has no more than 32 levels below the
+    /// root. Its capacities are those of `room`, and `exact_planes` has no effect.
     pub tree: BuildOptions,
     /// The capacities of the tree and of its build.
     pub room: KdTreeRoom,
@@ -36,6 +40,27 @@ pub struct KdTreeBuilder {
     options: KdTreeBuilderOptions,
     passes: KdTreePasses,
     buffers: KdTreeBuffers,
+    slabs: Option<SlabStage>,
+}
+
+/// The last stage of a build of a tree with slabs.
+struct SlabStage {
+    builder: SlabBuilder,
+    slabs: Buffer<Slab>,
+}
+
+impl SlabStage {
+    fn new(context: &Arc<Context>, of: &KdTreeBuffers) -> Result<Self, GpuError> {
+        let slabs = Buffer::new(context, "kd_build_slabs", of.nodes.len(), BufferUse::Storage)?;
+        let tree = TreeBuffers {
+            tree: of.slab_tree.clone(),
+            nodes: of.nodes.clone(),
+            parents: of.parents.clone(),
+            leaf_triangles: of.leaf_triangles.clone(),
+            slabs: slabs.clone(),
+        };
+        Ok(Self { builder: SlabBuilder::new(context, &tree)?, slabs })
+    }
 }
 
 /// A finished build. The tree is in the builder's buffers until the next build.
@@ -53,7 +78,32 @@ pub struct BuiltTree {
     pub finest_scale: u32,
     /// Times of the build's dispatches; empty without a timer.
     pub stages: Vec<TimerRow>,
+    /// Whether slabs have been computed.
+    pub has_slabs: bool,
     state: KdBuild,
+}
+
+/// Copies of a tree's arrays, of exactly its size.
+pub struct DeviceTree {
+    /// The nodes.
+    pub nodes: Buffer<KdNode>,
+    /// The parent of each pair of nodes.
+    pub parents: Buffer<u32>,
+    /// The triangles of the leaves, with their indices.
+    pub leaf_triangles: Buffer<LeafTriangle>,
+    /// The plane of each of `leaf_triangles`.
+    pub leaf_planes: Buffer<Plane>,
+    /// A slab for each node; empty for a tree without slabs.
+    pub slabs: Buffer<Slab>,
+}
+
+impl BuiltTree {
+    /// Returns what is known of the tree's sizes, and the times of its build, by kernel.
+    pub fn report(&self, n_triangles: usize) -> DeviceBuild {
+        let sizes = [self.n_nodes, self.n_entries].map(u64::from);
+        let statistics = Statistics::of_device(n_triangles, sizes, self.depth, self.has_slabs);
+        device_build::report(accel::Statistics::KdTree(statistics), &self.stages)
+    }
 }
 
 impl KdTreeBuilder {
@@ -71,8 +121,10 @@ impl KdTreeBuilder {
             return Err(GpuError::TooLarge { object, bytes: triangles.any().bytes(), limit });
         }
         let bindings = KdTreeBuffers::bindings(context)?;
+        let buffers = KdTreeBuffers::new(context, &bindings, triangles, options.room, &options.tree)?;
         Ok(Self {
-            buffers: KdTreeBuffers::new(context, &bindings, triangles, options.room, &options.tree)?,
+            slabs: options.tree.slabs.then(|| SlabStage::new(context, &buffers)).transpose()?,
+            buffers,
             passes: KdTreePasses::new(context, &bindings)?,
             context: context.clone(),
             options: options.clone(),
@@ -94,7 +146,8 @@ impl KdTreeBuilder {
 
     /// Returns the number of a timer's rows that a build needs, one per dispatch.
     pub fn n_stages(&self) -> u32 {
-        KdTreePasses::n_stages(self.buffers.initial().max_depth)
+        let of_slabs = if self.slabs.is_some() { SlabBuilder::N_STAGES } else { 0 };
+        KdTreePasses::n_stages(self.buffers.initial().max_depth) + of_slabs
     }
 
     /// Builds the tree and waits for the device. `timer`: takes the times of the dispatches, which are then all in one
@@ -117,6 +170,7 @@ impl KdTreeBuilder {
             finest_scale: state.finest,
             stages: timer.map_or(Ok(Vec::new()), Timer::rows)?,
             state,
+            has_slabs: self.slabs.is_some(),
         })
     }
 
@@ -133,11 +187,36 @@ impl KdTreeBuilder {
             parents: self.buffers.parents.download_first(n_nodes / 2)?,
             leaf_triangles: entries.iter().map(|entry| entry.triangle_ix).collect(),
             leaf_planes: self.buffers.leaf_planes.download_first(n_entries)?,
-            slabs: Vec::new(),
+            slabs: self.slabs.as_ref().map_or(Ok(Vec::new()), |stage| stage.slabs.download_first(n_nodes))?,
             box_min: built.state.box_min,
             box_max: built.state.box_max,
             depth: built.depth,
         })
+    }
+
+    /// Copies the tree of the last build to buffers that are created for `usage`, so that the builder can be dropped.
+    ///
+    /// # Errors
+    /// Out of memory; a Vulkan call fails.
+    pub fn copy(&self, built: &BuiltTree, usage: BufferUse) -> Result<DeviceTree, GpuError> {
+        let (n_nodes, n_entries) = (built.n_nodes as usize, built.n_entries as usize);
+        let (context, from) = (&self.context, &self.buffers);
+        let to = DeviceTree {
+            nodes: Buffer::new(context, "kd_nodes", n_nodes, usage)?,
+            parents: Buffer::new(context, "kd_parents", n_nodes / 2, usage)?,
+            leaf_triangles: Buffer::new(context, "leaf_triangles", n_entries, usage)?,
+            leaf_planes: Buffer::new(context, "leaf_planes", n_entries, usage)?,
+            slabs: Buffer::new(context, "kd_slabs", if built.has_slabs { n_nodes } else { 0 }, usage)?,
+        };
+        let mut arrays = vec![
+            (from.nodes.any(), to.nodes.any(), n_nodes * size_of::<KdNode>()),
+            (from.parents.any(), to.parents.any(), n_nodes / 2 * size_of::<u32>()),
+            (from.leaf_triangles.any(), to.leaf_triangles.any(), n_entries * size_of::<LeafTriangle>()),
+            (from.leaf_planes.any(), to.leaf_planes.any(), n_entries * size_of::<Plane>()),
+        ];
+        arrays.extend(self.slabs.iter().map(|it| (it.slabs.any(), to.slabs.any(), n_nodes * size_of::<Slab>())));
+        device_build::copy(context, "kdtree_copy", &arrays)?;
+        Ok(to)
     }
 
     fn record_all(&self, timer: Option<&Timer>) -> Result<CommandBuffer, GpuError> {
@@ -145,7 +224,7 @@ impl KdTreeBuilder {
             commands.reset_timer();
             self.passes.setup(commands, &self.buffers);
             (0..self.n_levels()).for_each(|level_ix| self.passes.level(commands, &self.buffers, level_ix));
-            self.passes.finish(commands, &self.buffers);
+            self.finish(commands);
         })
     }
 
@@ -164,9 +243,18 @@ impl KdTreeBuilder {
         parts.push(record(&|commands| {
             then(commands);
             commands.bind(self.buffers.set_of(0));
-            self.passes.finish(commands, &self.buffers);
+            self.finish(commands);
         })?);
         Ok(parts)
+    }
+
+    /// Records what comes after the last level. Needs the built nodes, and the references in leaves. Leaves the tree.
+    fn finish(&self, commands: &Commands) {
+        self.passes.finish(commands, &self.buffers);
+        if let Some(stage) = &self.slabs {
+            then(commands);
+            stage.builder.record(commands);
+        }
     }
 
     /// The number of levels, that of the root included.

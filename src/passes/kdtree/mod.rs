@@ -22,6 +22,7 @@
 //! each level downwards
 //!   place            writes the nodes in depth-first order
 //! leaves             writes the entries of leaves, with triangles and planes
+//! slabs, if wanted   src/passes/kd_slabs.rs
 //! ```
 //!
 //! Prefix sums give all places, and atomics only add, or find a least or greatest integer. So the same device builds
@@ -35,7 +36,7 @@ mod builder;
 
 use std::{mem::offset_of, sync::Arc};
 
-pub use self::builder::{BuiltTree, KdTreeBuilder, KdTreeBuilderOptions};
+pub use self::builder::{BuiltTree, DeviceTree, KdTreeBuilder, KdTreeBuilderOptions};
 use super::{Kernels, ONE_GROUP, spirv};
 use crate::{
     buffers::KdTreeBuffers,
