@@ -172,6 +172,11 @@ def test_refusals(tmp_path):
 
 def test_ctrl_c_ends_a_picture():
     scene = kdray.load(CORNELL, size=(64, 64), device="cpu")
+    # Python does not set this handler where a shell ignores SIGINT, as it does for what runs in the background.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
-    with pytest.raises(KeyboardInterrupt):
-        scene.render(spp=60_000, integrator="path")
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            scene.render(spp=60_000, integrator="path")
+    finally:
+        signal.signal(signal.SIGINT, before)

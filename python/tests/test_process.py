@@ -115,6 +115,7 @@ scene = kdray.RaycastingScene(device="cpu")
 scene.add_triangles(corners.reshape(-1, 3), np.arange(6000).reshape(-1, 3))
 scene.cast_rays(np.zeros((1, 6)))
 rays = np.tile(random.uniform(-1, 1, (200_000, 6)).astype(np.float32), (100, 1))
+signal.signal(signal.SIGINT, signal.default_int_handler)  # which Python does not set where a shell ignores SIGINT
 threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
 try:
     scene.count_intersections(rays)
