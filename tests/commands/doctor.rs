@@ -2,7 +2,10 @@
 
 use std::{fs, path::Path, process::Output};
 
-use crate::support::command::{cornell, kdray, stderr, stdout};
+use crate::support::{
+    command::{cornell, kdray, stderr, stdout},
+    kept,
+};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -39,6 +42,9 @@ fn a_healthy_machine_is_found_so() {
 
 #[test]
 fn a_scene_is_examined_on_each_processor() {
+    if kept::leaves_out("the hash of a flattened scene") {
+        return;
+    }
     let directory = TempDir::new().unwrap();
     let path = directory.path();
     let found = json(&doctor(path, &[&cornell(), "--json"], 0));
