@@ -18,7 +18,7 @@
 
 use std::{mem::offset_of, sync::Arc};
 
-use super::{kernel, spirv};
+use super::{ONE_GROUP, kernel, spirv, then};
 use crate::{
     buffers::{KdSlabBuffers, TreeBuffers},
     gpu::{
@@ -111,8 +111,7 @@ impl SlabBuilder {
             commands.fill_buffer(self.buffers.entry_leaves.any(), u32::MAX);
             commands.barrier(Access::TransferWrite, Access::KernelUpdate); // entry_leaves
         };
-        let one_group = Dispatch::Threads([1, 1, 1], [1, 1, 1]);
-        commands.dispatch_after(reset, &self.begin, None, &0u32, one_group);
+        commands.dispatch_after(reset, &self.begin, None, &0u32, ONE_GROUP);
     }
 
     /// Returns the indirect dispatch whose size is at a byte offset of `build`.
@@ -129,9 +128,4 @@ impl SlabBuilder {
 
 fn dispatch(commands: &Commands, kernel: &ComputePipeline, dispatch: Dispatch) {
     commands.dispatch(kernel, None, &0u32, dispatch);
-}
-
-/// Makes the next kernel wait for the previous one, and for the sizes of dispatches that the previous one has written.
-fn then(commands: &Commands) {
-    commands.barrier(Access::KernelUpdate, Access::KernelUpdate); // all arrays of the computation
 }

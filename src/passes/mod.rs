@@ -25,7 +25,10 @@ use crate::{
     accel::{AccelKind, Search, kdtree::Traversal},
     buffers::uses_graphics_pipeline,
     frame::{Primary, RenderOptions},
-    gpu::{BindingLayout, ComputeDesc, ComputePipeline, Constant, Constants, Context, Dispatch, GpuError, Shader},
+    gpu::{
+        Access, BindingLayout, Commands, ComputeDesc, ComputePipeline, Constant, Constants, Context, Dispatch,
+        GpuError, Shader,
+    },
     layout::{CONSTANTS_OF_SHADERS, constants},
 };
 
@@ -322,6 +325,12 @@ impl Kernels<'_> {
 
 /// The size of a dispatch of one workgroup.
 const ONE_GROUP: Dispatch<'static> = Dispatch::Threads([1, 1, 1], [1, 1, 1]);
+
+/// Makes the next kernel of a build wait for the previous one, and for the sizes of dispatches that the previous one
+/// has written.
+fn then(commands: &Commands) {
+    commands.barrier(Access::KernelUpdate, Access::KernelUpdate); // the build's arrays
+}
 
 /// Returns a constant that the shader does not declare, if there is one.
 fn undeclared(file: &str, constants: &Constants) -> Option<&'static str> {

@@ -43,7 +43,7 @@ use std::{mem::offset_of, sync::Arc};
 
 pub use self::builder::{DeviceGrid, GridBuilder};
 use self::level::Level;
-use super::{Kernels, ONE_GROUP, spirv};
+use super::{Kernels, ONE_GROUP, spirv, then};
 use crate::{
     buffers::{GridBuffers, PairSets},
     gpu::{Access, BindingLayout, Commands, ComputePipeline, Constants, Context, Dispatch, GpuError},
@@ -168,12 +168,6 @@ fn sized_by(buffers: &GridBuffers, offset: usize) -> Dispatch<'_> {
 
 fn dispatch(commands: &Commands, kernel: &ComputePipeline, dispatch: Dispatch) {
     commands.dispatch(kernel, None, &GridSort::default(), dispatch);
-}
-
-/// Makes the next kernel wait for the previous one, and for the sizes of dispatches that the previous one has
-/// written.
-fn then(commands: &Commands) {
-    commands.barrier(Access::KernelUpdate, Access::KernelUpdate); // the build's arrays
 }
 
 #[cfg(test)]

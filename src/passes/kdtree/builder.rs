@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{KdTreePasses, then};
+use super::KdTreePasses;
 use crate::{
     accel::{
         self, DeviceBuild,
@@ -11,7 +11,7 @@ use crate::{
     buffers::{KdTreeBuffers, KdTreeRoom, TreeBuffers},
     gpu::{Buffer, BufferUse, CommandBuffer, Commands, Context, GpuError, Timer, TimerRow},
     layout::{KD_MOST_ENTRIES, KdBuild, KdNode, LeafTriangle, Plane, Slab, Triangle},
-    passes::{device_build, kd_slabs::SlabBuilder},
+    passes::{device_build, kd_slabs::SlabBuilder, then},
 };
 
 /// Options of a [`KdTreeBuilder`].

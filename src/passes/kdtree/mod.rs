@@ -37,7 +37,7 @@ mod builder;
 use std::{mem::offset_of, sync::Arc};
 
 pub use self::builder::{BuiltTree, DeviceTree, KdTreeBuilder, KdTreeBuilderOptions};
-use super::{Kernels, ONE_GROUP, spirv};
+use super::{Kernels, ONE_GROUP, spirv, then};
 use crate::{
     buffers::KdTreeBuffers,
     gpu::{Access, BindingLayout, Commands, ComputePipeline, Constants, Context, Dispatch, GpuError},
@@ -183,12 +183,6 @@ impl KdTreePasses {
         let entries = offset_of!(KdBuild, entry_groups_x) as u64;
         commands.dispatch(&self.leaves, None, &KdStage::default(), Dispatch::Indirect(buffers.build.any(), entries));
     }
-}
-
-/// Makes the next kernel wait for the previous one, and for the sizes of dispatches that the previous one has
-/// written.
-fn then(commands: &Commands) {
-    commands.barrier(Access::KernelUpdate, Access::KernelUpdate); // the build's arrays
 }
 
 #[cfg(test)]
