@@ -2,7 +2,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 // Kd-tree, count cells: counts the references of the cells' children, and the splits, the children with references and
-// the references in leaves of each block of cells. One workgroup per block of cells.
+// the references in leaves of each group of cells. One workgroup per group of cells.
 // Reads build, levels, sides; updates cells_from; writes scan_blocks.
 #include "kdtree_build/kd_sides.glsl"
 #include "scan.glsl"
@@ -25,27 +25,29 @@ uvec2 count(uint cell_ix) {
     return uvec2(1u | n_open << 16, 0u);
 }
 
+// The references that the next level has from the cells up to one, and those of all cells after it.
+uint next_and_after(uint cell_ix) {
+    uint end = cells_from[cell_ix].first + cells_from[cell_ix].n_references;
+    uvec2 n_sides = sides_before(end);
+    return n_sides.x + n_sides.y + levels[stage.level_ix].n_references - end;
+}
+
 void main() {
-    uint block = index_of_group();
     uint n_cells = levels[stage.level_ix].n_cells;
-    uvec2 sum = uvec2(0u);
-    for (uint row = 0u; row < KD_ROWS; ++row) {
-        uint cell_ix = block * KD_BLOCK_SIZE + row * SCAN_GROUP_SIZE + scan_rank();
-        bool is_cell = cell_ix < n_cells;
-        uvec2 counts = uvec2(0u);
-        if (is_cell) counts = count(cell_ix);
-        uvec2 total, before;
-        before.x = sum.x + workgroup_exclusive_add(counts.x, total.x);
-        before.y = sum.y + workgroup_exclusive_add(counts.y, total.y);
-        if (is_cell) {
-            uvec2 halves = halves_of(before.x);
-            cells_from[cell_ix].splits_before = halves.x;
-            cells_from[cell_ix].open_before = halves.y;
-            cells_from[cell_ix].in_leaves_before = before.y;
-        }
-        sum += total;
+    uint begin = min(index_of_group() * SCAN_GROUP_SIZE, n_cells), end = min(begin + SCAN_GROUP_SIZE, n_cells);
+    uint cell_ix = begin + scan_rank();
+    uvec2 counts = uvec2(0u), total, before;
+    if (cell_ix < end) counts = count(cell_ix);
+    before.x = workgroup_exclusive_add(counts.x, total.x);
+    before.y = workgroup_exclusive_add(counts.y, total.y);
+    if (cell_ix < end) {
+        uvec2 halves = halves_of(before.x);
+        cells_from[cell_ix].splits_before = halves.x;
+        cells_from[cell_ix].open_before = halves.y;
+        cells_from[cell_ix].in_leaves_before = before.y;
     }
-    if (gl_LocalInvocationIndex == 0u && block < blocks_of(n_cells)) {
-        scan_blocks[build.cell_blocks_begin + block] = uvec4(halves_of(sum.x), sum.y, 0u);
+    if (gl_LocalInvocationIndex == 0u && begin < end) {
+        scan_blocks[build.cell_groups_begin + index_of_group()] =
+            uvec4(halves_of(total.x), total.y, next_and_after(end - 1u));
     }
 }

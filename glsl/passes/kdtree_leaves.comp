@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 // Kd-tree, leaves: writes the leaf entries, a triangle and its plane for each reference in a leaf. One workgroup per
-// block of these references; an invocation writes one entry per row. Twin of src/accel/kdtree/planes.rs.
+// group of these references. Twin of src/accel/kdtree/planes.rs.
 // Reads build, triangles, leaf_references, built_nodes, places; writes leaf_triangles, leaf_planes.
 #include "kdtree_build/kd_scales.glsl"
 
@@ -61,13 +61,10 @@ void write_entry(uint entry_ix, uint triangle_ix, Triangle triangle, uint cell_s
 }
 
 void main() {
-    uint begin = index_of_group() * KD_BLOCK_SIZE + gl_LocalInvocationIndex;
-    for (uint row = 0u; row < KD_ROWS; ++row) {
-        uint i = begin + row * SCAN_GROUP_SIZE;
-        if (i >= build.n_entries) break;
-        uvec2 reference = leaf_references[i];
-        uint built_ix = reference.y & 0x7ffffffu;
-        uint entry_ix = places[built_ix].y + i - built_nodes[built_ix].split_or_first;
-        write_entry(entry_ix, reference.x, triangles[reference.x], reference.y >> 27);
-    }
+    uint i = index_of_entry();
+    if (i >= build.n_entries) return;
+    uvec2 reference = leaf_references[i];
+    uint built_ix = reference.y & 0x7ffffffu;
+    uint entry_ix = places[built_ix].y + i - built_nodes[built_ix].split_or_first;
+    write_entry(entry_ix, reference.x, triangles[reference.x], reference.y >> 27);
 }

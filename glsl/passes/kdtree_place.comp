@@ -1,8 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 // Kd-tree, place: writes the nodes of a level into the finished tree, in depth-first order: a pair, then all pairs
-// below its first node, then those below its second. One workgroup per block of pairs of the level; an invocation
-// writes one pair per row.
+// below its first node, then those below its second. One workgroup per group of pairs of the level.
 // The invocation of the root's pair also writes what the computation of slabs needs to know of the tree.
 // Reads build, levels, built_nodes, built_parents, below; updates places; writes nodes, parents, tree.
 #include "kdtree_build/kd_build.glsl"
@@ -42,21 +41,17 @@ void write_tree() {
 
 void main() {
     KdLevel level = levels[stage.level_ix];
-    uint begin = index_of_group() * KD_BLOCK_SIZE + gl_LocalInvocationIndex;
-    for (uint row = 0u; row < KD_ROWS; ++row) {
-        uint i = begin + row * SCAN_GROUP_SIZE;
-        if (i >= level.n_new_pairs) break;
-        uint built_ix = level.n_pairs - level.n_new_pairs + i;
-        if (built_ix == 0u) {
-            write_node(0u, 0u, uvec2(1u, 0u));
-            nodes[1] = KdNode(0u, KD_LEAF);
-            parents[0] = 0u;
-            write_tree();
-            continue;
-        }
-        uvec2 place = places[built_parents[built_ix]];
-        uvec2 first = uvec2(place.x + 1u, place.y);
-        write_node(2u * built_ix, 2u * place.x, first);
-        write_node(2u * built_ix + 1u, 2u * place.x + 1u, first + below[2u * built_ix]);
+    if (index_of_entry() >= level.n_new_pairs) return;
+    uint built_ix = level.n_pairs - level.n_new_pairs + index_of_entry();
+    if (built_ix == 0u) {
+        write_node(0u, 0u, uvec2(1u, 0u));
+        nodes[1] = KdNode(0u, KD_LEAF);
+        parents[0] = 0u;
+        write_tree();
+        return;
     }
+    uvec2 place = places[built_parents[built_ix]];
+    uvec2 first = uvec2(place.x + 1u, place.y);
+    write_node(2u * built_ix, 2u * place.x, first);
+    write_node(2u * built_ix + 1u, 2u * place.x + 1u, first + below[2u * built_ix]);
 }

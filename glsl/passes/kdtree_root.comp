@@ -27,21 +27,28 @@ uint finest_needed(float largest) {
 }
 
 void set_groups() {
-    uvec3 cells = groups_of(1u), references = groups_of(blocks_of(build.n_finite));
+    uvec3 one = dispatch_of(1u), references = dispatch_of(groups_over(build.n_finite));
+    uvec3 blocks = dispatch_of(blocks_of(build.n_finite));
     uint n_bin_blocks = build.n_finite > KD_BIN_BLOCK ? (build.n_finite + KD_BIN_BLOCK - 1u) / KD_BIN_BLOCK : 0u;
-    uvec3 bins = groups_of(n_bin_blocks);
+    uvec3 bins = dispatch_of(n_bin_blocks);
     levels[0].bin_groups_x = bins.x;
     levels[0].bin_groups_y = bins.y;
     levels[0].bin_groups_z = 1u;
-    levels[0].cell_groups_x = cells.x;
-    levels[0].cell_groups_y = cells.y;
-    levels[0].cell_groups_z = 1u;
+    levels[0].choose_groups_x = build.n_finite > KD_SMALL_CELL ? 1u : 0u;
+    levels[0].choose_groups_y = 1u;
+    levels[0].choose_groups_z = 1u;
+    levels[0].team_groups_x = 1u;
+    levels[0].team_groups_y = 1u;
+    levels[0].team_groups_z = 1u;
+    levels[0].block_groups_x = blocks.x;
+    levels[0].block_groups_y = blocks.y;
+    levels[0].block_groups_z = 1u;
     levels[0].reference_groups_x = references.x;
     levels[0].reference_groups_y = references.y;
     levels[0].reference_groups_z = 1u;
-    levels[0].cell_block_groups_x = cells.x;
-    levels[0].cell_block_groups_y = cells.y;
-    levels[0].cell_block_groups_z = 1u;
+    levels[0].cell_groups_x = one.x;
+    levels[0].cell_groups_y = one.y;
+    levels[0].cell_groups_z = 1u;
     levels[0].spine_groups_x = 1u;
     levels[0].spine_groups_y = 1u;
     levels[0].spine_groups_z = 1u;

@@ -1412,6 +1412,9 @@ struct GridSort {
 #define KD_GROUPS_X 1024u
 // The most references of a small cell, whose planes are all tried.
 #define KD_SMALL_CELL 64u
+// The least number of invocations that try the planes of a small cell, and the number of such teams in a workgroup.
+#define KD_TEAM_SIZE 32u
+#define KD_TEAMS 4u
 // The number of references that one workgroup counts by bins at a time. A cell with more is large.
 #define KD_BIN_BLOCK 4096u
 // Bins on an axis: two for each invocation of a workgroup.
@@ -1457,8 +1460,8 @@ struct KdBuild {
     uint max_cells;
     // The finest scale of the tree.
     uint finest;
-    // The index in scan_blocks at which blocks of cells begin. Blocks of references begin at 0.
-    uint cell_blocks_begin;
+    // The index in scan_blocks at which groups of cells begin. Blocks of references begin at 0.
+    uint cell_groups_begin;
     // Cells that became leaves because their children would have passed a capacity.
     uint n_limited;
     // Entries of all leaves, and pairs of nodes, the root's included.
@@ -1484,27 +1487,35 @@ struct KdLevel {
     uint n_new_pairs;
     // The first cell that is not split for lack of capacity. All cells after it become leaves, too.
     uint cutoff;
-    // Sums over the level: references below and above their cells' planes, splits, children with references, and
-    // references in leaves.
+    // Sums over the level: references below and above their cells' planes; and, once the cutoff is known, splits,
+    // children with references, references of these, and references in leaves.
     uint n_below;
     uint n_above;
     uint n_splits;
     uint n_open;
+    uint n_next;
     uint n_in_leaves;
-    // Workgroups over blocks of references that are counted by bins, over cells, over blocks of references, over blocks
-    // of cells, of a prefix sum, and over blocks of new pairs.
+    // Workgroups over blocks of references that are counted by bins, over those by which cells that are not small are
+    // found, over `KD_TEAMS` cells each, over blocks and over groups of references, over groups of cells, of a prefix
+    // sum, and over groups of new pairs.
     uint bin_groups_x;
     uint bin_groups_y;
     uint bin_groups_z;
-    uint cell_groups_x;
-    uint cell_groups_y;
-    uint cell_groups_z;
+    uint choose_groups_x;
+    uint choose_groups_y;
+    uint choose_groups_z;
+    uint team_groups_x;
+    uint team_groups_y;
+    uint team_groups_z;
+    uint block_groups_x;
+    uint block_groups_y;
+    uint block_groups_z;
     uint reference_groups_x;
     uint reference_groups_y;
     uint reference_groups_z;
-    uint cell_block_groups_x;
-    uint cell_block_groups_y;
-    uint cell_block_groups_z;
+    uint cell_groups_x;
+    uint cell_groups_y;
+    uint cell_groups_z;
     uint spine_groups_x;
     uint spine_groups_y;
     uint spine_groups_z;

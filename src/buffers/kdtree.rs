@@ -12,7 +12,7 @@ use crate::{
         BIND_KD_LEVELS, BIND_KD_NODES, BIND_KD_PARENTS, BIND_KD_PLACES, BIND_KD_REFERENCES_FROM, BIND_KD_REFERENCES_TO,
         BIND_KD_SCALE_COUNTS, BIND_KD_SCAN_BLOCKS, BIND_KD_SIDES, BIND_KD_SLAB_TREE, BIND_KD_TRIANGLES, KD_BIN_BLOCK,
         KD_BIN_WORDS, KD_BLOCK_SIZE, KD_LEVEL_RECORDS, KD_MOST_ENTRIES, KD_SCALES, KD_WORD_DEPTH, KdBuild, KdCell,
-        KdLevel, KdNode, KdReference, KdSlabTree, KdStage, LeafTriangle, Plane, Triangle,
+        KdLevel, KdNode, KdReference, KdSlabTree, KdStage, LeafTriangle, Plane, SCAN_GROUP_SIZE, Triangle,
     },
 };
 
@@ -142,8 +142,8 @@ impl KdTreeBuffers {
         let capacities = KdTreeCapacities::new(n_triangles, room, context.limits().storage_range);
         let [n_references, n_pairs, n_cells] =
             [capacities.n_references, capacities.n_pairs, capacities.n_cells].map(|n| n as usize);
-        let cell_blocks_begin = capacities.n_references.div_ceil(KD_BLOCK_SIZE);
-        let n_blocks = cell_blocks_begin + capacities.n_cells.div_ceil(KD_BLOCK_SIZE);
+        let cell_groups_begin = capacities.n_references.div_ceil(KD_BLOCK_SIZE);
+        let n_blocks = cell_groups_begin + capacities.n_cells.div_ceil(SCAN_GROUP_SIZE);
         let words = |name, n: usize| Buffer::<u32>::new(context, name, n, storage);
         let two_words = |name, n: usize| Buffer::<[u32; 2]>::new(context, name, n, storage);
         let references = |name| Buffer::<KdReference>::new(context, name, n_references, storage);
@@ -195,7 +195,7 @@ impl KdTreeBuffers {
             BindingSet::new(bindings, "kdtree", &objects)
         };
         let sets = [set([&from, &to], [&cells_from, &cells_to])?, set([&to, &from], [&cells_to, &cells_from])?];
-        let initial = initial_build(capacities, options, cell_blocks_begin);
+        let initial = initial_build(capacities, options, cell_groups_begin);
         Ok(Self {
             capacities,
             build,
@@ -224,7 +224,7 @@ impl KdTreeBuffers {
 }
 
 /// Returns the state of a build before it begins.
-fn initial_build(capacities: KdTreeCapacities, options: &BuildOptions, cell_blocks_begin: u32) -> KdBuild {
+fn initial_build(capacities: KdTreeCapacities, options: &BuildOptions, cell_groups_begin: u32) -> KdBuild {
     KdBuild {
         least_x: u32::MAX,
         least_y: u32::MAX,
@@ -237,7 +237,7 @@ fn initial_build(capacities: KdTreeCapacities, options: &BuildOptions, cell_bloc
         max_references: capacities.n_references,
         max_pairs: capacities.n_pairs,
         max_cells: capacities.n_cells,
-        cell_blocks_begin,
+        cell_groups_begin,
         entry_groups_z: 1,
         ..KdBuild::default()
     }

@@ -20,6 +20,9 @@ pub struct Tree {
     pub leaf_triangles: Vec<u32>,
 }
 
+/// The most corners of a clipped triangle.
+const MAX_CORNERS: usize = 9;
+
 /// Inputs of a build.
 struct Input<'a> {
     triangles: &'a [Triangle],
@@ -203,8 +206,12 @@ fn sort_out(
     let reach = input.margin + slack_of(triangle);
     let mut polygon = vec![triangle.v0.to_array(), triangle.v1.to_array(), triangle.v2.to_array()];
     for face in 0..3 {
-        polygon = cut(&polygon, face, false, cell.min[face] - reach);
-        polygon = cut(&polygon, face, true, cell.max[face] + reach);
+        for (is_above, limit) in [(false, cell.min[face] - reach), (true, cell.max[face] + reach)] {
+            polygon = cut(&polygon, face, is_above, limit);
+            if polygon.len() > MAX_CORNERS {
+                return parts.map(|part| Some((part, triangle_ix)));
+            }
+        }
     }
     let part = |limits: &Bounds, is_below, limit| {
         let corners = cut(&polygon, axis, is_below, limit);

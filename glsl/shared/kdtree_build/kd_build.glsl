@@ -4,11 +4,10 @@
 //   cell       a node's box. It is open until its kernels have split it or made it a leaf
 //   reference  a triangle in a cell; those of a cell are side by side, by ascending triangles
 //   pair       the two children of a split. Pair 0 is the root and an unused node
-//   cutoff     the first cell of a level whose children would pass a capacity
-//   block      KD_BLOCK_SIZE consecutive triangles, references, cells, pairs or entries
-//
-// Kernels over blocks have workgroups of SCAN_GROUP_SIZE invocations. A workgroup takes one block, in KD_ROWS rows of
-// one entry per invocation.
+//   block      KD_BLOCK_SIZE consecutive triangles or references. A workgroup takes them in KD_ROWS rows of one per
+//              invocation
+//   group      SCAN_GROUP_SIZE consecutive cells, references, pairs or entries, one for each invocation of a workgroup
+//   cutoff     the first cell of the first group of a level's cells whose children would pass a capacity
 #ifndef KDRAY_KD_BUILD
 #define KDRAY_KD_BUILD
 
@@ -23,13 +22,23 @@ uint blocks_of(uint n_entries) {
     return (n_entries + KD_BLOCK_SIZE - 1u) / KD_BLOCK_SIZE;
 }
 
+// The number of groups of n entries.
+uint groups_over(uint n) {
+    return (n + SCAN_GROUP_SIZE - 1u) / SCAN_GROUP_SIZE;
+}
+
 // The index of the workgroup. In the last row of workgroups, it may be beyond the last block or cell.
 uint index_of_group() {
     return gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
 }
 
+// The index of the invocation's entry among those of all groups. It may be beyond the last entry.
+uint index_of_entry() {
+    return index_of_group() * SCAN_GROUP_SIZE + gl_LocalInvocationIndex;
+}
+
 // The size of a dispatch of n workgroups or a few more.
-uvec3 groups_of(uint n) {
+uvec3 dispatch_of(uint n) {
     return uvec3(min(n, KD_GROUPS_X), (n + KD_GROUPS_X - 1u) / KD_GROUPS_X, 1u);
 }
 

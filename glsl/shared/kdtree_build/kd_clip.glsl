@@ -14,8 +14,9 @@
 
 #include "kdtree_build/kd_scales.glsl"
 
-// A clipped triangle has nine corners at most. A polygon that rounding has bent may need more.
-const uint MAX_CORNERS = 12u;
+// A triangle that six faces cut has nine corners at most. A polygon that rounding has bent may need more, and is then
+// not clipped. Polygons are in memory, and larger ones make all slower.
+const uint MAX_CORNERS = 9u;
 // The range of margins with which no product of coordinates overflows, and none that matters is denormal.
 const float LEAST_MARGIN_TO_CLIP = 8.0779357e-28; // 2^-90
 const float GREATEST_MARGIN_TO_CLIP = 1.2980742e33; // 2^110
@@ -43,8 +44,7 @@ vec3 crossing(vec3 a, vec3 b, uint axis, float position) {
     return point;
 }
 
-// Cuts off the part beyond a plane. Sets n to MAX_CORNERS + 1 if there are too
-// many corners.
+// Cuts off the part beyond a plane. Sets n to MAX_CORNERS + 1 if there are too many corners.
 void cut(inout Polygon polygon, uint axis, float side, float position) {
     bool is_cut = false;
     for (uint i = 0u; i < polygon.n; ++i) {

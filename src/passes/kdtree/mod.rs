@@ -9,12 +9,12 @@
 //! gather             writes its references
 //! each level, 0 to 32; without open cells, its dispatches have no workgroups
 //!   bins             counts the references of large cells by bins
-//!   choose           finds each cell's split, a workgroup a cell
+//!   choose           finds the split of each cell that is not small, a workgroup a cell
+//!   choose_small     finds the split of each small cell, a team of invocations a cell
 //!   sort_out         finds each reference's sides of its cell's plane, and clips triangles that the plane cuts
 //!   spine            prefix sums over blocks of references
 //!   count_cells      counts splits, open children and references in leaves
-//!   spine            prefix sums over blocks of cells
-//!   cut              finds the first cell whose children would pass a capacity
+//!   spine            prefix sums over groups of cells, and the first group whose children would pass a capacity
 //!   split_cells      writes nodes and the cells of the next level, and sizes its dispatches
 //!   scatter          writes the references of the next level, and those in leaves
 //! each level upwards
@@ -26,8 +26,8 @@
 //! ```
 //!
 //! Prefix sums give all places, and atomics only add, or find a least or greatest integer. So the same device builds
-//! the same tree, bit for bit. From the first cell of a level whose children would pass a capacity on, all cells of the
-//! level become leaves.
+//! the same tree, bit for bit. From the first group of a level's cells whose children would pass a capacity on, all
+//! cells of the level become leaves.
 //!
 //! Zhou, Hou, Wang and Guo, "Real-time KD-tree construction on graphics hardware", 2008; Wu, Zhao and Liu, "SAH KD-tree
 //! construction on GPU", 2011.
@@ -56,11 +56,11 @@ struct KdTreePasses {
     gather: ComputePipeline,
     bins: ComputePipeline,
     choose: ComputePipeline,
+    choose_small: ComputePipeline,
     sort_out: ComputePipeline,
     spine_references: ComputePipeline,
     count_cells: ComputePipeline,
     spine_cells: ComputePipeline,
-    cut: ComputePipeline,
     split_cells: ComputePipeline,
     scatter: ComputePipeline,
     sum: ComputePipeline,
@@ -90,11 +90,11 @@ impl KdTreePasses {
             gather: kernels.of_blocks("kdtree_gather", spirv!("kdtree_gather.comp"), &none)?,
             bins: kernels.of_blocks("kdtree_bins", spirv!("kdtree_bins.comp"), &none)?,
             choose: kernels.of_blocks("kdtree_choose", spirv!("kdtree_choose.comp"), &none)?,
+            choose_small: kernels.of_blocks("kdtree_choose_small", spirv!("kdtree_choose_small.comp"), &none)?,
             sort_out: kernels.of_blocks("kdtree_sort_out", spirv!("kdtree_sort_out.comp"), &none)?,
             spine_references: spine("kdtree_spine_references", KD_SCANS_REFERENCES)?,
             count_cells: kernels.of_blocks("kdtree_count_cells", spirv!("kdtree_count_cells.comp"), &none)?,
             spine_cells: spine("kdtree_spine_cells", KD_SCANS_CELLS)?,
-            cut: kernels.of_blocks("kdtree_cut", spirv!("kdtree_cut.comp"), &none)?,
             split_cells: kernels.of_blocks("kdtree_split_cells", spirv!("kdtree_split_cells.comp"), &none)?,
             scatter: kernels.of_blocks("kdtree_scatter", spirv!("kdtree_scatter.comp"), &none)?,
             sum: kernels.of_blocks("kdtree_sum", spirv!("kdtree_sum.comp"), &none)?,
@@ -144,27 +144,25 @@ impl KdTreePasses {
             let dispatch = Dispatch::Indirect(buffers.levels.any(), offset as u64);
             commands.dispatch(kernel, Some(level_ix), &KdStage { level_ix }, dispatch);
         };
-        let references = offset_of!(KdLevel, reference_groups_x);
-        let cell_blocks = offset_of!(KdLevel, cell_block_groups_x);
+        let cells = offset_of!(KdLevel, cell_groups_x);
         let spine = offset_of!(KdLevel, spine_groups_x);
         commands.bind(buffers.set_of(level_ix));
         run(&self.bins, offset_of!(KdLevel, bin_groups_x));
         then(commands);
-        run(&self.choose, offset_of!(KdLevel, cell_groups_x));
+        run(&self.choose, offset_of!(KdLevel, choose_groups_x));
+        run(&self.choose_small, offset_of!(KdLevel, team_groups_x)); // of other cells: no barrier
         then(commands);
-        run(&self.sort_out, references);
+        run(&self.sort_out, offset_of!(KdLevel, block_groups_x));
         then(commands);
         run(&self.spine_references, spine);
         then(commands);
-        run(&self.count_cells, cell_blocks);
+        run(&self.count_cells, cells);
         then(commands);
         run(&self.spine_cells, spine);
         then(commands);
-        run(&self.cut, cell_blocks);
+        run(&self.split_cells, cells);
         then(commands);
-        run(&self.split_cells, cell_blocks);
-        then(commands);
-        run(&self.scatter, references);
+        run(&self.scatter, offset_of!(KdLevel, reference_groups_x));
         then(commands);
     }
 
@@ -195,6 +193,7 @@ mod tests {
         let kernels = [
             spirv!("kdtree_bins.comp"),
             spirv!("kdtree_choose.comp"),
+            spirv!("kdtree_choose_small.comp"),
             spirv!("kdtree_gather.comp"),
             spirv!("kdtree_leaves.comp"),
             spirv!("kdtree_root.comp"),

@@ -1,0 +1,55 @@
+// Candidates for a cell's split, and the choice among them. Ties go to the lower axis, then to the lower plane.
+#ifndef KDRAY_KD_SPLITS
+#define KDRAY_KD_SPLITS
+
+#include "kdtree_build/kd_areas.glsl"
+
+layout(std430, set = 0, binding = BIND_KD_CELLS_FROM) buffer CellsFromBlock { KdCell cells_from[]; };
+layout(std430, set = 0, binding = BIND_KD_REFERENCES_FROM) readonly buffer ReferencesFromBlock {
+    KdReference references_from[];
+};
+
+// The best split of each subgroup: weight, axis and position, as integers that sort like them.
+shared uvec3 best_of_subgroups[SCAN_GROUP_SIZE / 4u];
+
+const uvec3 NO_SPLIT = uvec3(0x7f800000u, KD_NO_AXIS, 0xffffffffu);
+
+bool is_before(uvec3 a, uvec3 b) {
+    if (a.x != b.x) return a.x < b.x;
+    return a.y != b.y ? a.y < b.y : a.z < b.z;
+}
+
+bool is_inside(Areas areas, float position) {
+    return position > areas.least && position < areas.greatest;
+}
+
+// Replaces the best split by that at a position inside the cell if the latter is better.
+void consider(inout uvec3 best, Areas areas, uint axis, float position, uvec2 n) {
+    uvec3 split = uvec3(floatBitsToUint(weight_of(areas, position, n.x, n.y)), axis, ordered(position));
+    if (is_before(split, best)) best = split;
+}
+
+// The best of the splits of all invocations of some successive subgroups. Needs uniform control flow.
+uvec3 best_of(uvec3 mine, uint first_subgroup, uint n_subgroups) {
+    uvec3 best;
+    best.x = subgroupMin(mine.x);
+    best.y = subgroupMin(mine.x == best.x ? mine.y : 0xffffffffu);
+    best.z = subgroupMin(mine.xy == best.xy ? mine.z : 0xffffffffu);
+    if (subgroupElect()) best_of_subgroups[gl_SubgroupID] = best;
+    barrier();
+    for (uint i = first_subgroup; i < first_subgroup + n_subgroups; ++i) {
+        if (is_before(best_of_subgroups[i], best)) best = best_of_subgroups[i];
+    }
+    return best;
+}
+
+// Writes the split of a cell of n references, if it is cheaper than a leaf.
+void write_split(uint cell_ix, uint n, uvec3 best) {
+    precise float leaf_cost = build.intersection_cost * float(n);
+    precise float cost = build.traversal_cost + build.intersection_cost * uintBitsToFloat(best.x);
+    bool pays = best.y < KD_NO_AXIS && cost < leaf_cost;
+    cells_from[cell_ix].axis = pays ? best.y : KD_NO_AXIS;
+    cells_from[cell_ix].position = from_ordered(best.z);
+}
+
+#endif
