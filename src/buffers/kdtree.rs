@@ -12,7 +12,7 @@ use crate::{
         BIND_KD_LEVELS, BIND_KD_NODES, BIND_KD_PARENTS, BIND_KD_PLACES, BIND_KD_REFERENCES_FROM, BIND_KD_REFERENCES_TO,
         BIND_KD_SCALE_COUNTS, BIND_KD_SCAN_BLOCKS, BIND_KD_SIDES, BIND_KD_SLAB_TREE, BIND_KD_TRIANGLES, KD_BIN_BLOCK,
         KD_BIN_WORDS, KD_BLOCK_SIZE, KD_LEVEL_RECORDS, KD_MOST_ENTRIES, KD_SCALES, KD_WORD_DEPTH, KdBuild, KdCell,
-        KdLevel, KdNode, KdReference, KdSlabTree, KdStage, LeafTriangle, Plane, SCAN_GROUP_SIZE, Triangle,
+        KdLevel, KdNode, KdReference, KdSlabPatch, KdSlabTree, KdStage, LeafTriangle, Plane, SCAN_GROUP_SIZE, Triangle,
     },
 };
 
@@ -69,7 +69,7 @@ impl KdTreeCapacities {
         Self {
             n_triangles,
             n_references: most(references, size_of::<LeafTriangle>()).max(n_triangles),
-            n_pairs: most(pairs, 2 * size_of::<KdNode>()),
+            n_pairs: most(pairs, 2 * size_of::<KdSlabPatch>()), // the largest element of a node
             n_cells: most(cells, size_of::<KdCell>()),
         }
     }
