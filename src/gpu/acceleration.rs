@@ -42,22 +42,7 @@ impl DriverAccel {
     /// The context was opened without ray tracing.
     pub fn new<T: Pod>(context: &Arc<Context>, triangles: &[T]) -> Result<Self, GpuError> {
         let corners = Buffer::with(context, "driver_accel corners", triangles, BufferUse::Structure)?;
-        let data = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
-            .vertex_format(vk::Format::R32G32B32_SFLOAT)
-            .vertex_data(vk::DeviceOrHostAddressConstKHR { device_address: corners.any().address() })
-            .vertex_stride(16)
-            .max_vertex((3 * triangles.len() as u32).saturating_sub(1))
-            .index_type(vk::IndexType::NONE_KHR);
-        let bottom = Contents {
-            name: "bottom level",
-            ty: vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL,
-            geometry: vk::AccelerationStructureGeometryKHR::default()
-                .geometry_type(vk::GeometryTypeKHR::TRIANGLES)
-                .geometry(vk::AccelerationStructureGeometryDataKHR { triangles: data })
-                .flags(vk::GeometryFlagsKHR::OPAQUE),
-            n_primitives: triangles.len() as u32,
-        };
-        let (bottom, build_ms) = Level::build(context, &bottom)?;
+        let (bottom, build_ms) = Level::build(context, &Contents::of_triangles(&corners, triangles.len()))?;
         let instances =
             Buffer::with(context, "driver_accel instance", &[instance_of(bottom.address())], BufferUse::Structure)?;
         let data = vk::AccelerationStructureGeometryInstancesDataKHR::default()
@@ -72,6 +57,21 @@ impl DriverAccel {
         };
         let (top, _) = Level::build(context, &top)?;
         Ok(Self { top, _bottom: bottom, build_ms })
+    }
+
+    /// Builds a bottom level that can be refitted, and refits it `n_times` to the same triangles. Returns the GPU times
+    /// of the refits, milliseconds; none without timestamps. `triangles`: see [`DriverAccel::new`].
+    ///
+    /// # Errors
+    /// Memory is exhausted.
+    ///
+    /// # Panics
+    /// The context was opened without ray tracing.
+    pub fn refits<T: Pod>(context: &Arc<Context>, triangles: &[T], n_times: usize) -> Result<Vec<f64>, GpuError> {
+        let corners = Buffer::with(context, "driver_accel corners", triangles, BufferUse::Structure)?;
+        let contents = Contents::of_triangles(&corners, triangles.len());
+        let (_, ms) = Level::build_and_refit(context, &contents, n_times)?;
+        Ok(ms.into_iter().skip(1).flatten().collect())
     }
 
     /// Returns the address of the top level, which a ray generation shader takes as `accelerationStructureEXT`.
@@ -98,15 +98,51 @@ fn instance_of(address: u64) -> [u32; 16] {
     words
 }
 
+impl Contents<'_> {
+    /// Inputs of a bottom level. `corners`: those of [`DriverAccel::new`].
+    fn of_triangles<T: Pod>(corners: &Buffer<T>, n: usize) -> Self {
+        let data = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
+            .vertex_format(vk::Format::R32G32B32_SFLOAT)
+            .vertex_data(vk::DeviceOrHostAddressConstKHR { device_address: corners.any().address() })
+            .vertex_stride(16)
+            .max_vertex((3 * n as u32).saturating_sub(1))
+            .index_type(vk::IndexType::NONE_KHR);
+        Self {
+            name: "bottom level",
+            ty: vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL,
+            geometry: vk::AccelerationStructureGeometryKHR::default()
+                .geometry_type(vk::GeometryTypeKHR::TRIANGLES)
+                .geometry(vk::AccelerationStructureGeometryDataKHR { triangles: data })
+                .flags(vk::GeometryFlagsKHR::OPAQUE),
+            n_primitives: n as u32,
+        }
+    }
+}
+
 impl Level {
     /// Builds a level on the device and waits for it. Also returns the GPU time of the build, milliseconds, unless
     /// the queue writes no timestamps.
     fn build(context: &Arc<Context>, contents: &Contents) -> Result<(Self, Option<f64>), GpuError> {
+        let (level, ms) = Self::build_and_refit(context, contents, 0)?;
+        Ok((level, ms[0]))
+    }
+
+    /// Builds a level, which can be refitted unless `n_refits` is 0, and refits it so often. Returns the GPU times of
+    /// the build and of each refit.
+    fn build_and_refit(
+        context: &Arc<Context>,
+        contents: &Contents,
+        n_refits: usize,
+    ) -> Result<(Self, Vec<Option<f64>>), GpuError> {
         let calls = RayTracingCalls::of(context);
         let geometries = [contents.geometry];
+        let mut flags = vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE;
+        if n_refits > 0 {
+            flags |= vk::BuildAccelerationStructureFlagsKHR::ALLOW_UPDATE;
+        }
         let mut info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
             .ty(contents.ty)
-            .flags(vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE)
+            .flags(flags)
             .mode(vk::BuildAccelerationStructureModeKHR::BUILD)
             .geometries(&geometries);
         let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
@@ -134,21 +170,39 @@ impl Level {
 
         // The extra bytes leave room to round the address up.
         let alignment = u64::from(calls.scratch_alignment);
-        let n_scratch = (sizes.build_scratch_size + alignment) as usize;
+        let n_scratch = (sizes.build_scratch_size.max(sizes.update_scratch_size) + alignment) as usize;
         let scratch = Buffer::<u8>::new(context, "scratch", n_scratch, BufferUse::Structure)?;
         let device_address = scratch.any().address().next_multiple_of(alignment);
         info = info.dst_acceleration_structure(raw).scratch_data(vk::DeviceOrHostAddressKHR { device_address });
         let timer = Timer::new(context, 1)?;
-        let buffer = CommandBuffer::record(context, contents.name, Some(&timer), |commands| {
+        let mut all_ms = Vec::new();
+        for i in 0..=n_refits {
+            if i > 0 {
+                info = info.mode(vk::BuildAccelerationStructureModeKHR::UPDATE).src_acceleration_structure(raw);
+            }
+            all_ms.push(level.time(&timer, calls, contents, &info)?);
+        }
+        Ok((level, all_ms))
+    }
+
+    /// Runs a build or a refit and waits for it.
+    fn time(
+        &self,
+        timer: &Timer,
+        calls: &RayTracingCalls,
+        contents: &Contents,
+        info: &vk::AccelerationStructureBuildGeometryInfoKHR,
+    ) -> Result<Option<f64>, GpuError> {
+        let context = &self.context;
+        let buffer = CommandBuffer::record(context, contents.name, Some(timer), |commands| {
             commands.reset_timer();
             commands.barrier(Access::TransferWrite, Access::StructureBuild); // corners, instances
             commands.barrier(Access::StructureBuild, Access::StructureBuild); // the level below
-            commands.pass(contents.name, None, || build(commands, calls, &info, contents.n_primitives));
+            commands.pass(contents.name, None, || build(commands, calls, info, contents.n_primitives));
             commands.barrier(Access::StructureBuild, Access::RayTracingUpdate); // this level
         })?;
         context.wait_for(context.submit(vec![buffer])?)?;
-        let ms = timer.rows()?[0].span_ms.map(|(begin, end)| end - begin);
-        Ok((level, ms))
+        Ok(timer.rows()?[0].span_ms.map(|(begin, end)| end - begin))
     }
 
     fn address(&self) -> u64 {

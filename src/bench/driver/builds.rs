@@ -27,7 +27,10 @@ pub struct Builds {
     pub n_threads: usize,
     /// Time of the driver's structure on the GPU; none where the device has no timestamps.
     pub bvh_ms: Option<Spread>,
-    /// Number of timed builds of each structure on the GPU, the driver's and kdray's.
+    /// Time of refitting the driver's structure to triangles that have moved; it is built to allow that. None where
+    /// the device has no timestamps.
+    pub refit_ms: Option<Spread>,
+    /// Number of timed builds of each structure on the GPU, the driver's and kdray's, and of refits.
     pub n_bvh_builds: usize,
     /// Times of kdray's kd-tree, with slabs, and grids on the GPU. There is no kd-tree where the device has too little
     /// room to build it.
@@ -60,6 +63,7 @@ impl Builds {
             driver_accel = DriverAccel::new(context, triangles)?;
             bvh_ms.push(driver_accel.build_ms());
         }
+        let refit_ms = DriverAccel::refits(context, triangles, N_BUILDS)?;
         let grids = [(AccelKind::Grid, GridOptions::uniform()), (AccelKind::Grid2, GridOptions::two_level())];
         let mut on_device: Vec<_> = DeviceBuilds::of_tree(context, triangles)?.into_iter().collect();
         for (kind, options) in &grids {
@@ -69,6 +73,7 @@ impl Builds {
             tree_ms: stage.tree_build_ms,
             n_threads: rayon::current_num_threads(),
             bvh_ms: Spread::of(bvh_ms.into_iter().flatten()),
+            refit_ms: Spread::of(refit_ms),
             n_bvh_builds: N_BUILDS,
             on_device,
         };

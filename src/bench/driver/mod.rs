@@ -6,10 +6,12 @@
 //! contest   contenders that take turns on a device -> times, hits
 //!   pipeline  the contender that uses VK_KHR_ray_tracing_pipeline; nothing else in kdray uses that extension
 //! raster    rasterization in place of primary rays -> times
+//! changing  times of builds and of rays -> times of frames in which all triangles have moved
 //! report    the results, in numbers and as a chart
 //! ```
 
 pub mod builds;
+pub mod changing;
 pub mod contest;
 mod pipeline;
 pub mod raster;
@@ -46,6 +48,9 @@ pub const VARIANTS: [Search; 5] = [
     Search::Grid2,
 ];
 
+/// The name of the first search through the kd-tree that the device builds.
+const GPU_TREE: &str = "mask, GPU's tree";
+
 /// One of kdray's structures on the device, with all data that the searches of [`VARIANTS`] read.
 struct Structure {
     /// The searches, each with its name.
@@ -70,8 +75,7 @@ impl Structure {
 
     /// Lets the device build a kd-tree, for the default traversal.
     fn of_device_tree(context: &Arc<Context>, stage: &Stage) -> Result<Self, GpuError> {
-        let name = format!("{}, GPU's tree", VARIANTS[0]);
-        Self::new(context, stage.geometry_of_device_tree(), vec![(VARIANTS[0], name)])
+        Self::new(context, stage.geometry_of_device_tree(), vec![(VARIANTS[0], GPU_TREE.to_owned())])
     }
 
     fn new(context: &Arc<Context>, geometry: Geometry, searches: Vec<(Search, String)>) -> Result<Self, GpuError> {

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{builds::Builds, contest::ContenderResult};
+use super::{builds::Builds, changing::ChangingFrames, contest::ContenderResult};
 use crate::{
     accel::kdtree::Statistics,
     bench::{
@@ -138,6 +138,8 @@ pub struct Report {
     pub sets: Vec<SetResult>,
     /// One entry per method of rasterization.
     pub raster: Vec<RasterResult>,
+    /// Frames of a scene that changes, for each set and each structure that the GPU builds.
+    pub changing: Vec<ChangingFrames>,
 }
 
 impl Report {

@@ -7,6 +7,7 @@ use kdray::{
         driver::{
             DeviceStage,
             builds::Builds,
+            changing::{ChangingFrames, MRAYS, changing_frames},
             report::{RasterResult, Report, SetResult, Timing},
         },
         rays::{RayKind, ray_sets},
@@ -53,6 +54,7 @@ pub fn run(args: &DriverArgs) -> Result<(), CliError> {
         report.raster.extend(rasters);
     }
     drop(progress);
+    report.changing = changing_frames(&report.builds, &report.sets);
     args.files.write(&report, || report.chart().svg())?;
     print(&text(&report))?;
     check_hits(&report)
@@ -81,6 +83,7 @@ fn empty_report(args: &DriverArgs, stage: &Stage, device: &Device, builds: Build
         builds,
         sets: Vec::new(),
         raster: Vec::new(),
+        changing: Vec::new(),
     }
 }
 
@@ -107,7 +110,25 @@ fn text(report: &Report) -> String {
     text += &format!("another distance by more than {:.1e} of it.\n", report.t_tolerance);
     text.extend(report.raster.iter().map(passes_text));
     text += &builds_text(&report.builds);
-    text
+    text + &changing_text(&report.changing)
+}
+
+/// A table of the frames of a changing scene; nothing without timestamps.
+fn changing_text(frames: &[ChangingFrames]) -> String {
+    if frames.is_empty() {
+        return String::new();
+    }
+    let row = |frame: &ChangingFrames| {
+        let [a, b, c, d] = frame.ms.map(|ms| format!("{ms:.2}"));
+        let ahead = decimal(frame.ahead_from_mrays, 1);
+        [frame.rays.name().to_owned(), frame.by.clone(), format!("{:.2}", frame.build_ms), a, b, c, d, ahead]
+    };
+    let [a, b, c, d] = MRAYS.map(|mrays| format!("{mrays} M"));
+    let rows: Vec<_> = frames.iter().map(row).collect();
+    "\nA frame in which all triangles have moved, ms: the build of a structure, and so many rays. Ahead from: million\n\
+     rays a frame from which it takes less time than the driver's structure, built anew.\n\n"
+        .to_owned()
+        + &table(["rays", "by", "build", &a, &b, &c, &d, "ahead from"], &rows)
 }
 
 fn cells(set: &SetResult, by: &str, timing: &Timing, ratio: Option<f64>, n_differing: Option<u64>) -> [String; 8] {
@@ -130,7 +151,7 @@ fn passes_text(raster: &RasterResult) -> String {
 }
 
 fn builds_text(builds: &Builds) -> String {
-    let Builds { tree_ms, n_threads, bvh_ms, n_bvh_builds, on_device } = builds;
+    let Builds { tree_ms, n_threads, bvh_ms, n_bvh_builds, on_device, .. } = builds;
     let bvh_ms = decimal(bvh_ms.map(|ms| ms.median), 3);
     let mut text = format!(
         "Built: the driver's tree in {bvh_ms} ms of the GPU (median of {n_bvh_builds}), the kd-tree in {tree_ms:.0} ms \
@@ -180,10 +201,19 @@ mod tests {
         };
         let set = |kind: RayKind| {
             let n_wrong = if kind == RayKind::Primary { n_wrong } else { 0 };
-            SetResult::new(kind, &[trial("driver", 4.0, 0), trial("mask", 2.0, 0), trial("stack", 4.0, n_wrong)])
+            let grid = trial("grid", 1.0, 0);
+            SetResult::new(kind, &[trial("driver", 4.0, 0), trial("mask", 2.0, 0), trial("stack", 4.0, n_wrong), grid])
         };
         let sets = RayKind::ALL.map(set);
         let ms = |ms| Spread::of([ms]);
+        let builds = Builds {
+            tree_ms: 1234.5,
+            n_threads: 2,
+            bvh_ms: ms(1.5),
+            refit_ms: ms(0.25),
+            n_bvh_builds: 5,
+            on_device: vec![DeviceBuilds { accel: "grid".to_owned(), ms: ms(0.5), stages: Vec::new() }],
+        };
         let pass = |name, pass_ms| PassSpread { name, ms: ms(pass_ms).unwrap() };
         Report {
             suite: "driver",
@@ -197,13 +227,8 @@ mod tests {
             tree: KdTree::build(&[], &BuildOptions::default()).statistics(0, &BuildOptions::default()),
             n_times: 3,
             t_tolerance: T_TOLERANCE,
-            builds: Builds {
-                tree_ms: 1234.5,
-                n_threads: 2,
-                bvh_ms: ms(1.5),
-                n_bvh_builds: 5,
-                on_device: vec![DeviceBuilds { accel: "grid".to_owned(), ms: ms(0.5), stages: Vec::new() }],
-            },
+            changing: changing_frames(&builds, &sets),
+            builds,
             raster: vec![
                 RasterResult::new(
                     "raster".to_owned(),
