@@ -16,6 +16,9 @@
 // (search/suspended_rays.glsl); writes listed_hits.
 #include "layout.glsl"
 
+layout(push_constant) uniform CastBatchBlock { CastBatch batch; };
+#define MASK_OF_CAST batch.mask
+
 const bool COUNT_COSTS = false;
 const bool TESTS_BLENDED = false;
 const bool FROM_CAMERA = false;
@@ -27,7 +30,6 @@ const bool FROM_CAMERA = false;
 layout(constant_id = CONSTANT_LISTS_HITS) const bool LISTS_HITS = false;
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
-layout(push_constant) uniform CastBatchBlock { CastBatch batch; };
 layout(std430, set = 0, binding = BIND_CAST_RAYS) readonly buffer CastRaysBlock { Ray cast_rays[]; };
 layout(std430, set = 0, binding = BIND_HIT_CURSORS) buffer HitCursorsBlock { HitCursor hit_cursors[]; };
 layout(std430, set = 0, binding = BIND_LISTED_HITS) writeonly buffer ListedHitsBlock { Hit listed_hits[]; };

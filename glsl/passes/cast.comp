@@ -6,6 +6,9 @@
 // (search/suspended_rays.glsl).
 #include "layout.glsl"
 
+layout(push_constant) uniform CastBatchBlock { CastBatch batch; };
+#define MASK_OF_CAST batch.mask
+
 const bool COUNT_COSTS = false;
 const bool TESTS_BLENDED = false;
 const bool FROM_CAMERA = false;
@@ -16,7 +19,6 @@ const bool FROM_CAMERA = false;
 layout(constant_id = CONSTANT_ANY_HIT) const bool ANY_HIT = false;
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
-layout(push_constant) uniform CastBatchBlock { CastBatch batch; };
 layout(std430, set = 0, binding = BIND_CAST_RAYS) readonly buffer CastRaysBlock { Ray cast_rays[]; };
 layout(std430, set = 0, binding = BIND_CAST_HITS) buffer CastHitsBlock { Hit cast_hits[]; };
 

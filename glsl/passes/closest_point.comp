@@ -10,6 +10,8 @@
 // of them that may be closer (instances/closest.glsl).
 #include "layout.glsl"
 
+layout(push_constant) uniform CastBatchBlock { CastBatch batch; };
+
 const bool COUNT_COSTS = false;
 const bool PREDICATES_BRANCHES = false;
 #include "constants.glsl"
@@ -28,7 +30,6 @@ const bool PREDICATES_BRANCHES = false;
 layout(constant_id = CONSTANT_SKIPS_HIDDEN) const bool SKIPS_HIDDEN = false;
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
-layout(push_constant) uniform CastBatchBlock { CastBatch batch; };
 layout(std430, set = 0, binding = BIND_CAST_POINTS) readonly buffer CastPointsBlock { QueryPoint cast_points[]; };
 layout(std430, set = 0, binding = BIND_CAST_HITS) buffer CastHitsBlock { Hit cast_hits[]; };
 

@@ -297,10 +297,13 @@ struct Instance {
 // `Instance.flags`: the linear map is a reflection. The second and the third corner of each triangle are swapped in the
 // world, so that its outside stays outside.
 #define INSTANCE_MIRRORED 1u
-// `Instance.flags`: rays of the camera, shadow rays, and all other rays meet the instance.
+// `Instance.flags`: rays of the camera, and shadow rays, meet the instance.
 #define INSTANCE_FOR_CAMERA 2u
 #define INSTANCE_FOR_SHADOWS 4u
-#define INSTANCE_FOR_OTHERS 8u
+// `Instance.flags`: the instance's mask. A cast meets the instance if their masks have a bit in common, all other rays
+// of paths meet it if it has any.
+#define INSTANCE_FOR_OTHERS 0xff000000u
+#define INSTANCE_MASK_SHIFT 24u
 
 // What a search through a geometry needs beside the arrays, 48 bytes. `box_min`, `box_max`, `plane_epsilon` and
 // `origin_reach` are those of `AccelConstants`, in the geometry's space.
@@ -1252,10 +1255,12 @@ struct RasterPush {
 // - `n_rays`: rays of the cast.
 // - `lanes_log2`: each ray has `2^lanes_log2` lanes, of which the first works.
 // - `resume_pass`: `PASS_BEGIN` and its like.
+// - `mask`: the cast's mask, shifted as that in `Instance.flags`.
 struct CastBatch {
     uint n_rays;
     uint lanes_log2;
     uint resume_pass;
+    uint mask;
 };
 
 // How far a ray is on its way from hit to hit, 28 bytes (all_hits.comp).

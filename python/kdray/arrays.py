@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 _CPU = 1  # kDLCPU of dlpack.h
+_ALL_BITS = 0xFF
 
 
 def as_array(name: str, value: Any) -> NDArray[Any]:
@@ -68,6 +69,24 @@ def integer(name: str, value: Any, least: int = 0) -> int:
     if not least <= number < 2**32:
         raise ValueError(f"{name}: expected an integer from {least} on, not {number}")
     return number
+
+
+def mask(name: str, value: Any, least: int) -> int:
+    """Returns a mask of 8 bits that is at least ``least``."""
+    number = integer(name, value, least)
+    if number > _ALL_BITS:
+        raise ValueError(f"{name}: expected an integer up to 255, not {number}")
+    return number
+
+
+def ids(name: str, value: Any) -> NDArray[np.uint32]:
+    """Returns ids of geometries, (N,) uint32; (1,) for one integer. Whether they exist is checked later."""
+    array = np.atleast_1d(as_array(name, value))
+    if array.ndim != 1 or (array.size and array.dtype.kind not in "iu"):
+        raise ValueError(f"{name}: expected integers of the shape (N,), not {array.dtype} of {array.shape}")
+    if array.size and not 0 <= array.min() <= array.max() < 2**32:
+        raise IndexError(f"{name}: there is no geometry {array.min()} or {array.max()}")
+    return np.ascontiguousarray(array, np.uint32)
 
 
 def vector(name: str, value: Any) -> NDArray[np.float64]:

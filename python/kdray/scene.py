@@ -80,7 +80,9 @@ class RaycastingScene:
 
     # What the scene holds
 
-    def add_triangles(self, vertex_positions: Any, triangle_indices: ArrayLike | None = None) -> int:
+    def add_triangles(
+        self, vertex_positions: Any, triangle_indices: ArrayLike | None = None, *, mask: int = 0xFF
+    ) -> int:
         """Adds a geometry, and returns its id: 0, 1, 2, ... No id is given out twice.
 
         Parameters
@@ -88,6 +90,7 @@ class RaycastingScene:
         vertex_positions : (N, 3) float32 or float64. Or a mesh with ``vertices`` and ``faces`` as trimesh's, or with
             ``vertex.positions`` and ``triangle.indices`` as Open3D's; then there is no other argument.
         triangle_indices : (M, 3) integers, the indices of each triangle's vertices.
+        mask : 0 to 255. See :meth:`set_masks`.
         """
         if triangle_indices is None:
             vertex_positions, triangle_indices = _parts_of_mesh(vertex_positions)
@@ -96,7 +99,7 @@ class RaycastingScene:
         if not self._has_origin:
             self._origin = _origin_of(vertices)
             self._has_origin = True
-        return self._core.add(arrays.relative(vertices, self._origin), triangles)
+        return self._core.add(arrays.relative(vertices, self._origin), triangles, arrays.mask("mask", mask, 0))
 
     def update_vertices(self, id: int, vertex_positions: ArrayLike, first: int = 0) -> None:
         """Replaces vertices of a geometry, from the index ``first`` on: (N, 3). Triangles and transform stay."""
@@ -113,20 +116,32 @@ class RaycastingScene:
         transforms : (N, 3, 4) or (N, 4, 4), from the geometries' vertices, as they were given, to the world. Each one
             replaces the transform before. No transform may flatten its geometry.
         """
-        id_array = np.atleast_1d(arrays.as_array("ids", ids))
-        if id_array.ndim != 1 or (id_array.size and id_array.dtype.kind not in "iu"):
-            raise ValueError(f"ids: expected integers of the shape (N,), not {id_array.dtype} of {id_array.shape}")
+        id_array = arrays.ids("ids", ids)
         matrices = arrays.floats("transforms", transforms, "(N, 3, 4)", (4,)).astype(np.float64)
         if matrices.ndim == 2:
             matrices = matrices[None]
         if matrices.shape not in [(len(id_array), 3, 4), (len(id_array), 4, 4)]:
             raise ValueError(f"transforms: expected the shape ({len(id_array)}, 3, 4), not {matrices.shape}")
-        if id_array.size and not 0 <= id_array.min() <= id_array.max() < 2**32:
-            raise IndexError(f"ids: there is no geometry {id_array.min()} or {id_array.max()}")
         affine = np.ascontiguousarray(matrices[:, :3])
         # Inside, points are relative to the origin c: A (p + c) + b - c.
         affine[:, :, 3] += affine[:, :, :3] @ self._origin - self._origin
-        self._core.set_transforms(np.ascontiguousarray(id_array, np.uint32), affine)
+        self._core.set_transforms(id_array, affine)
+
+    def set_masks(self, ids: ArrayLike, masks: ArrayLike) -> None:
+        """Says which queries meet which geometries: those whose ``mask`` has a bit in common with the geometry's.
+
+        A query without a mask has all bits, 0xff, as a geometry without one.
+
+        Parameters
+        ----------
+        ids : (N,) integers. One integer masks one geometry.
+        masks : (N,) integers from 0 to 255, or one for all. A geometry with 0 is met by no query.
+        """
+        id_array, values = arrays.ids("ids", ids), arrays.as_array("masks", masks)
+        if values.shape not in [(), id_array.shape]:
+            raise ValueError(f"masks: expected the shape ({len(id_array)},), not {values.shape}")
+        checked = [arrays.mask("masks", value, 0) for value in values.reshape(-1)]
+        self._core.set_masks(id_array, np.broadcast_to(np.array(checked, np.uint8), id_array.shape).copy())
 
     def remove(self, id: int) -> None:
         """Removes a geometry. The ids of all others stay."""
@@ -141,6 +156,7 @@ class RaycastingScene:
         *,
         t_min: ArrayLike = 0.0,
         t_max: ArrayLike = np.inf,
+        mask: int = 0xFF,
         out: dict[str, NDArray[Any]] | None = None,
     ) -> dict[str, NDArray[Any]]:
         """Finds the nearest hit of each ray.
@@ -151,6 +167,7 @@ class RaycastingScene:
         nthreads : threads of the CPU; 0: as many as the scene's.
         t_min, t_max : a hit at origin + t * direction counts if t_min < t <= t_max. One number, or one per ray (...).
             Rays of the shape (..., 8) have their own.
+        mask : 1 to 255. Geometries without a bit in common with it are not there. See :meth:`set_masks`.
         out : arrays for some or all of the results, C-contiguous and of the types and shapes below. Only they are
             returned.
 
@@ -167,29 +184,42 @@ class RaycastingScene:
         """
         rows, shape = arrays.rays("rays", rays, self._origin)
         outputs, results = _outputs(shape, _OF_RAYS, out)
-        self._core.cast(rows, _range(shape, t_min, t_max), self._threads(nthreads), outputs)
+        self._core.cast(rows, _range(shape, t_min, t_max), _mask(mask), self._threads(nthreads), outputs)
         return results
 
     def test_occlusions(
-        self, rays: ArrayLike, tnear: ArrayLike = 0.0, tfar: ArrayLike = np.inf, nthreads: int = 0
+        self,
+        rays: ArrayLike,
+        tnear: ArrayLike = 0.0,
+        tfar: ArrayLike = np.inf,
+        nthreads: int = 0,
+        *,
+        mask: int = 0xFF,
     ) -> NDArray[np.bool_]:
         """Tells of each ray whether it hits anything: (...) bool. See :meth:`cast_rays`.
 
-        ``tnear`` and ``tfar``: a hit counts if tnear < t <= tfar. One number, or one per ray (...).
+        ``tnear`` and ``tfar``: a hit counts if tnear < t <= tfar. One number, or one per ray (...). ``mask`` is as in
+        :meth:`cast_rays`, here and in all other queries.
         """
         rows, shape = arrays.rays("rays", rays, self._origin)
         hits = np.zeros(len(rows), np.bool_)
         t_range = _range(shape, tnear, tfar, ("tnear", "tfar"))
-        self._core.occluded(rows, t_range, self._threads(nthreads), hits)
+        self._core.occluded(rows, t_range, _mask(mask), self._threads(nthreads), hits)
         return hits.reshape(shape)
 
     def count_intersections(
-        self, rays: ArrayLike, nthreads: int = 0, *, t_min: ArrayLike = 0.0, t_max: ArrayLike = np.inf
+        self,
+        rays: ArrayLike,
+        nthreads: int = 0,
+        *,
+        t_min: ArrayLike = 0.0,
+        t_max: ArrayLike = np.inf,
+        mask: int = 0xFF,
     ) -> NDArray[np.int32]:
         """Counts the triangles that each ray hits: (...) int32. Triangles that coincide count one by one."""
         rows, shape = arrays.rays("rays", rays, self._origin)
         counts = np.zeros(len(rows), np.int32)
-        self._core.count(rows, _range(shape, t_min, t_max), self._threads(nthreads), counts)
+        self._core.count(rows, _range(shape, t_min, t_max), _mask(mask), self._threads(nthreads), counts)
         return counts.reshape(shape)
 
     def list_intersections(
@@ -199,6 +229,7 @@ class RaycastingScene:
         *,
         t_min: ArrayLike = 0.0,
         t_max: ArrayLike = np.inf,
+        mask: int = 0xFF,
         max_hits: int | None = None,
     ) -> dict[str, NDArray[Any]]:
         """Lists all hits of each ray, or the ``max_hits`` nearest ones, in the order of t.
@@ -214,7 +245,7 @@ class RaycastingScene:
         """
         rows, shape = arrays.rays("rays", rays, self._origin)
         most = None if max_hits is None else arrays.integer("max_hits", max_hits)
-        lists = self._core.list(rows, _range(shape, t_min, t_max), most, self._threads(nthreads))
+        lists = self._core.list(rows, _range(shape, t_min, t_max), _mask(mask), most, self._threads(nthreads))
         names = ["ray_splits", "ray_ids", "t_hit", "geometry_ids", "primitive_ids"]
         results: dict[str, NDArray[Any]] = dict(zip(names, lists))
         results["primitive_uvs"] = lists[5].reshape(-1, 2)
@@ -222,7 +253,9 @@ class RaycastingScene:
 
     # Points
 
-    def compute_closest_points(self, query_points: ArrayLike, nthreads: int = 0) -> dict[str, NDArray[Any]]:
+    def compute_closest_points(
+        self, query_points: ArrayLike, nthreads: int = 0, *, mask: int = 0xFF
+    ) -> dict[str, NDArray[Any]]:
         """Finds the point of the triangles that is closest to each query point (..., 3).
 
         Returns
@@ -234,7 +267,9 @@ class RaycastingScene:
         """
         query = arrays.floats("query_points", query_points, "(..., 3)", (3,))
         shape = query.shape[:-1]
-        results = self._closest(arrays.relative(query, self._origin), shape, nthreads, [*_OF_RAYS, "points"])
+        results = self._closest(
+            arrays.relative(query, self._origin), shape, _mask(mask), nthreads, [*_OF_RAYS, "points"]
+        )
         points = results.pop("points")
         if self._origin.any():
             points = points + self._origin
@@ -242,14 +277,16 @@ class RaycastingScene:
                 points = points.astype(np.float32)
         return {"points": points, "distances": results.pop("t_hit"), **results}
 
-    def compute_distance(self, query_points: ArrayLike, nthreads: int = 0) -> NDArray[np.float32]:
+    def compute_distance(
+        self, query_points: ArrayLike, nthreads: int = 0, *, mask: int = 0xFF
+    ) -> NDArray[np.float32]:
         """Computes the distance of each query point (..., 3) from the triangles: (...) float32."""
         query = arrays.floats("query_points", query_points, "(..., 3)", (3,))
         points = arrays.relative(query, self._origin)
-        return self._closest(points, query.shape[:-1], nthreads, ["t_hit"])["t_hit"]
+        return self._closest(points, query.shape[:-1], _mask(mask), nthreads, ["t_hit"])["t_hit"]
 
     def compute_signed_distance(
-        self, query_points: ArrayLike, nthreads: int = 0, nsamples: int = 1
+        self, query_points: ArrayLike, nthreads: int = 0, nsamples: int = 1, *, mask: int = 0xFF
     ) -> NDArray[np.float32]:
         """Computes the distance of each query point (..., 3): (...) float32, negative inside.
 
@@ -261,18 +298,20 @@ class RaycastingScene:
         """
         query = arrays.floats("query_points", query_points, "(..., 3)", (3,))
         points, n = arrays.relative(query, self._origin), _n_samples(nsamples)
-        distances = self._closest(points, (len(points),), nthreads, ["t_hit"])["t_hit"]
-        inside = self._is_inside(points, nthreads, n)
+        distances = self._closest(points, (len(points),), _mask(mask), nthreads, ["t_hit"])["t_hit"]
+        inside = self._is_inside(points, _mask(mask), nthreads, n)
         return np.where(inside, -distances, distances).astype(np.float32).reshape(query.shape[:-1])
 
-    def compute_occupancy(self, query_points: ArrayLike, nthreads: int = 0, nsamples: int = 1) -> NDArray[np.float32]:
+    def compute_occupancy(
+        self, query_points: ArrayLike, nthreads: int = 0, nsamples: int = 1, *, mask: int = 0xFF
+    ) -> NDArray[np.float32]:
         """Tells of each query point (..., 3) whether it is inside: (...) float32, 1 or 0.
 
         It is decided as by :meth:`compute_signed_distance`.
         """
         query = arrays.floats("query_points", query_points, "(..., 3)", (3,))
         points, n = arrays.relative(query, self._origin), _n_samples(nsamples)
-        return self._is_inside(points, nthreads, n).astype(np.float32).reshape(query.shape[:-1])
+        return self._is_inside(points, _mask(mask), nthreads, n).astype(np.float32).reshape(query.shape[:-1])
 
     # Cameras
 
@@ -339,8 +378,8 @@ class RaycastingScene:
             if geometry is None:
                 self._core.add_removed()
                 continue
-            vertices, triangles, transform = geometry
-            self._core.add(vertices.reshape(-1, 3), triangles.reshape(-1, 3))
+            vertices, triangles, transform, mask = geometry
+            self._core.add(vertices.reshape(-1, 3), triangles.reshape(-1, 3), mask)
             if not np.array_equal(transform.reshape(3, 4), np.eye(3, 4)):
                 moved.append((id, transform.reshape(3, 4)))
         if moved:
@@ -353,13 +392,13 @@ class RaycastingScene:
         return arrays.integer("nthreads", nthreads) or self._nthreads
 
     def _closest(
-        self, points: _F32, shape: tuple[int, ...], nthreads: int, names: list[str]
+        self, points: _F32, shape: tuple[int, ...], mask: int, nthreads: int, names: list[str]
     ) -> dict[str, NDArray[Any]]:
         outputs, results = _outputs(shape, names)
-        self._core.closest(points, self._threads(nthreads), outputs)
+        self._core.closest(points, mask, self._threads(nthreads), outputs)
         return results
 
-    def _is_inside(self, points: _F32, nthreads: int, n_samples: int) -> NDArray[np.bool_]:
+    def _is_inside(self, points: _F32, mask: int, nthreads: int, n_samples: int) -> NDArray[np.bool_]:
         votes = np.zeros(len(points), np.int64)
         open_ix = np.arange(len(points))
         t_range = _range((), 0.0, np.inf)
@@ -367,7 +406,7 @@ class RaycastingScene:
             rays = np.empty((len(open_ix), 6), np.float32)
             rays[:, :3], rays[:, 3:] = points[open_ix], direction
             counts = np.zeros(len(rays), np.int32)
-            self._core.count(rays, t_range, self._threads(nthreads), counts)
+            self._core.count(rays, t_range, mask, self._threads(nthreads), counts)
             votes[open_ix] += counts % 2
             most = n_samples // 2
             open_ix = open_ix[(votes[open_ix] <= most) & (n_cast - votes[open_ix] <= most)]
@@ -398,6 +437,10 @@ def _origin_of(vertices: NDArray[Any]) -> NDArray[np.float64]:
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     is_far = max(np.abs(low).max(), np.abs(high).max()) > _NEAR
     return np.rint(low / 2 + high / 2) if is_far else np.zeros(3)
+
+
+def _mask(mask: int) -> int:
+    return arrays.mask("mask", mask, 1)
 
 
 def _range(

@@ -50,6 +50,9 @@ type Outputs<'py> = (
     Option<PyReadwriteArray2<'py, f32>>,
 );
 
+/// Of a geometry: vertices (N, 3), triangles (M, 3) and transform (3, 4), which are flat, and the mask.
+type Parts<'py> = (Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f64>>, u8);
+
 /// ray_splits, ray_ids, t_hit, geometry_ids, primitive_ids, uvs.
 type Lists<'py> = (
     Bound<'py, PyArray1<u32>>,
@@ -215,10 +218,16 @@ impl Core {
     }
 
     /// Adds a geometry, and returns its id. `vertices`: (N, 3), `faces`: (M, 3).
-    fn add(&self, py: Python, vertices: PyReadonlyArray2<f32>, faces: PyReadonlyArray2<u32>) -> PyResult<u32> {
+    fn add(
+        &self,
+        py: Python,
+        vertices: PyReadonlyArray2<f32>,
+        faces: PyReadonlyArray2<u32>,
+        mask: u8,
+    ) -> PyResult<u32> {
         let vertices = vec3s(vertices.as_slice()?);
         let faces = cast_slice(faces.as_slice()?).to_vec();
-        self.with_threads(py, 0, |state| state.add(vertices, faces))
+        self.with_threads(py, 0, |state| state.add(vertices, faces, mask))
     }
 
     /// Uses up an id.
@@ -250,25 +259,25 @@ impl Core {
         self.with(py, |state| state.set_transforms(ids, &transforms))
     }
 
+    fn set_masks(&self, py: Python, ids: PyReadonlyArray1<u32>, masks: PyReadonlyArray1<u8>) -> PyResult<()> {
+        let (ids, masks) = (ids.as_slice()?, masks.as_slice()?);
+        self.with(py, |state| state.set_masks(ids, masks))
+    }
+
     /// The number of ids that were given out.
     fn n_ids(&self, py: Python) -> PyResult<usize> {
         self.with(py, |state| Ok(state.n_ids()))
     }
 
-    /// The vertices (N, 3), triangles (M, 3) and transform (3, 4) of a geometry, or None where one was removed. All
-    /// arrays are flat.
-    #[allow(clippy::type_complexity)]
-    fn geometry<'py>(
-        &self,
-        py: Python<'py>,
-        id: u32,
-    ) -> PyResult<Option<(Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f64>>)>> {
+    /// A geometry, or None where one was removed.
+    fn geometry<'py>(&self, py: Python<'py>, id: u32) -> PyResult<Option<Parts<'py>>> {
         let geometry = self.with(py, |state| Ok(state.geometry(id).cloned()))?;
         Ok(geometry.map(|geometry| {
             let rows = geometry.transform.transpose().to_cols_array();
             let vertices: Vec<f32> = geometry.vertices.iter().flat_map(|vertex| vertex.to_array()).collect();
             let faces = geometry.faces.into_flattened();
-            (vertices.into_pyarray(py), faces.into_pyarray(py), rows[..12].to_vec().into_pyarray(py))
+            let transform = rows[..12].to_vec().into_pyarray(py);
+            (vertices.into_pyarray(py), faces.into_pyarray(py), transform, geometry.mask)
         }))
     }
 
@@ -278,6 +287,7 @@ impl Core {
         py: Python,
         rays: PyReadonlyArray2<f32>,
         range: Range,
+        mask: u8,
         n_threads: usize,
         mut outputs: Outputs,
     ) -> PyResult<()> {
@@ -290,7 +300,7 @@ impl Core {
                 let n = at_once.min(rows.len() - first);
                 let parts: Vec<_> =
                     columns.split_off_parts(n, RAYS_PER_PART).into_iter().map(|part| Mutex::new(Some(part))).collect();
-                let (caster, placed) = state.caster(rows.len())?;
+                let (caster, placed) = state.caster(rows.len(), mask)?;
                 let take = |begin: usize, hits: &[Hit]| {
                     let part = locked(&parts[begin / RAYS_PER_PART]).take().expect("each part is taken once");
                     part.write(placed, hits);
@@ -307,6 +317,7 @@ impl Core {
         py: Python,
         rays: PyReadonlyArray2<f32>,
         range: Range,
+        mask: u8,
         n_threads: usize,
         mut output: PyReadwriteArray1<bool>,
     ) -> PyResult<()> {
@@ -323,7 +334,7 @@ impl Core {
                     part.iter_mut().zip(hits).for_each(|(out, hit)| *out = hit.triangle_ix != NO_TRIANGLE);
                 };
                 let make = |begin: usize, rays: &mut [Ray]| rows.write(first + begin, rays);
-                state.caster(rows.len())?.0.cast_stream(n, Query::Any, make, take).map_err(failed)
+                state.caster(rows.len(), mask)?.0.cast_stream(n, Query::Any, make, take).map_err(failed)
             })
         })
     }
@@ -334,6 +345,7 @@ impl Core {
         py: Python,
         rays: PyReadonlyArray2<f32>,
         range: Range,
+        mask: u8,
         n_threads: usize,
         mut output: PyReadwriteArray1<i32>,
     ) -> PyResult<()> {
@@ -344,7 +356,7 @@ impl Core {
             let at_once = of_processor(QUERIES_AT_ONCE, state);
             in_chunks(rows.len(), at_once, &pool, |first| {
                 let rays = rows.rays(first, at_once);
-                let counts = state.caster(rows.len())?.0.count_hits(&rays).map_err(failed)?;
+                let counts = state.caster(rows.len(), mask)?.0.count_hits(&rays).map_err(failed)?;
                 output[first..].iter_mut().zip(&counts).for_each(|(out, count)| *out = *count as i32);
                 Ok(())
             })
@@ -357,6 +369,7 @@ impl Core {
         py: Python<'py>,
         rays: PyReadonlyArray2<f32>,
         range: Range,
+        mask: u8,
         most_per_ray: Option<u32>,
         n_threads: usize,
     ) -> PyResult<Lists<'py>> {
@@ -368,7 +381,7 @@ impl Core {
             let at_once = of_processor(QUERIES_AT_ONCE, state);
             in_chunks(rows.len(), at_once, &pool, |first| {
                 let rays = rows.rays(first, at_once);
-                let (caster, placed) = state.caster(rows.len())?;
+                let (caster, placed) = state.caster(rows.len(), mask)?;
                 let all = caster.all_hits(&rays, most_per_ray).map_err(failed)?;
                 let before = t_hit.len() as u64;
                 if before + all.hits.len() as u64 > u64::from(u32::MAX) {
@@ -401,6 +414,7 @@ impl Core {
         &self,
         py: Python,
         points: PyReadonlyArray2<f32>,
+        mask: u8,
         n_threads: usize,
         mut outputs: Outputs,
     ) -> PyResult<()> {
@@ -413,7 +427,7 @@ impl Core {
                 let end = points.len().min(first + at_once);
                 let query = |p: &[f32; 3]| QueryPoint { position: Vec3::from(*p), t_max: f32::INFINITY };
                 let queries: Vec<_> = points[first..end].par_iter().with_min_len(1024).map(query).collect();
-                let (caster, placed) = state.caster(points.len())?;
+                let (caster, placed) = state.caster(points.len(), mask)?;
                 let hits = caster.closest_points(&queries, 1).map_err(failed)?.hits;
                 columns.split_off(hits.len()).write(placed, &hits);
                 Ok(())

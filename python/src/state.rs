@@ -9,7 +9,7 @@ use kdray::{
     },
     gpu::GpuError,
     scene::{Camera, Instance, Material, Mesh, Projection, RenderDefaults, Scene, Transform},
-    world::{InstanceUpdate, World, instances::Instancing},
+    world::{InstanceUpdate, Mismatch, World, instances::Instancing},
 };
 use pyo3::{
     exceptions::{PyIndexError, PyRuntimeError, PyValueError},
@@ -26,6 +26,9 @@ const EXPECTED_RAYS: u64 = 1 << 24;
 /// rays and hits take longer.
 const SMALL_BATCH: usize = 4096;
 
+/// The mask of geometries that all rays meet.
+const ALL: u8 = 0xff;
+
 /// Triangles that belong together, and their place.
 #[derive(Clone)]
 pub struct Geometry {
@@ -33,7 +36,9 @@ pub struct Geometry {
     pub faces: Vec<[u32; 3]>,
     /// From the vertices to the world.
     pub transform: DMat4,
-    /// The scene's counter of changes when the transform was last set.
+    /// Rays meet the geometry if their mask has a bit in common with it.
+    pub mask: u8,
+    /// The scene's counter of changes when the transform or the mask was last set.
     moved_at: u64,
 }
 
@@ -73,7 +78,7 @@ pub struct State {
     geometries: Vec<Option<Geometry>>,
     /// Counts changes.
     now: u64,
-    /// The change that last added, removed or deformed a geometry, and the one that last moved one.
+    /// The change that last added, removed or deformed a geometry, and the one that last moved or masked one.
     shapes_at: u64,
     places_at: u64,
     /// The world of the last query.
@@ -105,7 +110,7 @@ impl State {
     }
 
     /// Adds a geometry and returns its identifier.
-    pub fn add(&mut self, vertices: Vec<Vec3>, faces: Vec<[u32; 3]>) -> PyResult<u32> {
+    pub fn add(&mut self, vertices: Vec<Vec3>, faces: Vec<[u32; 3]>, mask: u8) -> PyResult<u32> {
         check_finite("vertex_positions", &vertices)?;
         if let Some(ix) = faces.as_flattened().par_iter().find_first(|ix| **ix as usize >= vertices.len()) {
             let what = format!("triangle_indices: has the index {ix}, but there are {} vertices", vertices.len());
@@ -113,7 +118,11 @@ impl State {
         }
         self.now += 1;
         self.shapes_at = self.now;
-        self.geometries.push(Some(Geometry { vertices, faces, transform: DMat4::IDENTITY, moved_at: 0 }));
+        if mask != ALL {
+            self.places_at = self.now;
+        }
+        let (transform, moved_at) = (DMat4::IDENTITY, self.now);
+        self.geometries.push(Some(Geometry { vertices, faces, transform, mask, moved_at }));
         Ok(self.geometries.len() as u32 - 1)
     }
 
@@ -163,19 +172,35 @@ impl State {
         Ok(())
     }
 
+    /// Sets the masks of geometries. If one of them is refused, none is set.
+    pub fn set_masks(&mut self, ids: &[u32], masks: &[u8]) -> PyResult<()> {
+        ids.iter().try_for_each(|id| self.geometry_mut(*id).map(|_| ()))?;
+        self.now += 1;
+        let now = self.now;
+        for (id, mask) in ids.iter().zip(masks) {
+            let geometry = self.geometry_mut(*id)?;
+            (geometry.mask, geometry.moved_at) = (*mask, now);
+        }
+        self.places_at = now;
+        Ok(())
+    }
+
     /// Whether the scene casts on a GPU.
     pub fn has_gpu(&self) -> bool {
         self.engine.device().is_some_and(|device| !device.is_software())
     }
 
-    /// Returns what casts `n` rays or points into the geometries as they are now, and what their hits are in.
-    pub fn caster(&mut self, n: usize) -> PyResult<(&mut Caster<'static>, Placed<'_>)> {
+    /// Returns what casts `n` rays or points with a mask into the geometries as they are now, and what their hits are
+    /// in.
+    pub fn caster(&mut self, n: usize, mask: u8) -> PyResult<(&mut Caster<'static>, Placed<'_>)> {
         if !self.geometries.iter().flatten().any(|geometry| !geometry.faces.is_empty()) {
             return Err(PyRuntimeError::new_err("the scene has no triangles: add_triangles adds some"));
         }
         let before = self.ready.take();
         let ready = self.current(before, n)?;
-        self.ready.insert(ready).caster([&self.engine, &self.cpu], n)
+        let (caster, placed) = self.ready.insert(ready).caster([&self.engine, &self.cpu], n)?;
+        caster.set_mask(mask).map_err(failed)?;
+        Ok((caster, placed))
     }
 
     /// Returns a world of the geometries as they are now. `n_rays`: that are about to be cast.
@@ -186,17 +211,17 @@ impl State {
                 Ok(ready) => Ok(ready),
                 Err(_) => self.build(n_rays, None),
             },
-            // The first move gives geometries structures of their own, which further moves keep.
+            // The first move or mask gives geometries structures of their own, which further moves keep.
             before => self.build(n_rays, before.filter(|before| before.keeps == self.keeps())),
         }
     }
 
-    /// Geometries that never moved are flattened: one structure is quicker than many.
+    /// Geometries that never moved, and that all rays meet, are flattened: one structure is quicker than many.
     fn keeps(&self) -> bool {
         self.places_at > 0
     }
 
-    /// Moves the instances of a world to where their geometries are now.
+    /// Gives the instances of a world the transforms and masks that their geometries have now.
     fn moved(&self, mut ready: Ready) -> Result<Ready, GpuError> {
         let mut updates = Vec::new();
         for (instance_ix, place) in ready.places.iter_mut().enumerate() {
@@ -204,7 +229,8 @@ impl State {
             if geometry.moved_at > ready.places_at {
                 let transform = Transform::of_affine(geometry.transform).expect("checked when it was set");
                 place.mirrors = transform.mirrors();
-                updates.push(InstanceUpdate { instance_ix, transform: Some(transform), ..InstanceUpdate::default() });
+                let (transform, mask) = (Some(transform), Some(geometry.mask));
+                updates.push(InstanceUpdate { instance_ix, transform, mask, ..InstanceUpdate::default() });
             }
         }
         ready.world = ready.world.with_instances_changed(&updates)?;
@@ -227,12 +253,21 @@ impl State {
         let opened = Opened::read(Source::Scene(Box::new(scene)), &LoadRequest::rays(n_rays));
         let opened = opened.map_err(|error| wrong(&error))?;
         let world = engine.builder().build(opened, &Work::Rays(n_rays)).map_err(|error| wrong(&error))?.world;
+        let world = if keeps { self.masked(&world, &places).map_err(|error| wrong(&error))? } else { world };
         let traversal = match pinned {
             Some(traversal) => traversal,
             None => engine.methods(&world, &Workload::of_rays(n_rays)).map_err(failed)?.traversal.value,
         };
         let (shapes_at, places_at) = (self.shapes_at, self.places_at);
         Ok(Ready { world, places, traversal, on_device: None, on_cpu: None, keeps, shapes_at, places_at })
+    }
+
+    /// Returns a world with the masks of the geometries.
+    fn masked(&self, world: &World, places: &[Place]) -> Result<World, Mismatch> {
+        let mask_of = |place: &Place| self.geometry(place.geometry_id).map(|it| it.mask);
+        let update = |(instance_ix, place)| InstanceUpdate { instance_ix, mask: mask_of(place), ..Default::default() };
+        let updates: Vec<_> = places.iter().enumerate().map(update).filter(|it| it.mask != Some(ALL)).collect();
+        if updates.is_empty() { Ok(world.clone()) } else { world.with_instances_changed(&updates) }
     }
 
     /// Returns the geometries as a scene, each moved by its instance.

@@ -153,13 +153,13 @@ impl GpuCaster {
     ) -> Result<(), GpuError> {
         resources.cast_rays.upload(rays)?;
         resources.hit_cursors.upload(cursors)?;
-        let n_rays = rays.len() as u32;
+        let rays = self.masked(rays.len() as u32);
         self.context.run("all_hits", |commands| {
             self.tree.suspended_rays.reset(commands);
-            kernel.record(commands, &resources.set, n_rays, ResumePass::Begin);
+            kernel.record(commands, &resources.set, rays, ResumePass::Begin);
         })?;
         self.tree.suspended_rays.finish(&self.context, |commands, resume_pass| {
-            kernel.record(commands, &resources.set, n_rays, resume_pass);
+            kernel.record(commands, &resources.set, rays, resume_pass);
         })?;
         Ok(())
     }

@@ -37,7 +37,8 @@ impl GpuCaster {
         check_structure(self.accel_kind)?;
         let search = self.prepared_for(points.len())?;
         let PointResources { cast_points, cast_hits, set } = &search.resources;
-        let record = |commands: &Commands, n_points, pass| search.kernel.record(commands, set, n_points, pass);
+        let record =
+            |commands: &Commands, n_points, pass| search.kernel.record(commands, set, self.masked(n_points), pass);
         let found = self.run_batches(points, (cast_points, cast_hits), n_times.max(1), record);
         self.point_search = Some(search);
         let (hits, gpu_ms) = found?;

@@ -2,12 +2,12 @@
 
 use std::{rc::Rc, sync::Arc};
 
-use super::Contender;
+use super::{ALL_INSTANCES, Contender};
 use crate::{
     accel::{Query, kdtree::Traversal},
     buffers::{CastResources, ResumePass},
     gpu::{Access, BindingLayout, Commands, Context, GpuError},
-    passes::Cast,
+    passes::{Cast, Masked},
 };
 
 /// A kernel that casts rays by one traversal for one query.
@@ -50,7 +50,8 @@ impl Contender for Kernel {
     }
 
     fn record(&self, commands: &Commands) {
-        self.cast.record(commands, &self.resources.set, self.resources.cast_rays.len() as u32, ResumePass::Begin);
+        let rays = Masked { n: self.resources.cast_rays.len() as u32, mask: ALL_INSTANCES };
+        self.cast.record(commands, &self.resources.set, rays, ResumePass::Begin);
     }
 
     fn resources(&self) -> &Rc<CastResources> {

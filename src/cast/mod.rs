@@ -58,7 +58,7 @@ use crate::{
         Access, BindingLayout, Buffer, CommandBuffer, Commands, Context, Device, GpuError, Limits, Statistic, Timer,
     },
     layout::{PathRay, RAY_GROUP_SIZE},
-    passes,
+    passes::{self, Masked},
     reference::{self, inputs::KernelInputs},
     world::{Geometry, Mismatch, World},
 };
@@ -101,6 +101,7 @@ pub struct GpuCaster {
     /// The kind of the structure, or of that of each geometry.
     accel_kind: AccelKind,
     rays_per_batch: usize,
+    mask: u8,
     /// What parts of a stream need, made at its first use.
     lanes: Vec<stream::Lane>,
 }
@@ -119,6 +120,7 @@ impl GpuCaster {
         Ok(Self {
             resources: CastResources::new(context, &bindings, &buffers, 0)?,
             rays_per_batch: RAYS_PER_BATCH.min(most_rays(context.limits())),
+            mask: ALL_INSTANCES,
             context: Arc::clone(context),
             tree: buffers,
             structures_id: geometry.accel().structures_id(),
@@ -163,6 +165,22 @@ impl GpuCaster {
         Ok(())
     }
 
+    /// Makes later rays and points meet the instances alone whose masks
+    /// ([`InstanceUpdate::mask`](crate::world::InstanceUpdate::mask)) have a bit in common with `mask`. At first it is
+    /// 0xff. Without instances, they meet everything. Casts that were recorded keep the mask before.
+    ///
+    /// # Errors
+    /// The mask is 0.
+    pub fn set_mask(&mut self, mask: u8) -> Result<(), BadOptions> {
+        self.mask = checked_mask(mask)?;
+        Ok(())
+    }
+
+    /// Returns the first `n` rays or points of a buffer, for a kernel.
+    fn masked(&self, n: u32) -> Masked {
+        Masked { n, mask: self.mask }
+    }
+
     /// Limits batches to `n_rays` rays, at least 1 and at most what the device allows.
     #[must_use]
     pub fn with_batches_of(self, n_rays: usize) -> Self {
@@ -178,7 +196,7 @@ impl GpuCaster {
         check_repetitions(n_times)?;
         let kernel = self.prepare(query, rays.len())?;
         let CastResources { cast_rays, cast_hits, set } = &self.resources;
-        let record = |commands: &Commands, n_rays, pass| kernel.record(commands, set, n_rays, pass);
+        let record = |commands: &Commands, n_rays, pass| kernel.record(commands, set, self.masked(n_rays), pass);
         let (hits, gpu_ms) = self.run_batches(rays, (cast_rays, cast_hits), n_times.max(1), record)?;
         Ok(CastResult { hits, gpu_ms, n_invalid: count_invalid(rays) })
     }
@@ -279,6 +297,14 @@ pub(crate) fn check_repetitions(n_times: u32) -> Result<(), BadOptions> {
     check("n_times", n_times, n_times <= MOST_REPETITIONS, || format!("at most {MOST_REPETITIONS}"))
 }
 
+/// The mask that has a bit in common with all others but 0.
+const ALL_INSTANCES: u8 = 0xff;
+
+fn checked_mask(mask: u8) -> Result<u8, BadOptions> {
+    check("mask", mask, mask != 0, || "at least 1".to_owned())?;
+    Ok(mask)
+}
+
 /// Checks that a world differs in its instances at most. `structures_id`: that of the world before.
 fn check_structures(structures_id: Option<&StructuresId>, geometry: Geometry) -> Result<(), GpuError> {
     let is_same = structures_id.is_some() && structures_id == geometry.accel().structures_id().as_ref();
@@ -316,6 +342,7 @@ pub struct CpuCaster<'a> {
     n_scattered: AtomicUsize,
     /// For each triangle, `TRIANGLE_HIDDEN` or 0. None if no triangle is hidden.
     hidden: Option<Vec<u32>>,
+    mask: u8,
 }
 
 /// The triangles and their structure: the caller's, or those of a world that the caster keeps.
@@ -337,7 +364,15 @@ impl<'a> CpuCaster<'a> {
 
     fn of_held(held: Held<'a>, geometry: Geometry, traversal: Traversal) -> Self {
         let links = TraversalLinks::of(geometry.accel(), geometry.triangles(), traversal);
-        Self { held, traversal, links, wide: OnceLock::new(), n_scattered: AtomicUsize::new(0), hidden: None }
+        Self {
+            held,
+            traversal,
+            links,
+            wide: OnceLock::new(),
+            n_scattered: AtomicUsize::new(0),
+            hidden: None,
+            mask: ALL_INSTANCES,
+        }
     }
 
     fn geometry(&self) -> Geometry<'_> {
@@ -367,6 +402,15 @@ impl<'a> CpuCaster<'a> {
         Ok(Self { hidden: Some(hidden_words(n_triangles, triangles)), ..self })
     }
 
+    /// Makes later rays and points meet some instances alone, as [`GpuCaster::set_mask`] does.
+    ///
+    /// # Errors
+    /// The mask is 0.
+    pub fn set_mask(&mut self, mask: u8) -> Result<(), BadOptions> {
+        self.mask = checked_mask(mask)?;
+        Ok(())
+    }
+
     /// Casts rays, and returns one hit for each.
     pub fn cast(&self, rays: &[Ray], query: Query) -> Vec<Hit> {
         let mut hits = vec![Hit::zeroed(); rays.len()];
@@ -381,7 +425,7 @@ impl<'a> CpuCaster<'a> {
             Some(words) => inputs.with_hidden(words),
             None => inputs,
         };
-        inputs.with_links(&self.links)
+        inputs.with_links(&self.links).with_mask(self.mask)
     }
 
     /// Returns how the rays are traced: scattered rays through the wide hierarchy, if it exists or making it pays. The

@@ -7,7 +7,7 @@ use crate::{
     accel::Query,
     buffers::{CastResources, ResumePass, SuspendedRays},
     gpu::{BindingSet, Context, ExternalBuffer, ExternalCommands, GpuError},
-    passes,
+    passes::{self, Masked},
 };
 
 /// A cast that is ready to be recorded into command buffers, any number of times. It keeps the triangles, their
@@ -17,7 +17,7 @@ pub struct RecordedCast {
     kernel: Arc<passes::Cast>,
     set: BindingSet,
     suspended_rays: SuspendedRays,
-    n_rays: u32,
+    rays: Masked,
 }
 
 impl GpuCaster {
@@ -44,7 +44,7 @@ impl GpuCaster {
             kernel: self.prepare_kernel(query)?,
             set: CastResources::external(&self.bindings, &tree, rays, hits)?,
             suspended_rays: tree.suspended_rays,
-            n_rays: n_rays as u32,
+            rays: self.masked(n_rays as u32),
         })
     }
 }
@@ -59,7 +59,7 @@ impl RecordedCast {
     pub fn record(&self, commands: &ExternalCommands) {
         let commands = commands.commands(&self.context);
         self.suspended_rays.reset(&commands);
-        self.kernel.record(&commands, &self.set, self.n_rays, ResumePass::Begin);
+        self.kernel.record(&commands, &self.set, self.rays, ResumePass::Begin);
     }
 
     /// Finishes the rays that stopped at the driver's limit of loop iterations. Most drivers have no such limit. The
@@ -70,7 +70,7 @@ impl RecordedCast {
     /// A call fails.
     pub fn finish(&self) -> Result<u32, GpuError> {
         self.suspended_rays.finish(&self.context, |commands, resume_pass| {
-            self.kernel.record(commands, &self.set, self.n_rays, resume_pass);
+            self.kernel.record(commands, &self.set, self.rays, resume_pass);
         })
     }
 }

@@ -56,7 +56,7 @@ impl GpuCaster {
             let Lane { tree, resources: CastResources { cast_rays, cast_hits, set }, rays, hits } = lane;
             make(first, &mut rays[..n]);
             cast_rays.upload(&rays[..n])?;
-            caster.run(tree, 1, |commands, pass| kernel.record(commands, set, n as u32, pass))?;
+            caster.run(tree, 1, |commands, pass| kernel.record(commands, set, caster.masked(n as u32), pass))?;
             cast_hits.download_bytes(0, cast_slice_mut(&mut hits[..n]))?;
             take(first, &hits[..n]);
         };

@@ -66,6 +66,19 @@ impl<'a> Caster<'a> {
         }
     }
 
+    /// Makes later rays and points meet some instances alone, as
+    /// [`GpuCaster::set_mask`](cast::GpuCaster::set_mask) does.
+    ///
+    /// # Errors
+    /// The mask is 0.
+    pub fn set_mask(&mut self, mask: u8) -> Result<(), GpuError> {
+        match &mut self.0 {
+            Backend::Device(caster) => caster.set_mask(mask)?,
+            Backend::Cpu(caster) => caster.set_mask(mask)?,
+        }
+        Ok(())
+    }
+
     /// Casts all rays `n_times` (at least once) for timing. Every repetition finds the same hits. The times of the
     /// result are those of the device's kernel, or wall-clock times on the CPU.
     ///

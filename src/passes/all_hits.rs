@@ -3,7 +3,10 @@
 
 use std::sync::Arc;
 
-use super::{cast::record_batch, kernel, search_constants, searching};
+use super::{
+    cast::{Masked, record_batch},
+    kernel, search_constants, searching,
+};
 use crate::{
     accel::kdtree::Traversal,
     buffers::ResumePass,
@@ -35,11 +38,11 @@ impl AllHits {
         Ok(Self { kernel: kernel(context, bindings, "all_hits", shader, &constants)?, n_lanes })
     }
 
-    /// Needs the first `n_rays` elements of `cast_rays` and `hit_cursors`. Leaves in the cursors where each ray's list
+    /// Needs the first elements of `cast_rays` and `hit_cursors`. Leaves in the cursors where each ray's list
     /// ends, and if hits are listed, the lists in `listed_hits`; a ray that was suspended leaves a mark in its cursor.
     /// `pass`: which rays are traced, all or those that were suspended.
-    pub fn record(&self, commands: &Commands, set: &BindingSet, n_rays: u32, pass: ResumePass) {
+    pub fn record(&self, commands: &Commands, set: &BindingSet, rays: Masked, pass: ResumePass) {
         commands.bind(set);
-        record_batch(commands, &self.kernel, (n_rays, self.n_lanes), pass);
+        record_batch(commands, &self.kernel, (rays, self.n_lanes), pass);
     }
 }

@@ -9,7 +9,7 @@ use crate::{
     buffers::ResumePass,
     frame::bounce::lanes_log2,
     gpu::{BindingLayout, BindingSet, Commands, ComputePipeline, Context, Dispatch, GpuError, Statistic},
-    layout::{CastBatch, RAY_GROUP_SIZE, constants},
+    layout::{CastBatch, INSTANCE_MASK_SHIFT, RAY_GROUP_SIZE, constants},
 };
 
 /// The pipeline of the pass.
@@ -45,23 +45,32 @@ impl Cast {
         self.kernel.statistics()
     }
 
-    /// Needs the first `n_rays` elements of `cast_rays`. Leaves the first `n_rays` elements of `cast_hits`; a ray that
-    /// was suspended leaves a mark in place of its hit. `resume_pass`: which rays are traced, all or those that were
-    /// suspended.
-    pub fn record(&self, commands: &Commands, set: &BindingSet, n_rays: u32, pass: ResumePass) {
+    /// Needs the first elements of `cast_rays`. Leaves the first elements of `cast_hits`; a ray that was suspended
+    /// leaves a mark in place of its hit. `pass`: which rays are traced, all or those that were suspended.
+    pub fn record(&self, commands: &Commands, set: &BindingSet, rays: Masked, pass: ResumePass) {
         commands.bind(set);
-        record_batch(commands, &self.kernel, (n_rays, self.n_lanes), pass);
+        record_batch(commands, &self.kernel, (rays, self.n_lanes), pass);
     }
 }
 
-/// Records a kernel of a [`CastBatch`] of so many rays or points, on a device with so many lanes.
+/// The rays or points of a dispatch.
+#[derive(Clone, Copy)]
+pub struct Masked {
+    /// Their number: the first elements of their buffer.
+    pub n: u32,
+    /// They meet the instances whose masks have a bit in common with this one.
+    pub mask: u8,
+}
+
+/// Records a kernel of a [`CastBatch`] of these rays or points, on a device with so many lanes.
 pub(super) fn record_batch(
     commands: &Commands,
     kernel: &ComputePipeline,
-    (n_rays, n_lanes): (u32, u32),
+    (Masked { n: n_rays, mask }, n_lanes): (Masked, u32),
     pass: ResumePass,
 ) {
     let lanes_log2 = lanes_log2(n_rays, n_lanes);
     let dispatch = Dispatch::Threads([n_rays << lanes_log2, 1, 1], [RAY_GROUP_SIZE, 1, 1]);
-    commands.dispatch(kernel, None, &CastBatch { n_rays, lanes_log2, resume_pass: pass.constant() }, dispatch);
+    let mask = u32::from(mask) << INSTANCE_MASK_SHIFT;
+    commands.dispatch(kernel, None, &CastBatch { n_rays, lanes_log2, resume_pass: pass.constant(), mask }, dispatch);
 }

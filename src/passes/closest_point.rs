@@ -3,7 +3,10 @@
 
 use std::sync::Arc;
 
-use super::{cast::record_batch, kernel, spirv};
+use super::{
+    cast::{Masked, record_batch},
+    kernel, spirv,
+};
 use crate::{
     buffers::ResumePass,
     gpu::{BindingLayout, BindingSet, Commands, ComputePipeline, Constants, Context, GpuError},
@@ -27,11 +30,11 @@ impl ClosestPoint {
         Ok(Self { kernel, n_lanes: context.n_lanes()? })
     }
 
-    /// Needs the first `n_points` elements of `cast_points`. Leaves the first `n_points` elements of `cast_hits`; a
-    /// search that was suspended leaves a mark in place of its hit. `pass`: which points are searched for, all or those
-    /// whose search was suspended.
-    pub fn record(&self, commands: &Commands, set: &BindingSet, n_points: u32, pass: ResumePass) {
+    /// Needs the first elements of `cast_points`. Leaves the first elements of `cast_hits`; a search that was suspended
+    /// leaves a mark in place of its hit. `pass`: which points are searched for, all or those whose search was
+    /// suspended.
+    pub fn record(&self, commands: &Commands, set: &BindingSet, points: Masked, pass: ResumePass) {
         commands.bind(set);
-        record_batch(commands, &self.kernel, (n_points, self.n_lanes), pass);
+        record_batch(commands, &self.kernel, (points, self.n_lanes), pass);
     }
 }

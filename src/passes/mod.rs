@@ -74,7 +74,7 @@ pub use self::{
     all_hits::AllHits,
     atrous_filter::AtrousFilter,
     auxiliary::Auxiliary,
-    cast::Cast,
+    cast::{Cast, Masked},
     closest_point::ClosestPoint,
     compact::Compact,
     demodulate::Demodulate,

@@ -13,8 +13,8 @@ use crate::{
         two_level::TwoLevel,
     },
     layout::{
-        AccelConstants, Frame, GridCell, Hit, INSTANCE_FOR_CAMERA, INSTANCE_FOR_OTHERS, INSTANCE_FOR_SHADOWS, Instance,
-        KdBox, KdNode, KdRope, Light, Material, Plane, Slab, TRIANGLE_HIDDEN, Triangle,
+        AccelConstants, Frame, GridCell, Hit, INSTANCE_FOR_CAMERA, INSTANCE_FOR_OTHERS, INSTANCE_FOR_SHADOWS,
+        INSTANCE_MASK_SHIFT, Instance, KdBox, KdNode, KdRope, Light, Material, Plane, Slab, TRIANGLE_HIDDEN, Triangle,
     },
     world::{Emitters, Geometry, Instances, Textures, World, instances::Stored},
 };
@@ -77,6 +77,8 @@ pub struct KernelInputs<'a, R = NoCounter> {
     pub n_grid_levels: u32,
     /// The instances of which the world consists; `None` if it is flat.
     pub instanced: Option<Instanced<'a>>,
+    /// The bits of [`Instance::flags`] of which rays that are neither the camera's nor shadow rays want one.
+    pub other_rays: u32,
     /// The instance whose geometry is searched: the arrays of the structure, `box_min`, `box_max`, `origin_reach` and
     /// `triangles` are the geometry's, and the indices of triangles are those within it.
     pub inside: Option<&'a Instance>,
@@ -179,12 +181,12 @@ impl<'a, R> KernelInputs<'a, R> {
         }
     }
 
-    /// Returns the kind of the rays, as a bit of [`Instance::flags`].
+    /// Returns the kind of the rays: bits of [`Instance::flags`], of which an instance that they meet has one.
     pub(super) fn kind_of_rays(&self, any_hit: bool) -> u32 {
         match self.tests_blended && any_hit {
             _ if self.is_of_camera => INSTANCE_FOR_CAMERA,
             true => INSTANCE_FOR_SHADOWS,
-            false => INSTANCE_FOR_OTHERS,
+            false => self.other_rays,
         }
     }
 
@@ -314,6 +316,7 @@ impl<'a> KernelInputs<'a> {
             grid_cells: CountedSlice::from(&[][..]),
             n_grid_levels: 0,
             instanced: None,
+            other_rays: INSTANCE_FOR_OTHERS,
             inside: None,
         }
     }
@@ -350,6 +353,7 @@ impl<'a> KernelInputs<'a> {
             grid_cells: self.grid_cells.with_counter(Counted(&counts.n_nodes)),
             n_grid_levels: self.n_grid_levels,
             instanced: self.instanced,
+            other_rays: self.other_rays,
             inside: self.inside,
         }
     }
@@ -360,6 +364,12 @@ impl<'a> KernelInputs<'a> {
     /// Nothing was hit.
     pub fn material_at(&self, hit: &Hit) -> &'a Material {
         &self.materials[self.material_ix_of(hit.triangle_ix) as usize]
+    }
+
+    /// Returns the same inputs, but rays that are neither the camera's nor shadow rays meet the instances whose masks
+    /// have a bit in common with this one.
+    pub fn with_mask(self, mask: u8) -> Self {
+        Self { other_rays: u32::from(mask) << INSTANCE_MASK_SHIFT, ..self }
     }
 
     /// Returns the same inputs, but rays pass through triangles whose word is `TRIANGLE_HIDDEN`. There is one word

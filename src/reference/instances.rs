@@ -78,7 +78,7 @@ impl TopCell {
         true
     }
 
-    /// Goes on to the next instance that may have a hit nearer than `t_best`, and whose flags have the bit `kind`.
+    /// Goes on to the next instance that may have a hit nearer than `t_best`, and whose flags have a bit of `kind`.
     fn find_instance<'a>(
         &mut self,
         ray: &TopRay,

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::{Instances, Mismatch, Parts, World, emissive::is_emissive, instances::flags_of};
 use crate::{
     accel::{Accel, two_level::TwoLevel},
-    layout::{INSTANCE_MIRRORED, Instance},
+    layout::{INSTANCE_FOR_OTHERS, INSTANCE_MASK_SHIFT, INSTANCE_MIRRORED, Instance},
     scene::{
         RayKinds, Transform,
         mesh::{MAX_COORDINATE, box_corners},
@@ -29,8 +29,12 @@ pub struct InstanceUpdate {
     pub transform: Option<Transform>,
     /// The materials of the slots, as those of [`Instance::materials`](crate::scene::Instance::materials).
     pub materials: Option<Vec<u32>>,
-    /// The rays that meet the instance.
+    /// The rays that meet the instance. [`RayKinds::other`] also sets all bits of the mask, or none.
     pub rays: Option<RayKinds>,
+    /// The mask: a cast meets the instance if the cast's mask
+    /// ([`Caster::set_mask`](crate::engine::Caster::set_mask)) has a bit in common with it. At first it is 0xff, or 0
+    /// if `other` rays pass through the instance. With 0, paths pass through it as well.
+    pub mask: Option<u8>,
 }
 
 impl World {
@@ -67,7 +71,10 @@ impl World {
                 materials.iter().any(|material| is_emissive[*material as usize])
             };
             let changes_light = is_emissive.contains(&true)
-                && (update.transform.is_some() || update.materials.is_some() || update.rays.is_some());
+                && (update.transform.is_some()
+                    || update.materials.is_some()
+                    || update.rays.is_some()
+                    || update.mask.is_some());
             keeps_emitters &= !(changes_light && emits(&instances));
             if let Some(materials) = &update.materials {
                 check_materials(materials, scene.materials.len()).map_err(wrong)?;
@@ -84,6 +91,9 @@ impl World {
             }
             if let Some(rays) = update.rays {
                 instance.flags = instance.flags & INSTANCE_MIRRORED | flags_of(rays);
+            }
+            if let Some(mask) = update.mask {
+                instance.flags = instance.flags & !INSTANCE_FOR_OTHERS | u32::from(mask) << INSTANCE_MASK_SHIFT;
             }
         }
         Ok(self.with_instances(two, instances, keeps_emitters))

@@ -138,7 +138,7 @@ fn moved_and_hidden_instances_change_the_lists() {
     let mut caster = GpuCaster::new(device(), world.geometry(), Traversal::OF_GPUS).expect("a caster");
     let before = caster.all_hits(&rays, None).expect("lists");
     let transform = Transform::new(DVec3::ONE, DQuat::IDENTITY, DVec3::new(0.0, 3.0, 0.0)).expect("a transform");
-    let update = InstanceUpdate { instance_ix: 3, transform: Some(transform), materials: None, rays: None };
+    let update = InstanceUpdate { instance_ix: 3, transform: Some(transform), ..Default::default() };
     let moved = world.with_instances_changed(&[update]).expect("a world");
     caster.set_world(&moved).expect("the caster's world");
     let after = caster.all_hits(&rays, None).expect("lists");

@@ -6,10 +6,10 @@ use kdray::{
         Query,
         kdtree::{BuildOptions, Traversal},
     },
-    cast::{CpuCaster, GpuCaster, Hit, NO_TRIANGLE, Ray, cast_on_cpu},
+    cast::{CpuCaster, GpuCaster, Hit, NO_TRIANGLE, QueryPoint, Ray, cast_on_cpu},
     layout::{INSTANCE_FOR_OTHERS, Triangle},
     scene::{Scene, Transform},
-    world::{FlatScene, World},
+    world::{FlatScene, InstanceUpdate, World},
 };
 
 use super::{ball, flattened, kept, scene_of, transforms};
@@ -203,4 +203,48 @@ fn rays_meet_only_instances_for_their_kind() {
     assert!(n_hits(&hits) > 200 && hits.iter().all(|hit| hit.triangle_ix < n || hit.triangle_ix == NO_TRIANGLE));
     let mut caster = GpuCaster::new(device(), world.geometry(), Traversal::OF_GPUS).expect("a caster");
     compare::hits(1, &hits, &caster.cast(&rays, Query::Closest, 1).expect("hits").hits).unwrap();
+}
+
+/// The masks of four instances: two have a bit in common, one has another bit, and one has none.
+const MASKS: [u8; 4] = [0x81, 0x01, 0x02, 0x00];
+
+/// Casts with masks find what casts without masks find in a world without the other instances.
+#[test]
+fn casts_meet_the_instances_of_their_mask() {
+    let (transforms, mesh) = (&transforms(4.0)[..4], ball());
+    let world = kept(&scene_of(&mesh, transforms));
+    let update = |(instance_ix, mask)| InstanceUpdate { instance_ix, mask: Some(mask), ..InstanceUpdate::default() };
+    let updates: Vec<_> = MASKS.into_iter().enumerate().map(update).collect();
+    let masked = world.with_instances_changed(&updates).expect("a world");
+    let rays = rays_at(transforms, 1500);
+    let point = |ray: &Ray| QueryPoint { position: ray.origin, t_max: f32::INFINITY };
+    let points: Vec<_> = rays[..500].iter().map(point).collect();
+    let mut on_cpu = CpuCaster::new(masked.geometry(), Traversal::Stack);
+    let mut on_device = GpuCaster::new(device(), masked.geometry(), Traversal::OF_GPUS).expect("a caster");
+    let mut n_of_masks = Vec::new();
+    for mask in [0xff, 0x01, 0x80, 0x82, 0x40] {
+        let n = mesh.len() as u32;
+        let unmet = (0..4).filter(|ix| MASKS[*ix as usize] & mask == 0).flat_map(|ix| ix * n..(ix + 1) * n);
+        let expected = CpuCaster::new(world.geometry(), Traversal::Stack).hiding(&unmet.collect::<Vec<_>>()).unwrap();
+        on_cpu.set_mask(mask).expect("a mask");
+        on_device.set_mask(mask).expect("a mask");
+        let closest = expected.cast(&rays, Query::Closest);
+        compare::exact(&closest, &on_cpu.cast(&rays, Query::Closest)).unwrap();
+        compare::hits(3, &closest, &on_device.cast(&rays, Query::Closest, 1).expect("hits").hits).unwrap();
+        n_of_masks.push(n_hits(&closest));
+        assert_eq!(n_hits(&on_cpu.cast(&rays, Query::Any)), n_hits(&closest));
+        assert!(n_hits(&on_device.cast(&rays, Query::Any, 1).expect("hits").hits).abs_diff(n_hits(&closest)) < 3);
+        let counts = expected.count_hits(&rays);
+        assert_eq!(on_cpu.count_hits(&rays), counts);
+        compare::exact_but_for(6, &counts, &on_device.count_hits(&rays).expect("counts")).unwrap();
+        let nearest = expected.closest_points(&points).expect("points");
+        compare::exact(&nearest, &on_cpu.closest_points(&points).expect("points")).unwrap();
+        let found = on_device.closest_points(&points, 1).expect("points").hits;
+        let differ = |(a, b): (&Hit, &Hit)| a.t != b.t && (a.t - b.t).abs() > 1e-5 * a.t;
+        assert!(!nearest.iter().zip(&found).any(differ));
+    }
+    assert!(n_of_masks.is_sorted_by(|a, b| a != b) && n_of_masks[4] == 0, "{n_of_masks:?}");
+    for refused in [on_cpu.set_mask(0), on_device.set_mask(0)] {
+        assert_eq!(refused.unwrap_err().to_string(), "mask is 0, not at least 1");
+    }
 }

@@ -117,7 +117,7 @@ fn hidden_and_moved_instances_are_left_out() {
     caster.closest_points(&points, 1).expect("hits");
     let away = Transform::new(DVec3::ONE, DQuat::IDENTITY, DVec3::new(0.5, 0.5, 3.0)).expect("a transform");
     let none = RayKinds { camera: true, shadow: true, other: false };
-    let update = |instance_ix| InstanceUpdate { instance_ix, transform: None, materials: None, rays: None };
+    let update = |instance_ix| InstanceUpdate { instance_ix, ..InstanceUpdate::default() };
     let updates =
         [InstanceUpdate { transform: Some(away), ..update(3) }, InstanceUpdate { rays: Some(none), ..update(0) }];
     let moved = world.with_instances_changed(&updates).expect("a world");

@@ -56,10 +56,10 @@ fn change(scene: &mut Scene, random: &mut Random) -> Vec<InstanceUpdate> {
         let materials: Option<Vec<u32>> = (random.below(2) == 0).then(|| list(random));
         let kinds = RayKinds { camera: random.below(4) > 0, shadow: random.below(4) > 0, other: random.below(4) > 0 };
         let rays = (random.below(3) == 0).then_some(kinds);
-        Some(InstanceUpdate { instance_ix, transform, materials, rays })
+        Some(InstanceUpdate { instance_ix, transform, materials, rays, mask: None })
     });
     let updates: Vec<InstanceUpdate> = updates.collect();
-    for InstanceUpdate { instance_ix, transform, materials, rays } in updates.clone() {
+    for InstanceUpdate { instance_ix, transform, materials, rays, .. } in updates.clone() {
         let instance = &mut scene.instances[instance_ix];
         instance.transform = transform.unwrap_or(instance.transform.clone());
         instance.materials = materials.unwrap_or(instance.materials.clone());
@@ -183,7 +183,7 @@ fn ten_thousand_updates_take_no_memory() {
             instance_ix: random.below(5),
             transform: Some(some_transform(&mut random)),
             materials: Some(vec![random.below(4) as u32]),
-            rays: None,
+            ..InstanceUpdate::default()
         };
         world = world.with_instances_changed(&[moved]).expect("a world");
         caster.set_world(&world).expect("a change");

@@ -12,9 +12,9 @@
 // component of a corner in the world is off by 6 u of the sum of its own. Both are covered by 8 u of the sums of all
 // components (`slack`). A share of 2^-19 of |N| covers its own rounding and that of `limit_of`.
 //
-// Needs constants.glsl, scene.glsl, search/suspended_rays.glsl, search/traversal_ray.glsl, search/magnitude.glsl and
-// kdtree/distant_cells.glsl. Provides `LocalQuery`, `local_query`, `limit_of` and `find_closer_instance`, and what
-// top_nodes.glsl does.
+// Needs `batch`, constants.glsl, scene.glsl, search/suspended_rays.glsl, search/traversal_ray.glsl,
+// search/magnitude.glsl and kdtree/distant_cells.glsl. Provides `LocalQuery`, `local_query`, `limit_of` and
+// `find_closer_instance`, and what top_nodes.glsl does.
 
 #include "instances/top_nodes.glsl"
 
@@ -77,7 +77,7 @@ void enter_nearer(Query query, uint pair, inout TopCell at) {
     at.pending = (at.pending << 1) | 1u;
 }
 
-// Goes on to the next instance that may have a point as close as the best one, of those that rays of casts meet.
+// Goes on to the next instance that may have a point as close as the best one, of those that the search's mask meets.
 // Returns false if none is left, or if the invocation's loop iterations are spent.
 bool find_closer_instance(Query query, float best_squared, inout TopCell at) {
     bool found = false;
@@ -90,7 +90,7 @@ bool find_closer_instance(Query query, float best_squared, inout TopCell at) {
             enter_nearer(query, node.link, at);
         } else {
             uint instance_ix = may_be ? node.link & ~TOP_LEAF : 0u;
-            found = may_be && (floatBitsToUint(instance_row(instance_ix, 4u).w) & INSTANCE_FOR_OTHERS) != 0u;
+            found = may_be && (floatBitsToUint(instance_row(instance_ix, 4u).w) & batch.mask) != 0u;
             if (!found) leave_node(at);
         }
         looks = !found && at.node_ix != NO_TRIANGLE && has_iterations();

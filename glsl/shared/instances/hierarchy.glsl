@@ -8,8 +8,8 @@
 // that an instance is entered whenever the transformed ray can have a hit in it.
 //
 // Needs scene.glsl, search/suspended_rays.glsl, search/steps.glsl, search/traversal_ray.glsl, grid/grid.glsl,
-// TESTS_BLENDED and FROM_CAMERA. Provides `TopRay`, `top_ray`, `kind_of_rays`, `find_instance`, `in_geometry`, and what
-// top_nodes.glsl does.
+// TESTS_BLENDED, FROM_CAMERA and in casts MASK_OF_CAST. Provides `TopRay`, `top_ray`, `kind_of_rays`, `find_instance`,
+// `in_geometry`, and what top_nodes.glsl does.
 
 #include "instances/top_nodes.glsl"
 
@@ -55,13 +55,16 @@ bool enter_child(TopRay ray, uint pair, float t_best, inout TopCell at) {
     return true;
 }
 
-// The kind of the invocation's rays, as a bit of `Instance.flags`.
+// The kind of the invocation's rays: bits of `Instance.flags`, of which an instance that they meet has one.
 uint kind_of_rays(bool any_hit) {
+#ifdef MASK_OF_CAST
+    return MASK_OF_CAST;
+#endif
     if (FROM_CAMERA) return INSTANCE_FOR_CAMERA;
     return TESTS_BLENDED && any_hit ? INSTANCE_FOR_SHADOWS : INSTANCE_FOR_OTHERS;
 }
 
-// Goes on to the next instance that may have a hit nearer than t_best, and whose flags have the bit `kind`. Returns
+// Goes on to the next instance that may have a hit nearer than t_best, and whose flags have a bit of `kind`. Returns
 // false if none is left, or if the invocation's loop iterations are spent. instance_ix: the instance.
 bool find_instance(TopRay ray, float t_best, uint kind, inout TopCell at, out uint instance_ix) {
     bool found = false;
