@@ -65,8 +65,22 @@ impl TwoLevel {
         options: &AccelOptions,
         progress: &Progress,
     ) -> Self {
-        let build = |range: &StoredRange| Arc::new(BottomLevel::build(range.of(stored), options, progress));
-        Self::of_structures(ranges.par_iter().map(build).collect(), instances)
+        Self::build_missing(vec![None; ranges.len()], (stored, ranges), instances, (options, progress))
+    }
+
+    /// Does what [`TwoLevel::build`] does, but takes the structures that are given.
+    pub(crate) fn build_missing(
+        given: Vec<Option<Arc<BottomLevel>>>,
+        (stored, ranges): (&[Triangle], &[StoredRange]),
+        instances: &[Instance],
+        (options, progress): (&AccelOptions, &Progress),
+    ) -> Self {
+        let n_built = |(range, given): (&StoredRange, &Option<_>)| if given.is_some() { 0 } else { range.n_triangles };
+        let parts = progress.parts(ranges.iter().zip(&given).map(n_built));
+        let build = |((range, given), part): ((&StoredRange, Option<_>), Progress)| {
+            given.unwrap_or_else(|| Arc::new(BottomLevel::build(range.of(stored), options, &part)))
+        };
+        Self::of_structures(ranges.par_iter().zip(given).zip(parts).map(build).collect(), instances)
     }
 
     fn of_structures(structures: Vec<Arc<BottomLevel>>, instances: &[Instance]) -> Self {

@@ -1,9 +1,9 @@
 //! Progress of long work, which the library reports and a program shows.
 
 use std::{
-    fmt,
+    fmt, mem,
     sync::{
-        Arc,
+        Arc, Mutex, PoisonError,
         atomic::{AtomicU64, Ordering},
     },
 };
@@ -21,7 +21,8 @@ pub enum Work {
 
 /// Receives reports of progress, from any thread.
 pub trait Observer: Send + Sync {
-    /// `share` of the work is done, 0 to 1. Work of one kind can begin several times, for example with each file.
+    /// `share` of the work is done, 0 to 1. Work of one kind can begin several times, for example with each file. An
+    /// observer that unwinds ends the work.
     fn progress(&self, work: Work, share: f32);
 }
 
@@ -40,6 +41,19 @@ impl Progress {
         if let Some(observer) = &self.0 {
             observer.progress(work, share);
         }
+    }
+
+    /// Returns what reports of parts of the work go to. A part counts by its size.
+    pub(crate) fn parts(&self, sizes: impl Iterator<Item = u32>) -> Vec<Self> {
+        let Some(observer) = &self.0 else { return sizes.map(|_| Self::default()).collect() };
+        let sizes: Vec<u32> = sizes.collect();
+        let total = sizes.iter().map(|size| f64::from(*size)).sum::<f64>().max(1.0);
+        let done = Arc::new(Mutex::new(0.0));
+        let part = |size: u32| {
+            let (observer, done) = (Arc::clone(observer), Arc::clone(&done));
+            Self::to(Arc::new(Part { observer, weight: f64::from(size) / total, done, told: Mutex::new(0.0) }))
+        };
+        sizes.into_iter().map(part).collect()
     }
 
     /// Begins work of `total` units.
@@ -65,6 +79,30 @@ impl PartialEq for Progress {
     }
 }
 
+/// The observer of a part of some work.
+struct Part {
+    /// That of the whole work.
+    observer: Arc<dyn Observer>,
+    weight: f64,
+    /// The share of the whole work that is done.
+    done: Arc<Mutex<f64>>,
+    /// The share of the part that is done.
+    told: Mutex<f32>,
+}
+
+impl Observer for Part {
+    fn progress(&self, work: Work, share: f32) {
+        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        let greater = told.max(share);
+        let more = greater - mem::replace(&mut *told, greater);
+        let mut done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
+        *done += self.weight * f64::from(more);
+        let share = done.min(1.0) as f32;
+        drop((told, done));
+        self.observer.progress(work, share);
+    }
+}
+
 /// Counts units of work that is under way.
 pub(crate) struct Meter<'a> {
     observer: Option<&'a dyn Observer>,
@@ -79,5 +117,31 @@ impl Meter<'_> {
         let Some(observer) = self.observer else { return };
         let done = self.done.fetch_add(n, Ordering::Relaxed) + n;
         observer.progress(self.work, (done as f64 / self.total.max(1) as f64).min(1.0) as f32);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Default)]
+    struct Shares(Mutex<Vec<f32>>);
+
+    impl Observer for Shares {
+        fn progress(&self, _: Work, share: f32) {
+            self.0.lock().unwrap().push(share);
+        }
+    }
+
+    #[test]
+    fn parts_count_by_their_sizes() {
+        let shares = Arc::new(Shares::default());
+        let progress = Progress::to(Arc::clone(&shares) as Arc<dyn Observer>);
+        let parts = progress.parts([3, 0, 1].into_iter());
+        for (part, share) in [(2, 1.0), (0, 0.5), (1, 1.0), (0, 0.25), (0, 1.0)] {
+            parts[part].report(Work::Building, share);
+        }
+        assert_eq!(*shares.0.lock().unwrap(), [0.25, 0.625, 0.625, 0.625, 1.0]);
+        assert!(Progress::default().parts([1].into_iter())[0] == Progress::default());
     }
 }

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::{
     Mismatch, Textures,
     instances::{Instances, Kept, Stored},
+    rebuilt::Reused,
 };
 use crate::{
     accel::two_level::StoredRange,
@@ -119,20 +120,34 @@ impl FlatScene {
     /// # Errors
     /// Fails as [`FlatScene::new`] does, or if the instances have more triangles than there are indices.
     pub fn with_instances(scene: &Scene) -> Result<Self, Mismatch> {
+        Ok(Self::with_reused(scene, |_| None)?.0)
+    }
+
+    /// Does what [`Self::with_instances`] does, but takes the triangles of some meshes over. Returns the scene, and for
+    /// each geometry what it has taken over.
+    pub(super) fn with_reused<'a>(
+        scene: &Scene,
+        reused: impl Fn(usize) -> Option<Reused<'a>>,
+    ) -> Result<(Self, Vec<Option<Reused<'a>>>), Mismatch> {
         if scene.n_triangles() == 0 {
-            return Self::new(scene);
+            return Ok((Self::new(scene)?, Vec::new()));
         }
         check_instances(scene)?;
         let (instances, kept) = Instances::of_scene(scene)?;
         let n_stored = kept.iter().map(|it| scene.meshes[it.mesh_ix].faces.len()).sum();
         let mut parts = Parts { triangles: Vec::with_capacity(n_stored), ..Parts::default() };
-        for Kept { mesh_ix, transform, instance_ix } in &kept {
-            parts.push(&scene.meshes[*mesh_ix], transform, *instance_ix)?;
+        let in_own_space = |it: &Kept| Some(it.mesh_ix).filter(|_| it.transform == Transform::IDENTITY);
+        let reused: Vec<_> = kept.iter().map(|it| in_own_space(it).and_then(&reused)).collect();
+        for (Kept { mesh_ix, transform, instance_ix }, reused) in kept.iter().zip(&reused) {
+            match reused {
+                Some(Reused { triangles, .. }) => parts.triangles.extend_from_slice(triangles),
+                None => parts.push(&scene.meshes[*mesh_ix], transform, *instance_ix)?,
+            }
             parts.materials.extend(&scene.meshes[*mesh_ix].slots);
         }
         let placed: Vec<_> = kept.iter().map(|it| (&scene.meshes[it.mesh_ix], &it.transform)).collect();
         let textures = Textures::new(scene, &placed)?;
-        Ok(Self::of_parts(scene, parts, textures, Some(instances)))
+        Ok((Self::of_parts(scene, parts, textures, Some(instances)), reused))
     }
 
     fn of_parts(scene: &Scene, parts: Parts, textures: Textures, instances: Option<Instances>) -> Self {

@@ -22,6 +22,7 @@ mod moved;
 mod path_materials;
 #[cfg(feature = "files")]
 mod posed;
+mod rebuilt;
 mod scene_hash;
 #[doc(hidden)]
 pub mod texture;

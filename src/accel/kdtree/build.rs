@@ -79,6 +79,8 @@ fn grow((input, meter): (Input, &Meter), references: Vec<Reference>, cell: Build
     if references.len() <= TASK_REFERENCES {
         return subtree(references);
     }
+    // The observer may stop the build, which takes long until the first subtree is done.
+    meter.add(0);
     let Some((split, cells)) = cell.split(&references, input.options, &mut Search::default()) else {
         // The cell becomes a leaf. This is rare: nearly all of its triangles coincide, or a split exceeds the budget.
         return subtree(references);
