@@ -39,7 +39,7 @@ class RaycastingScene:
     Methods have the names, shapes and types of Open3D's ``t.geometry.RaycastingScene``, and take anything that numpy
     can read: arrays, nested lists, tensors of the CPU by ``__array__`` or ``__dlpack__``. Integers and booleans become
     float32 where numbers are expected. Every method may be called from any thread; a scene does one thing at a time.
-    Structures are built when a query first needs them, and again after changes.
+    Structures are built when a query first needs them, and those of changed geometries again after changes.
 
     Lengths are in the unit of the vertices. Coordinates may be float64: they are rounded to float32 relative to the
     scene's ``origin``.
@@ -146,6 +146,14 @@ class RaycastingScene:
     def remove(self, id: int) -> None:
         """Removes a geometry. The ids of all others stay."""
         self._core.remove(arrays.integer("id", id))
+
+    def build(self, nthreads: int = 0, *, progress: Callable[[float], object] | None = None) -> None:
+        """Builds what the next query would build, and uploads it. Ctrl-C ends it, as it does in a query.
+
+        ``progress`` is called with the share that is done, 0 to 1, some times a second, on this thread. If it raises an
+        exception, the build ends with it. A build that was ended leaves the scene as it was.
+        """
+        self._core.build(self._threads(nthreads), progress)
 
     # Rays
 

@@ -5,6 +5,7 @@
 //! scene     the class `Core`: a lock, and what Python hands over
 //!   state     geometries, the world that is made of them, casters
 //!   columns   hits to the arrays of results
+//!   watched  builds, of whose progress Python is told
 //! pictures  the class `CoreScene`: a file that is rendered
 //! process   the pools of threads, the devices, and the refusal of forked children
 //! ```
@@ -14,6 +15,7 @@ mod pictures;
 mod process;
 mod scene;
 mod state;
+mod watched;
 
 /// The compiled part of `kdray`. Its interface may change; use that of `kdray`.
 #[pyo3::pymodule]

@@ -11,6 +11,7 @@ use glam::{DMat4, DVec3, DVec4, Vec3};
 use kdray::{
     accel::Query,
     cast::{Hit, NO_TRIANGLE, QueryPoint, RAYS_PER_PART, Ray},
+    engine::Caster,
 };
 use numpy::{
     IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyReadwriteArray1, PyReadwriteArray2,
@@ -22,7 +23,8 @@ use rayon::prelude::*;
 use super::{
     columns::{Columns, Found},
     process::{Selector, check_fork, engine, failed, is_forked, name_of, pool},
-    state::State,
+    state::{Placed, State},
+    watched::watched,
 };
 
 /// Rays that are cast between two looks at Ctrl-C, by a GPU or by others: some tenths of a second.
@@ -172,19 +174,30 @@ impl Core {
     }
 }
 
-/// Calls `chunk` on the pool with the first of each `at_once` of `n` queries. In between, the caller's own thread lets
-/// Python raise KeyboardInterrupt.
-fn in_chunks(
+/// The queries of a call.
+struct Queries<'a> {
     n: usize,
+    /// How many are made between two looks at Ctrl-C.
     at_once: usize,
-    pool: &rayon::ThreadPool,
-    mut chunk: impl FnMut(usize) -> PyResult<()> + Send,
+    mask: u8,
+    pool: &'a rayon::ThreadPool,
+}
+
+/// Sees to what casts the queries, and calls `chunk` on the pool with the first of each `at_once` of them. In between,
+/// the caller's own thread lets Python raise KeyboardInterrupt.
+fn in_chunks(
+    state: &mut State,
+    Queries { n, at_once, mask, pool }: Queries,
+    mut chunk: impl FnMut(usize, (&mut Caster<'static>, Placed)) -> PyResult<()> + Send,
 ) -> PyResult<()> {
+    if n > 0 {
+        watched(pool, |progress| state.prepare(n, progress), |_| Ok(()))?;
+    }
     for first in (0..n).step_by(at_once) {
         if first > 0 {
             Python::attach(|py| py.check_signals())?;
         }
-        pool.install(|| chunk(first))?;
+        pool.install(|| chunk(first, state.caster(n, mask)?))?;
     }
     Ok(())
 }
@@ -269,6 +282,31 @@ impl Core {
         self.with(py, |state| Ok(state.n_ids()))
     }
 
+    /// Builds what the next query needs, and calls `progress` with the share that is done.
+    fn build(&self, py: Python, n_threads: usize, progress: Option<Py<PyAny>>) -> PyResult<()> {
+        let pool = pool(n_threads)?;
+        let tell = |share: f32| match &progress {
+            Some(progress) => Python::attach(|py| progress.call1(py, (share,))).map(|_| ()),
+            None => Ok(()),
+        };
+        self.with(py, |state| {
+            let n = RAYS_AT_ONCE[0];
+            watched(&pool, |progress| state.prepare(n, progress), tell)?;
+            pool.install(|| state.caster(n, u8::MAX).map(|_| ()))?;
+            tell(1.0)
+        })
+    }
+
+    /// Whether the next query builds nothing. For tests.
+    fn is_built(&self, py: Python) -> PyResult<bool> {
+        self.with(py, |state| Ok(state.is_built()))
+    }
+
+    /// The addresses of the structures of geometries: what has not changed keeps its own. For tests.
+    fn structures(&self, py: Python) -> PyResult<Vec<usize>> {
+        self.with(py, |state| Ok(state.structures()))
+    }
+
     /// A geometry, or None where one was removed.
     fn geometry<'py>(&self, py: Python<'py>, id: u32) -> PyResult<Option<Parts<'py>>> {
         let geometry = self.with(py, |state| Ok(state.geometry(id).cloned()))?;
@@ -296,11 +334,10 @@ impl Core {
         let pool = pool(n_threads)?;
         self.with(py, |state| {
             let at_once = of_processor(RAYS_AT_ONCE, state);
-            in_chunks(rows.len(), at_once, &pool, |first| {
+            in_chunks(state, Queries { n: rows.len(), at_once, mask, pool: &pool }, |first, (caster, placed)| {
                 let n = at_once.min(rows.len() - first);
                 let parts: Vec<_> =
                     columns.split_off_parts(n, RAYS_PER_PART).into_iter().map(|part| Mutex::new(Some(part))).collect();
-                let (caster, placed) = state.caster(rows.len(), mask)?;
                 let take = |begin: usize, hits: &[Hit]| {
                     let part = locked(&parts[begin / RAYS_PER_PART]).take().expect("each part is taken once");
                     part.write(placed, hits);
@@ -326,7 +363,7 @@ impl Core {
         let pool = pool(n_threads)?;
         self.with(py, |state| {
             let at_once = of_processor(RAYS_AT_ONCE, state);
-            in_chunks(rows.len(), at_once, &pool, |first| {
+            in_chunks(state, Queries { n: rows.len(), at_once, mask, pool: &pool }, |first, (caster, _)| {
                 let n = at_once.min(rows.len() - first);
                 let parts: Vec<_> = output[first..][..n].chunks_mut(RAYS_PER_PART).map(Mutex::new).collect();
                 let take = |begin: usize, hits: &[Hit]| {
@@ -334,7 +371,7 @@ impl Core {
                     part.iter_mut().zip(hits).for_each(|(out, hit)| *out = hit.triangle_ix != NO_TRIANGLE);
                 };
                 let make = |begin: usize, rays: &mut [Ray]| rows.write(first + begin, rays);
-                state.caster(rows.len(), mask)?.0.cast_stream(n, Query::Any, make, take).map_err(failed)
+                caster.cast_stream(n, Query::Any, make, take).map_err(failed)
             })
         })
     }
@@ -354,9 +391,9 @@ impl Core {
         let pool = pool(n_threads)?;
         self.with(py, |state| {
             let at_once = of_processor(QUERIES_AT_ONCE, state);
-            in_chunks(rows.len(), at_once, &pool, |first| {
+            in_chunks(state, Queries { n: rows.len(), at_once, mask, pool: &pool }, |first, (caster, _)| {
                 let rays = rows.rays(first, at_once);
-                let counts = state.caster(rows.len(), mask)?.0.count_hits(&rays).map_err(failed)?;
+                let counts = caster.count_hits(&rays).map_err(failed)?;
                 output[first..].iter_mut().zip(&counts).for_each(|(out, count)| *out = *count as i32);
                 Ok(())
             })
@@ -379,9 +416,8 @@ impl Core {
         let (mut geometry_ids, mut primitive_ids, mut uvs) = (Vec::new(), Vec::new(), Vec::new());
         self.with(py, |state| {
             let at_once = of_processor(QUERIES_AT_ONCE, state);
-            in_chunks(rows.len(), at_once, &pool, |first| {
+            in_chunks(state, Queries { n: rows.len(), at_once, mask, pool: &pool }, |first, (caster, placed)| {
                 let rays = rows.rays(first, at_once);
-                let (caster, placed) = state.caster(rows.len(), mask)?;
                 let all = caster.all_hits(&rays, most_per_ray).map_err(failed)?;
                 let before = t_hit.len() as u64;
                 if before + all.hits.len() as u64 > u64::from(u32::MAX) {
@@ -423,11 +459,10 @@ impl Core {
         let pool = pool(n_threads)?;
         self.with(py, |state| {
             let at_once = of_processor(QUERIES_AT_ONCE, state);
-            in_chunks(points.len(), at_once, &pool, |first| {
+            in_chunks(state, Queries { n: points.len(), at_once, mask, pool: &pool }, |first, (caster, placed)| {
                 let end = points.len().min(first + at_once);
                 let query = |p: &[f32; 3]| QueryPoint { position: Vec3::from(*p), t_max: f32::INFINITY };
                 let queries: Vec<_> = points[first..end].par_iter().with_min_len(1024).map(query).collect();
-                let (caster, placed) = state.caster(points.len(), mask)?;
                 let hits = caster.closest_points(&queries, 1).map_err(failed)?.hits;
                 columns.split_off(hits.len()).write(placed, &hits);
                 Ok(())

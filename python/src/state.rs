@@ -1,14 +1,17 @@
 //! The geometries of a scene, and the world that is made of them when rays need it.
 
+use std::sync::Arc;
+
 use glam::{DMat4, DVec3, Vec3};
 use kdray::{
-    accel::kdtree::Traversal,
+    accel::{Accel, kdtree::Traversal},
     engine::{
         Caster, Engine, LoadRequest, Opened, Source, Work,
         choices::{Request, Workload},
     },
     gpu::GpuError,
     scene::{Camera, Instance, Material, Mesh, Projection, RenderDefaults, Scene, Transform},
+    util::progress::Progress,
     world::{InstanceUpdate, Mismatch, World, instances::Instancing},
 };
 use pyo3::{
@@ -38,8 +41,9 @@ pub struct Geometry {
     pub transform: DMat4,
     /// Rays meet the geometry if their mask has a bit in common with it.
     pub mask: u8,
-    /// The scene's counter of changes when the transform or the mask was last set.
+    /// The scene's counter of changes when the transform or the mask was last set, and when the vertices were.
     moved_at: u64,
+    shaped_at: u64,
 }
 
 /// The geometry of an instance of a world.
@@ -121,8 +125,8 @@ impl State {
         if mask != ALL {
             self.places_at = self.now;
         }
-        let (transform, moved_at) = (DMat4::IDENTITY, self.now);
-        self.geometries.push(Some(Geometry { vertices, faces, transform, mask, moved_at }));
+        let (transform, [moved_at, shaped_at]) = (DMat4::IDENTITY, [self.now; 2]);
+        self.geometries.push(Some(Geometry { vertices, faces, transform, mask, moved_at, shaped_at }));
         Ok(self.geometries.len() as u32 - 1)
     }
 
@@ -142,6 +146,7 @@ impl State {
     /// Replaces vertices of a geometry from `first` on.
     pub fn set_vertices(&mut self, id: u32, first: usize, vertices: &[Vec3]) -> PyResult<()> {
         check_finite("vertex_positions", vertices)?;
+        let now = self.now + 1;
         let geometry = self.geometry_mut(id)?;
         let n = geometry.vertices.len();
         let Some(range) = first.checked_add(vertices.len()).and_then(|end| geometry.vertices.get_mut(first..end))
@@ -150,8 +155,8 @@ impl State {
             return Err(PyIndexError::new_err(what));
         };
         range.copy_from_slice(vertices);
-        self.now += 1;
-        self.shapes_at = self.now;
+        geometry.shaped_at = now;
+        (self.now, self.shapes_at) = (now, now);
         Ok(())
     }
 
@@ -190,35 +195,51 @@ impl State {
         self.engine.device().is_some_and(|device| !device.is_software())
     }
 
-    /// Returns what casts `n` rays or points with a mask into the geometries as they are now, and what their hits are
-    /// in.
-    pub fn caster(&mut self, n: usize, mask: u8) -> PyResult<(&mut Caster<'static>, Placed<'_>)> {
+    /// Sees to a world of the geometries as they are now. `n`: the rays or points that are about to be cast.
+    pub fn prepare(&mut self, n: usize, progress: &Progress) -> PyResult<()> {
         if !self.geometries.iter().flatten().any(|geometry| !geometry.faces.is_empty()) {
             return Err(PyRuntimeError::new_err("the scene has no triangles: add_triangles adds some"));
         }
-        let before = self.ready.take();
-        let ready = self.current(before, n)?;
-        let (caster, placed) = self.ready.insert(ready).caster([&self.engine, &self.cpu], n)?;
+        // A world that moves is another one if that fails; one that is replaced stays until then.
+        if let Some(ready) = self
+            .ready
+            .take_if(|ready| ready.keeps && ready.shapes_at == self.shapes_at && ready.places_at < self.places_at)
+        {
+            self.ready = self.moved(ready).ok();
+        }
+        if !self.is_built() {
+            self.ready = Some(self.build(n, progress)?);
+        }
+        Ok(())
+    }
+
+    /// Whether there is a world of the geometries as they are now.
+    pub fn is_built(&self) -> bool {
+        let is_current = |ready: &Ready| (ready.shapes_at, ready.places_at) == (self.shapes_at, self.places_at);
+        self.ready.as_ref().is_some_and(is_current)
+    }
+
+    /// Returns what casts `n` rays or points with a mask, and what their hits are in. The scene is prepared.
+    pub fn caster(&mut self, n: usize, mask: u8) -> PyResult<(&mut Caster<'static>, Placed<'_>)> {
+        let ready = self.ready.as_mut().expect("the scene is prepared");
+        let (caster, placed) = ready.caster([&self.engine, &self.cpu], n)?;
         caster.set_mask(mask).map_err(failed)?;
         Ok((caster, placed))
     }
 
-    /// Returns a world of the geometries as they are now. `n_rays`: that are about to be cast.
-    fn current(&self, before: Option<Ready>, n_rays: usize) -> PyResult<Ready> {
-        match before {
-            Some(ready) if (ready.shapes_at, ready.places_at) == (self.shapes_at, self.places_at) => Ok(ready),
-            Some(ready) if ready.keeps && ready.shapes_at == self.shapes_at => match self.moved(ready) {
-                Ok(ready) => Ok(ready),
-                Err(_) => self.build(n_rays, None),
-            },
-            // The first move or mask gives geometries structures of their own, which further moves keep.
-            before => self.build(n_rays, before.filter(|before| before.keeps == self.keeps())),
+    /// The addresses of the structures of geometries, none if they have one together.
+    pub fn structures(&self) -> Vec<usize> {
+        match self.ready.as_ref().map(|ready| ready.world.accel()) {
+            Some(Accel::TwoLevel(two)) => two.structures().iter().map(|it| Arc::as_ptr(it).addr()).collect(),
+            _ => Vec::new(),
         }
     }
 
-    /// Geometries that never moved, and that all rays meet, are flattened: one structure is quicker than many.
+    /// Whether each geometry has a structure of its own, which changes of others keep. Geometries that never moved,
+    /// that all rays meet, and that no query has seen change are flattened: one structure is quicker than many.
     fn keeps(&self) -> bool {
-        self.places_at > 0
+        let n_geometries = self.geometries.iter().flatten().filter(|geometry| !geometry.faces.is_empty()).count();
+        self.places_at > 0 || (self.ready.is_some() && n_geometries > 1)
     }
 
     /// Gives the instances of a world the transforms and masks that their geometries have now.
@@ -241,25 +262,39 @@ impl State {
         Ok(ready)
     }
 
-    /// Builds a world. `before`: the world that it replaces, which tells that the scene's shapes change.
-    fn build(&self, n_rays: usize, before: Option<Ready>) -> PyResult<Ready> {
-        let keeps = self.keeps();
-        let n_rays = if before.is_some() { n_rays as u64 } else { EXPECTED_RAYS };
-        let pinned = before.map(|before| before.traversal);
+    /// Builds a world, of which it takes what it can from the world before.
+    fn build(&self, n_rays: usize, progress: &Progress) -> PyResult<Ready> {
+        let (keeps, before) = (self.keeps(), self.ready.as_ref());
+        // If shapes have changed, they may do so again before many rays are cast.
+        let n_rays = if before.is_some() && self.places_at == 0 { n_rays as u64 } else { EXPECTED_RAYS };
         let (scene, places) = self.scene();
-        let instances = if keeps { Instancing::Keep } else { Instancing::Flatten };
-        let engine = self.engine.clone().with_request(Request { instances, ..Request::default() });
-        let wrong = |error: &dyn std::error::Error| PyValueError::new_err(error.to_string());
-        let opened = Opened::read(Source::Scene(Box::new(scene)), &LoadRequest::rays(n_rays));
-        let opened = opened.map_err(|error| wrong(&error))?;
-        let world = engine.builder().build(opened, &Work::Rays(n_rays)).map_err(|error| wrong(&error))?.world;
-        let world = if keeps { self.masked(&world, &places).map_err(|error| wrong(&error))? } else { world };
-        let traversal = match pinned {
-            Some(traversal) => traversal,
-            None => engine.methods(&world, &Workload::of_rays(n_rays)).map_err(failed)?.traversal.value,
+        let same: Vec<_> = places.iter().map(|place| before?.same(place, self)).collect();
+        let world = match before {
+            Some(before) if keeps && before.keeps => before.world.rebuilt(&scene, &same, progress).map_err(wrong)?,
+            _ => self.load(scene, n_rays, keeps, progress)?,
+        };
+        let world = if keeps { self.masked(&world, &places).map_err(wrong)? } else { world };
+        let traversal = match before {
+            Some(before) if before.keeps == keeps => before.traversal,
+            _ => {
+                let methods = self.engine_of(keeps).methods(&world, &Workload::of_rays(n_rays));
+                methods.map_err(failed)?.traversal.value
+            }
         };
         let (shapes_at, places_at) = (self.shapes_at, self.places_at);
         Ok(Ready { world, places, traversal, on_device: None, on_cpu: None, keeps, shapes_at, places_at })
+    }
+
+    /// Makes a world of which nothing is there.
+    fn load(&self, scene: Scene, n_rays: u64, keeps: bool, progress: &Progress) -> PyResult<World> {
+        let engine = self.engine_of(keeps).with_progress(progress.clone());
+        let opened = Opened::read(Source::Scene(Box::new(scene)), &LoadRequest::rays(n_rays)).map_err(wrong)?;
+        Ok(engine.builder().build(opened, &Work::Rays(n_rays)).map_err(wrong)?.world)
+    }
+
+    fn engine_of(&self, keeps: bool) -> Engine {
+        let instances = if keeps { Instancing::Keep } else { Instancing::Flatten };
+        self.engine.clone().with_request(Request { instances, ..Request::default() })
     }
 
     /// Returns a world with the masks of the geometries.
@@ -285,6 +320,13 @@ impl State {
 }
 
 impl Ready {
+    /// Returns the index of the mesh that a geometry has in this world, if it has not changed since.
+    fn same(&self, place: &Place, state: &State) -> Option<usize> {
+        let geometry = state.geometry(place.geometry_id)?;
+        let mesh_ix = self.places.binary_search_by_key(&place.geometry_id, |it| it.geometry_id).ok()?;
+        (geometry.shaped_at <= self.shapes_at).then_some(mesh_ix)
+    }
+
     /// Returns what casts `n` rays: the device, or the CPU if they are few. It is made at the first use.
     fn caster(&mut self, [engine, cpu]: [&Engine; 2], n: usize) -> PyResult<(&mut Caster<'static>, Placed<'_>)> {
         let Self { world, places, traversal, on_device, on_cpu, .. } = self;
@@ -303,6 +345,10 @@ fn made<T>(place: &mut Option<T>, make: impl FnOnce() -> Result<T, GpuError>) ->
         Some(caster) => Ok(caster),
         None => Ok(place.insert(make().map_err(failed)?)),
     }
+}
+
+fn wrong(error: impl std::error::Error) -> PyErr {
+    PyValueError::new_err(error.to_string())
 }
 
 fn check_finite(name: &str, vertices: &[Vec3]) -> PyResult<()> {

@@ -129,6 +129,50 @@ except KeyboardInterrupt:
     assert time.monotonic() - begin < 30
 
 
+def test_builds_tell_of_their_progress(device, random):
+    scene, shares = kdray.RaycastingScene(device=device), []
+    for _ in range(4):
+        scene.add_triangles(*soup(random, 40_000), mask=1)
+    scene.build(progress=shares.append)
+    assert shares == sorted(shares) and shares[0] == 0 and shares[-1] == 1 and any(0 < share < 1 for share in shares)
+    before = scene._core.structures()
+    scene.build()
+    assert len(before) == 4 and scene._core.structures() == before
+
+
+def test_what_the_progress_raises_ends_the_build(random):
+    scene = fresh("cpu", [soup(random, 60_000)])
+
+    def refuse(share):
+        raise LookupError(f"at {share:.1f}")
+
+    with pytest.raises(LookupError, match="at 0"):
+        scene.build(progress=refuse)
+    assert scene._core.is_built() is False
+    assert scene.cast_rays([0, 0, 0, 0, 0, 1])["t_hit"] > 0 and scene._core.is_built()
+    with pytest.raises(TypeError):
+        scene.build(progress=lambda: None)
+
+
+def test_interrupts_end_builds():
+    code = """
+import os, signal, threading, numpy as np, kdray
+random = np.random.default_rng(1)
+corners = random.uniform(-1, 1, (1_000_000, 1, 3)) + random.uniform(-0.1, 0.1, (1_000_000, 3, 3))
+scene = kdray.RaycastingScene(device="cpu")
+scene.add_triangles(corners.reshape(-1, 3), np.arange(3_000_000).reshape(-1, 3))
+signal.signal(signal.SIGINT, signal.default_int_handler)
+threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
+try:
+    scene.cast_rays([0, 0, 0, 0, 0, 1])
+    print("not interrupted")
+except KeyboardInterrupt:
+    print("interrupted", scene.device)
+"""
+    child = run(code)
+    assert child.stdout == "interrupted cpu\n", child.stderr
+
+
 def test_a_signals_handler_cannot_wait_for_the_call_that_it_interrupts():
     code = """
 import os, signal, threading, numpy as np, kdray
@@ -136,10 +180,11 @@ random = np.random.default_rng(1)
 scene = kdray.RaycastingScene(device="cpu")
 corners = random.uniform(-1, 1, (2000, 1, 3)) + random.uniform(-0.3, 0.3, (2000, 3, 3))
 scene.add_triangles(corners.reshape(-1, 3), np.arange(6000).reshape(-1, 3))
+rays = np.tile(random.uniform(-1, 1, (200_000, 6)).astype(np.float32), (100, 1))
 signal.signal(signal.SIGINT, lambda *_: scene.close())
 threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
 try:
-    scene.count_intersections(np.tile(random.uniform(-1, 1, (200_000, 6)).astype(np.float32), (100, 1)))
+    scene.count_intersections(rays)
 except RuntimeError as error:
     print(error)
 """

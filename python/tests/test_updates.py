@@ -93,6 +93,42 @@ def test_remove(device, random):
         scene.update_vertices(1, parts[1][0])
 
 
+def test_only_changed_geometries_get_new_structures(device, random):
+    parts = [soup(random, 40) for _ in range(4)]
+    scene, rays = fresh(device, parts), random_rays(random, 3000)
+
+    def structures():
+        assert_same_hits(scene.cast_rays(rays), expected.cast_rays(rays))
+        return scene._core.structures()
+
+    expected = fresh(device, parts)
+    assert structures() == [], "geometries that never changed have one structure"
+    parts[2] = (parts[2][0] * np.float32(0.7), parts[2][1])
+    scene.update_vertices(2, parts[2][0])
+    expected = fresh(device, parts)
+    first = structures()
+    assert len(set(first)) == 4
+    parts[1] = (parts[1][0] * np.float32(0.8), parts[1][1])
+    scene.update_vertices(1, parts[1][0])
+    expected = fresh(device, parts)
+    second = structures()
+    assert [a == b for a, b in zip(first, second)] == [True, False, True, True]
+    scene.remove(0)
+    parts.append(soup(random, 20))
+    assert scene.add_triangles(*parts[4]) == 4
+    expected = fresh(device, parts)
+    expected.remove(0)
+    third = structures()
+    assert third[:3] == second[1:] and third[3] not in second
+    scene.set_masks([4], 0)
+    expected.remove(4)
+    assert structures() == third
+    scene.update_transforms([3], random_transforms(random, 1))
+    scene.update_transforms([3], [np.eye(4)])
+    scene.update_vertices(3, parts[3][0])
+    assert [a == b for a, b in zip(structures(), third)] == [True, True, False, True]
+
+
 def test_a_stale_scene_would_be_noticed(device, random):
     """The comparison of the tests above fails for a scene that has missed a change."""
     parts = [soup(random, 40), soup(random, 60)]
