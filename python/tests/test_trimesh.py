@@ -100,3 +100,25 @@ def test_flat_rays_meet_the_mesh_at_their_hits():
     ray = RayMeshIntersector(box, device="cpu")
     locations, _, _ = ray.intersects_location([[-2, 0.1, 0.5 - 2e-6]], [[1, 0, 1e-6]])
     assert len(locations) and np.abs(np.abs(locations[:, 0]) - 0.5).min() < 1e-6 and np.abs(locations).max() < 0.51
+
+
+def test_points_in_a_cavity_are_outside():
+    hole = trimesh.creation.box([0.1, 0.1, 0.1])
+    hole.invert()
+    mesh = trimesh.util.concatenate([trimesh.creation.box(), hole])
+    points = [[0, 0, 0], [0.2, 0, 0], [0.3, 0.1, -0.2], [0, 0, 0.6]]
+    assert RayMeshIntersector(mesh, device="cpu").contains_points(points).tolist() == [False, True, True, False]
+
+
+def test_points_in_the_planes_of_faces():
+    """A cube without one of its eight parts. Rays that are parallel to axes would run in faces and along edges."""
+    cells = [cell for cell in np.ndindex(2, 2, 2) if cell != (1, 1, 1)]
+    parts = [trimesh.creation.box(bounds=[cell, np.add(cell, 1)]) for cell in cells]
+    mesh = trimesh.util.concatenate(parts)
+    mesh.merge_vertices()
+    beyond = np.floor(mesh.triangles_center + 0.1 * mesh.face_normals).astype(int)
+    mesh.update_faces([tuple(cell) not in cells for cell in beyond.tolist()])
+    assert mesh.is_watertight and np.isclose(mesh.volume, 7)
+    points = [[0.5, 1, 1], [1, 1, 0.5], [0.25, 1, 0.25], [1.5, 1.5, 1.5], [1.25, 1.5, 1.25], [3, 1, 1], [1, 1, -0.5]]
+    expected = [True, True, True, False, False, False, False]
+    assert RayMeshIntersector(mesh, device="cpu").contains_points(points).tolist() == expected
