@@ -22,6 +22,8 @@ mod poser;
 #[cfg(feature = "files")]
 mod scene_file;
 
+#[doc(hidden)]
+pub use self::model::deformation;
 #[cfg(feature = "files")]
 pub(crate) use self::{files::pack, poser::Poser};
 #[cfg(feature = "files")]

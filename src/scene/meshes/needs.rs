@@ -2,7 +2,10 @@
 
 use std::cmp::Reverse;
 
-use crate::{scene::model::error::Checked, util::memory::require};
+use crate::{
+    scene::model::{deformation::MorphDelta, error::Checked},
+    util::memory::require,
+};
 
 /// Size of a loaded triangle in bytes without its points: three indices of corners (12), three normals (36) and a slot
 /// (4).
@@ -68,6 +71,12 @@ pub(crate) fn require_for_tangents(mut n_faces: Vec<u64>, n_copied: u64) -> Chec
         .saturating_add(n_at_once.saturating_mul(MIKKTSPACE_BYTES))
         .saturating_add(n_copied.saturating_mul(TRIANGLE_BYTES));
     require("tangents for normal maps", needed).map_err(|error| error.to_string())
+}
+
+/// Refuses what `n_targets` morph targets add to `n_vertices` vertices if there is not enough memory for it.
+pub(crate) fn require_for_morph_targets(n_targets: u64, n_vertices: u64) -> Checked<()> {
+    let needed = n_targets.saturating_mul(n_vertices).saturating_mul(size_of::<MorphDelta>() as u64);
+    require("what morph targets add", needed).map_err(|error| error.to_string())
 }
 
 /// Refuses to make images of `n_bytes` from others if there is not enough memory for them.

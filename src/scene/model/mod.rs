@@ -3,6 +3,7 @@
 
 pub(crate) mod camera;
 pub(crate) mod defaults;
+pub mod deformation;
 pub(crate) mod environment;
 pub(crate) mod error;
 pub(crate) mod extent;

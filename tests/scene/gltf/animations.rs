@@ -337,3 +337,43 @@ fn the_worlds_of_a_file_are_those_of_its_scenes() {
         }
     }
 }
+
+/// A target that cannot be read where it has a weight, and a joint that takes a mesh away from the world for a moment.
+/// What is read once for all moments shows what reading the file at each moment shows.
+#[test]
+fn broken_moments_are_those_of_the_file() {
+    let mut model = triangle();
+    let added = model.accessor("VEC3", F32, &[[0.0_f32, 0.0, 1.0]; 3].concat());
+    let broken = model.accessor("VEC3", F32, &[0.0_f32, 1.0, 0.0, f32::NAN, 0.0, 0.0, 0.0, 2.0, 0.0]);
+    let primitive = model.json["meshes"][0]["primitives"][0].clone();
+    let mut skinned = primitive.clone();
+    skinned["attributes"]["JOINTS_0"] = json!(model.accessor("VEC4", U8, &[0_u8; 12]));
+    skinned["attributes"]["WEIGHTS_0"] = json!(model.accessor("VEC4", F32, &[[1.0_f32, 0.0, 0.0, 0.0]; 3].concat()));
+    let vanishes = model.show(skinned);
+    model.json["nodes"][vanishes]["skin"] = json!(0);
+    let joint = model.root(json!({ "translation": [3, 0, 0] }));
+    model.push("skins", json!({ "joints": [joint] }));
+    model.json["meshes"][0]["primitives"][0]["targets"] = json!([{ "POSITION": added }, { "POSITION": broken }]);
+    let weights = [1.0_f32, 0.0, 1.0, 0.0, 0.5, 1.0, 2.0, 0.0];
+    animate(&mut model, (0, "weights"), "LINEAR", &[0.0, 1.0, 2.0, 3.0], ("SCALAR", F32, &weights));
+    let scales = [1.0_f32, 1.0, 1.0, 1e30, 1e30, 1e30, 1.0, 1.0, 1.0];
+    animate(&mut model, (joint, "scale"), "STEP", &[0.0, 1.0, 2.0], ("VEC3", F32, &scales));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("model.glb");
+    std::fs::write(&path, model.glb()).unwrap();
+    let world_at = |at: f64| {
+        let mut request = LoadRequest::pictures(PictureChoices::default());
+        request.scene.at = Some(at);
+        let scene = Opened::read(path.as_path(), &request).unwrap().scene;
+        let flat = FlatScene::with_instances(&scene).unwrap();
+        (World::of_flat(flat, &BuildOptions::default()).unwrap(), scene, request)
+    };
+    let (first, scene, request) = world_at(0.0);
+    let mut animated = AnimatedWorld::new(&path, &request, scene, &first);
+    for (at, n_instances) in [(0.5, 2), (1.5, 1), (2.0, 2), (2.5, 2), (0.25, 2)] {
+        let (found, expected) = (animated.at(at).unwrap().0, world_at(at).0);
+        assert_eq!(expected.scene().instances.as_ref().map(|it| it.list.len()), Some(n_instances), "at {at}");
+        assert_eq!(found.scene().instances.as_ref().map(|it| it.list.len()), Some(n_instances), "at {at}");
+        assert!(found.scene().triangles == expected.scene().triangles, "at {at}");
+    }
+}

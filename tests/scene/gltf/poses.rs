@@ -1,6 +1,6 @@
 //! Morph targets and skins of glTF files.
 
-use glam::{Mat4, Vec2, Vec3, Vec4};
+use glam::{Mat4, Quat, Vec2, Vec3, Vec4};
 use serde_json::json;
 
 use super::{F32, U8, agreement, corners, flattened, triangle};
@@ -65,6 +65,29 @@ fn far_skins_keep_the_details_of_their_meshes() {
     // A near mesh is not moved.
     model.json["nodes"][1]["translation"] = json!([0.5, 0, 0]);
     assert_eq!(model.scene().meshes[0].positions[0], Vec3::new(0.5, 0.0, 0.0));
+}
+
+/// At rest the mesh is 500 km away, from where its joint, which turns, takes it to the origin.
+#[test]
+fn skins_of_far_meshes_keep_their_details() {
+    let mut model = triangle();
+    let far = [500_000.0_f32, 0.0, 0.0, 500_001.0, 0.0, 0.0, 500_000.0, 1.0, 0.0];
+    let positions = model.accessor("VEC3", F32, &far);
+    let joints = model.accessor("VEC4", U8, &[0_u8; 12]);
+    let weights = model.accessor("VEC4", F32, &[[1.0_f32, 0.0, 0.0, 0.0]; 3].concat());
+    let bind = Mat4::from_translation(Vec3::new(-500_000.0, 0.0, 0.0)).to_cols_array();
+    let bind = model.accessor("MAT4", F32, &bind);
+    let attributes = &mut model.json["meshes"][0]["primitives"][0]["attributes"];
+    attributes["POSITION"] = json!(positions);
+    attributes["JOINTS_0"] = json!(joints);
+    attributes["WEIGHTS_0"] = json!(weights);
+    model.json["nodes"][0]["skin"] = json!(0);
+    model.root(json!({ "rotation": Quat::from_rotation_z(0.3).to_array() }));
+    model.push("skins", json!({ "joints": [1], "inverseBindMatrices": bind }));
+    let expected = [Vec3::ZERO, Vec3::X, Vec3::Y].map(|p| Quat::from_rotation_z(0.3) * p);
+    for (found, expected) in corners(&model)[0].into_iter().zip(expected) {
+        assert!(found.distance(expected) < 1e-6, "{found} in place of {expected}");
+    }
 }
 
 /// The node of a mesh says which side of its faces is outside, although a skin places the mesh.

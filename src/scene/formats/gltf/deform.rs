@@ -1,8 +1,8 @@
-//! Morph targets and skins in the pose that the file gives. Animations are not shown.
+//! Morph targets and skins in the pose that the file gives, or that animations have at a moment.
 
 use std::collections::HashMap;
 
-use glam::{DMat3, DMat4, DVec3, Vec3};
+use glam::{DMat4, DVec3, Vec3};
 use gltf::{
     Semantic,
     json::{
@@ -15,39 +15,73 @@ use gltf::{
 use serde::Deserialize;
 
 use super::{accessor::Accessor, document::Document, geometry::Attributes};
-use crate::scene::model::{error::Checked, transform::normals_of};
+use crate::scene::{
+    meshes::needs::require_for_morph_targets,
+    model::{
+        deformation::{Deformation, Influence, JointMatrix, MorphDelta},
+        error::Checked,
+    },
+};
 
-/// The morph targets of a primitive whose weight is not 0.
+/// Which morph targets of meshes are read, and with which weights they change texture coordinates and colours.
+#[derive(Clone, Copy)]
+pub(super) struct Weights<'a> {
+    /// Missing ones are 0.
+    pub now: &'a [f32],
+    /// Whether targets of weight 0 are read, too.
+    pub reads_all: bool,
+}
+
+/// Morph targets of a primitive.
 pub(super) struct Morph<'a> {
     targets: Vec<Target<'a>>,
 }
 
 /// A morph target: what it adds to positions, normals and tangents.
 struct Target<'a> {
-    weight: f32,
+    /// Its index in the mesh.
+    ix: u32,
     added: [Option<Accessor<'a>>; 3],
 }
 
 impl<'a> Morph<'a> {
-    /// Returns the morph targets of a primitive of `n` vertices, or `None` if none has a weight.
-    pub fn new(attributes: &Attributes<'a>, weights: &[f32], n: usize) -> Checked<Option<Self>> {
-        let targets = attributes.primitive.targets.iter().flatten().zip(weights).enumerate();
-        let targets = targets.filter(|(_, (_, weight))| **weight != 0.0);
-        let targets = targets.map(|(ix, (target, weight))| Target::new(attributes, (ix, target), *weight, n));
-        let targets: Vec<_> = targets.collect::<Checked<_>>()?;
-        Ok((!targets.is_empty()).then_some(Self { targets }))
+    /// Returns the morph targets of a primitive of `n` vertices.
+    pub fn new(attributes: &Attributes<'a>, weights: Weights, n: usize) -> Checked<Self> {
+        let is_read = |ix: usize| weights.reads_all || weights.now.get(ix).is_some_and(|weight| *weight != 0.0);
+        let targets = attributes.primitive.targets.iter().flatten().enumerate().filter(|(ix, _)| is_read(*ix));
+        let targets: Checked<_> = targets.map(|(ix, target)| Target::new(attributes, (ix, target), n)).collect();
+        Ok(Self { targets: targets? })
     }
 
-    /// Returns position, normal and tangent of the vertex with index `ix`.
-    pub fn apply(&self, ix: usize, mut vertex: [Vec3; 3]) -> Checked<[Vec3; 3]> {
-        for target in &self.targets {
-            for (vector, added) in vertex.iter_mut().zip(&target.added) {
-                if let Some(added) = added {
-                    *vector += target.weight * Vec3::from_array(added.numbers(ix, 0.0)?);
+    /// Gives a deformation the deltas of its vertices, whose indices in the primitive are `used`. Returns what cannot
+    /// be read first: such vertices have no deltas.
+    ///
+    /// # Errors
+    /// The deltas need more memory than there is.
+    pub fn add_to(&self, used: &[u32], deformation: &mut Deformation) -> Checked<Option<String>> {
+        let Deformation { normals, tangents, deltas, first_deltas, .. } = deformation;
+        let is_used = [true, !normals.is_empty(), !tangents.is_empty()];
+        require_for_morph_targets(self.targets.len() as u64, used.len() as u64)?;
+        let mut wrong = None;
+        for ix in used {
+            let first = deltas.len();
+            first_deltas.push(first as u32);
+            for target in &self.targets {
+                match target.delta(*ix as usize, is_used) {
+                    Ok(delta) => deltas.extend(delta),
+                    Err(what) => {
+                        wrong.get_or_insert(what);
+                        deltas.truncate(first);
+                        break;
+                    }
                 }
             }
         }
-        Ok(vertex)
+        match deltas.is_empty() {
+            true => first_deltas.clear(),
+            false => first_deltas.push(deltas.len() as u32),
+        }
+        Ok(wrong)
     }
 }
 
@@ -116,17 +150,38 @@ impl MorphTargets {
         let primitive = self.meshes.get(mesh_ix).and_then(|mesh| mesh.primitives.get(primitive_ix));
         primitive.and_then(|primitive| primitive.targets.as_deref()).unwrap_or_default()
     }
+
+    /// Returns whether targets of a mesh change texture coordinates or colours.
+    pub fn change_surfaces(&self, mesh_ix: usize) -> bool {
+        let primitives = self.meshes.get(mesh_ix).into_iter().flat_map(|mesh| &mesh.primitives);
+        let mut names = primitives.flat_map(|it| it.targets.iter().flatten()).flat_map(|target| target.keys());
+        names.any(|name| name.starts_with("TEXCOORD_") || name.starts_with("COLOR_"))
+    }
 }
 
 impl<'a> Target<'a> {
-    fn new(attributes: &Attributes<'a>, (ix, target): (usize, &MorphTarget), weight: f32, n: usize) -> Checked<Self> {
+    fn new(attributes: &Attributes<'a>, (ix, target): (usize, &MorphTarget), n: usize) -> Checked<Self> {
         let MorphTarget { positions, normals, tangents } = target;
         let accessor = |index: &Option<_>, name: &str| {
             let path = format!("{}.targets[{ix}].{name}", attributes.path);
             index.map(|index| attributes.accessor(index, &[Type::Vec3], Some(n), path)).transpose()
         };
         let added = [accessor(positions, "POSITION")?, accessor(normals, "NORMAL")?, accessor(tangents, "TANGENT")?];
-        Ok(Self { weight, added })
+        Ok(Self { ix: ix as u32, added })
+    }
+
+    /// Returns what the target adds to a vertex, or `None` if that is nothing. `is_used`: whether the vertex has a
+    /// position, a normal and a tangent.
+    fn delta(&self, ix: usize, is_used: [bool; 3]) -> Checked<Option<MorphDelta>> {
+        let mut vectors = [Vec3::ZERO; 3];
+        for ((vector, added), is_used) in vectors.iter_mut().zip(&self.added).zip(is_used) {
+            if let Some(added) = added {
+                let read = Vec3::from_array(added.numbers(ix, 0.0)?);
+                *vector = if is_used { read } else { Vec3::ZERO };
+            }
+        }
+        let [position, normal, tangent] = vectors;
+        Ok((vectors != [Vec3::ZERO; 3]).then_some(MorphDelta { target: self.ix, position, normal, tangent }))
     }
 }
 
@@ -140,9 +195,6 @@ pub(super) struct Skin {
     /// JSON path.
     path: String,
     world_from_mesh: Vec<DMat4>,
-    /// The point of world space from which the positions count that it gives. It is subtracted before they are rounded
-    /// to single precision.
-    pub origin: DVec3,
 }
 
 /// A skin as it moves a primitive's vertices.
@@ -167,7 +219,7 @@ impl Skin {
                 *matrix *= glam::Mat4::from_cols_array(&matrices.numbers(ix, 0.0)?).as_dmat4();
             }
         }
-        Ok(Self { path, world_from_mesh, origin: DVec3::ZERO })
+        Ok(Self { path, world_from_mesh })
     }
 
     /// Returns the skin as it moves a primitive of `n` vertices.
@@ -184,41 +236,64 @@ impl Skin {
         }
         Ok(Skinning { skin: self, sets })
     }
+
+    /// Returns the joint of vertices that the skin does not move: one more than the skin has.
+    pub fn at_rest(&self) -> Influence {
+        Influence { joint: self.world_from_mesh.len() as u32, weight: 1.0 }
+    }
+
+    /// Returns the joints' transforms, which are rounded to single precision in the end. `rest_origin`: the point of
+    /// the mesh's space that is the origin of its vertices. `origin`: the point of world space that becomes the origin.
+    pub fn joints(&self, rest_origin: DVec3, origin: DVec3) -> Vec<JointMatrix> {
+        let all = self.world_from_mesh.iter().copied().chain([DMat4::IDENTITY]);
+        let from_rest = DMat4::from_translation(rest_origin);
+        all.map(|matrix| JointMatrix::new(matrix * from_rest, origin)).collect()
+    }
 }
 
 impl Skinning<'_> {
-    /// Returns position, normal and tangent of the vertex with index `ix` in world space, moved by the skin's origin.
-    pub fn apply(&self, ix: usize, [position, normal, tangent]: [Vec3; 3]) -> Checked<[Vec3; 3]> {
-        let matrix = self.matrix(ix)?;
-        let linear = DMat3::from_mat4(matrix);
-        let position = (matrix.transform_point3(position.as_dvec3()) - self.skin.origin).as_vec3();
-        let normal = (normals_of(linear) * normal.as_dvec3()).normalize_or_zero().as_vec3();
-        let tangent = (linear * tangent.as_dvec3()).normalize_or_zero().as_vec3();
-        Ok([position, normal, tangent])
+    /// Gives a deformation the influences of its vertices, whose indices in the primitive are `used`. Returns what
+    /// cannot be read first: such vertices are not moved.
+    pub fn add_to(&self, used: &[u32], deformation: &mut Deformation) -> Option<String> {
+        let (mut wrong, mut of_vertices) = (None, Vec::with_capacity(used.len()));
+        for ix in used {
+            of_vertices.push(self.influences(*ix as usize).unwrap_or_else(|what| {
+                wrong.get_or_insert(what);
+                vec![self.skin.at_rest()]
+            }));
+        }
+        let n = of_vertices.iter().map(Vec::len).max().unwrap_or(1);
+        deformation.n_influences = n;
+        deformation.influences = vec![Influence::default(); n * used.len()];
+        for (to, found) in deformation.influences.chunks_exact_mut(n).zip(of_vertices) {
+            to[..found.len()].copy_from_slice(&found);
+        }
+        wrong
     }
 
-    /// Returns whether the skin mirrors the neighbourhood of the vertex with index `ix`.
-    pub fn mirrors(&self, ix: usize) -> Checked<bool> {
-        Ok(DMat3::from_mat4(self.matrix(ix)?).determinant() < 0.0)
-    }
-
-    /// Returns the weighted mean of the joints' transforms.
-    fn matrix(&self, ix: usize) -> Checked<DMat4> {
-        let (mut sum, mut total) = (DMat4::ZERO, 0.0);
+    /// Returns the joints of a vertex whose weights are not 0. Their weights add up to 1.
+    fn influences(&self, ix: usize) -> Checked<Vec<Influence>> {
+        let (mut found, mut total) = (Vec::with_capacity(4 * self.sets.len()), 0.0);
         for [joints, weights] in &self.sets {
             for (joint, weight) in joints.integers::<4>(ix).into_iter().zip(weights.numbers::<4>(ix, 0.0)?) {
                 if weight == 0.0 {
                     continue;
                 }
-                let matrix = self.skin.world_from_mesh.get(joint as usize).ok_or_else(|| {
-                    format!("{}: element {ix} is joint {joint}, which {} lacks", joints.path, self.skin.path)
-                })?;
-                sum += *matrix * f64::from(weight);
+                if joint as usize >= self.skin.world_from_mesh.len() {
+                    return Err(format!(
+                        "{}: element {ix} is joint {joint}, which {} lacks",
+                        joints.path, self.skin.path
+                    ));
+                }
+                found.push(Influence { joint, weight });
                 total += f64::from(weight);
             }
         }
         // A vertex without weights would vanish. Most programs give it to the first joint.
-        let first = self.skin.world_from_mesh.first().copied().unwrap_or_default();
-        Ok(if total > 0.0 { sum * total.recip() } else { first })
+        if !(total > 0.0) {
+            return Ok(vec![Influence { joint: 0, weight: 1.0 }]);
+        }
+        found.iter_mut().for_each(|it| it.weight = (f64::from(it.weight) / total) as f32);
+        Ok(found)
     }
 }

@@ -365,6 +365,11 @@ impl Document {
         }
     }
 
+    /// Returns the number of notes.
+    pub fn n_notes(&self) -> usize {
+        self.notes.borrow().iter().map(|notes| notes.n).sum()
+    }
+
     /// Returns a warning for each kind of thing that is not shown.
     pub fn warnings(&self, path: &Path) -> Vec<String> {
         let warning = |Notes { kind, listed, n }: Notes| {

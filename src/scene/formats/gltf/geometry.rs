@@ -14,32 +14,23 @@ use rayon::prelude::*;
 
 use super::{
     accessor::Accessor,
-    deform::{Added, Morph, Skin, Skinning, TargetAttributes},
+    deform::{Added, Morph, Skin, TargetAttributes, Weights},
     document::{Document, LEFT_OUT},
     draco,
+    rest::Rest,
 };
 use crate::scene::{
     meshes::needs::{self, MeshSize, require_for_mesh},
-    model::{Mesh, error::Checked},
+    model::{Mesh, deformation::Deformation, error::Checked},
 };
 
-/// How the vertices of a mesh move away from the places that the file gives.
+/// How a mesh is read.
 #[derive(Clone, Copy)]
-pub(super) struct Pose<'a> {
-    /// Weights of the morph targets; missing ones are 0.
-    pub weights: &'a [f32],
+pub(super) struct Reading<'a> {
+    pub weights: Weights<'a>,
     pub skin: Option<&'a Skin>,
     /// Whether the order of the faces' corners is reversed.
     pub is_turned: bool,
-}
-
-/// The vertices of a primitive that its faces use.
-struct Vertices {
-    positions: Vec<Vec3>,
-    /// Unit normals, or zero; empty if the file has none.
-    normals: Vec<Vec3>,
-    /// Empty if the file has none.
-    tangents: Vec<Vec4>,
 }
 
 /// A primitive of a mesh.
@@ -70,12 +61,11 @@ pub(super) fn attributes_of(primitives: &[Primitive]) -> needs::Attributes {
 
 /// Returns the mesh of a primitive, or `None` for points and lines and for what cannot be read. `n_read` is the number
 /// of triangles that have been read already, and those of the primitive are added. The faces without area that join
-/// strips count: they are in no mesh, but a short file can state any number of them. Also returns whether the skin
-/// moves the vertices.
+/// strips count: they are in no mesh, but a short file can state any number of them.
 ///
 /// # Errors
 /// The mesh needs more memory than there is.
-pub(super) fn mesh(document: &Document, part: &Part, pose: Pose, n_read: &mut u64) -> Checked<Option<(Mesh, bool)>> {
+pub(super) fn mesh(document: &Document, part: &Part, reading: Reading, n_read: &mut u64) -> Checked<Option<Rest>> {
     let &Part { primitive, targets, ref path, slot, .. } = part;
     let mode = match primitive.mode {
         Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) => mode,
@@ -92,19 +82,15 @@ pub(super) fn mesh(document: &Document, part: &Part, pose: Pose, n_read: &mut u6
     let Some((positions, indices)) = document.or_left_out(attributes.positions_and_indices()) else { return Ok(None) };
     let mut faces = attributes.faces(mode, (indices, positions.n), (part.whole, n_read))?;
     let (used, places) = attributes.places(&positions, &mut faces);
-    let skin = pose.skin.and_then(|skin| document.or_left_out(skin.of(&attributes, positions.n)));
-    let vertices = attributes.vertices(places, (&used, positions.n), pose.weights, skin.as_ref());
-    if pose.is_turned {
+    let (deformation, is_skinned) = attributes.deformation(places, (&used, positions.n), reading)?;
+    if reading.is_turned {
         faces.iter_mut().for_each(|face| face.swap(1, 2));
     }
     let mut mesh = Mesh { slots: vec![slot; faces.len()], ..Mesh::default() };
-    // Tangents without normals are ignored, as the specification says.
-    mesh.normals = corners(&faces, &vertices.normals).unwrap_or_else(|| vec![[Vec3::ZERO; 3]; faces.len()]);
-    mesh.tangents = corners(&faces, &vertices.tangents).unwrap_or_default();
     for (set, uvs) in mesh.uvs.iter_mut().enumerate() {
         let semantic = Semantic::TexCoords(set as u32);
         let Some(found) = attributes.readable(semantic.clone(), &[Type::Vec2], positions.n) else { continue };
-        let added = Added::new(&attributes, &semantic, &[Type::Vec2], (pose.weights, positions.n));
+        let added = Added::new(&attributes, &semantic, &[Type::Vec2], (reading.weights.now, positions.n));
         let added = document.or_left_out(added).unwrap_or_default();
         let uv = |ix| added.to(ix, found.numbers(ix, 0.0)?).map(Vec2::from_array);
         let found = read(document, &used, Vec2::ZERO, uv);
@@ -112,14 +98,14 @@ pub(super) fn mesh(document: &Document, part: &Part, pose: Pose, n_read: &mut u6
     }
     let (semantic, types) = (Semantic::Colors(0), [Type::Vec3, Type::Vec4]);
     if let Some(found) = attributes.readable(semantic.clone(), &types, positions.n) {
-        let added = Added::new(&attributes, &semantic, &types, (pose.weights, positions.n));
+        let added = Added::new(&attributes, &semantic, &types, (reading.weights.now, positions.n));
         let added = document.or_left_out(added).unwrap_or_default();
         let colour = |ix| added.to_colour(ix, found.numbers(ix, 1.0)?).map(Vec4::from_array);
         let found = read(document, &used, Vec4::ONE, colour);
         mesh.colours = corners(&faces, &found).unwrap_or_default();
     }
-    (mesh.positions, mesh.faces) = (vertices.positions, faces);
-    Ok(Some((mesh, skin.is_some())))
+    mesh.faces = faces;
+    Ok(Some(Rest { mesh, deformation, is_skinned, ..Rest::default() }))
 }
 
 /// The attributes of a primitive.
@@ -225,63 +211,45 @@ impl<'a> Attributes<'a> {
         (used, places)
     }
 
-    /// Reads normals and tangents, and moves them and the positions into their pose. `used` are the indices of the
-    /// vertices, of which the primitive has `n`.
-    fn vertices(
+    /// Reads normals and tangents, and what moves them and the positions. `used` are the indices of the vertices, of
+    /// which the primitive has `n`. Also returns whether the skin moves them.
+    ///
+    /// # Errors
+    /// The morph targets need more memory than there is.
+    fn deformation(
         &self,
         positions: Vec<Vec3>,
         (used, n): (&[u32], usize),
-        weights: &[f32],
-        skin: Option<&Skinning>,
-    ) -> Vertices {
+        reading: Reading,
+    ) -> Checked<(Deformation, bool)> {
         let document = self.document;
-        let mut vertices = Vertices { positions, normals: Vec::new(), tangents: Vec::new() };
+        let mut deformation = Deformation { positions, ..Deformation::default() };
+        // Tangents without normals are ignored, as the specification says.
         if let Some(normals) = self.readable(Semantic::Normals, &[Type::Vec3], n) {
             let normal = |ix| Ok(Vec3::from_array(normals.numbers(ix, 0.0)?).normalize_or_zero());
-            vertices.normals = read(document, used, Vec3::ZERO, normal);
+            deformation.normals = read(document, used, Vec3::ZERO, normal);
             if let Some(tangents) = self.readable(Semantic::Tangents, &[Type::Vec4], n) {
                 let tangent = |ix| Ok(unit_tangent(Vec4::from_array(tangents.numbers(ix, 0.0)?)));
-                vertices.tangents = read(document, used, Vec4::ZERO, tangent);
+                deformation.tangents = read(document, used, Vec4::ZERO, tangent);
             }
         }
-        if let Some(morph) = document.or_left_out(Morph::new(self, weights, n)).flatten() {
-            document.or_left_out(vertices.change(used, |ix, vertex| morph.apply(ix, vertex)));
+        if let Some(morph) = document.or_left_out(Morph::new(self, reading.weights, n)) {
+            let wrong = morph.add_to(used, &mut deformation)?;
+            wrong.into_iter().for_each(|what| document.note(LEFT_OUT, what));
         }
-        if let Some(skin) = skin {
-            document.or_left_out(vertices.change(used, |ix, vertex| skin.apply(ix, vertex)));
-            // The cross product of reflected vectors is the reverse of their reflected cross product.
-            for (tangent, ix) in vertices.tangents.iter_mut().zip(used) {
-                tangent.w = if skin.mirrors(*ix as usize).unwrap_or(false) { -tangent.w } else { tangent.w };
+        let Some(skin) = reading.skin else { return Ok((deformation, false)) };
+        let skinning = document.or_left_out(skin.of(self, n));
+        match &skinning {
+            Some(skinning) => {
+                let wrong = skinning.add_to(used, &mut deformation);
+                wrong.into_iter().for_each(|what| document.note(LEFT_OUT, what));
+            }
+            None => {
+                deformation.n_influences = 1;
+                deformation.influences = vec![skin.at_rest(); used.len()];
             }
         }
-        vertices
-    }
-}
-
-impl Vertices {
-    /// Changes each vertex by a function that gets its index. Returns the first error; such vertices stay as they are.
-    fn change(&mut self, used: &[u32], change: impl Fn(usize, [Vec3; 3]) -> Checked<[Vec3; 3]>) -> Checked<()> {
-        let mut result = Ok(());
-        for (at, ix) in used.iter().enumerate() {
-            let normal = self.normals.get(at).copied().unwrap_or_default();
-            let tangent = self.tangents.get(at).copied().unwrap_or_default();
-            let changed = change(*ix as usize, [self.positions[at], normal, tangent.truncate()]);
-            let [position, normal, along] = match changed {
-                Ok(changed) => changed,
-                Err(what) => {
-                    result = result.and(Err(what));
-                    continue;
-                }
-            };
-            self.positions[at] = position;
-            if let Some(changed) = self.normals.get_mut(at) {
-                *changed = normal.normalize_or_zero();
-            }
-            if let Some(changed) = self.tangents.get_mut(at) {
-                *changed = unit_tangent(along.extend(tangent.w));
-            }
-        }
-        result
+        Ok((deformation, skinning.is_some()))
     }
 }
 
@@ -344,13 +312,13 @@ mod tests {
         let primitive = &document.root.meshes[0].primitives[0];
         let part = Part { primitive, targets: &[], path: String::new(), slot: 0, whole: Default::default() };
         let mut n_read = 5;
+        let weights = Weights { now: &[], reads_all: false };
+        let reading = Reading { weights, skin: None, is_turned: false };
         for n in [1003, 2001] {
-            let (found, _) = mesh(&document, &part, Pose { weights: &[], skin: None, is_turned: false }, &mut n_read)
-                .unwrap()
-                .unwrap();
-            assert_eq!((found.faces.len(), n_read), (0, n));
+            let found = mesh(&document, &part, reading, &mut n_read).unwrap().unwrap();
+            assert_eq!((found.mesh.faces.len(), n_read), (0, n));
         }
         n_read = u64::MAX;
-        assert!(mesh(&document, &part, Pose { weights: &[], skin: None, is_turned: false }, &mut n_read).is_err());
+        assert!(mesh(&document, &part, reading, &mut n_read).is_err());
     }
 }

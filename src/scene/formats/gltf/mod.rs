@@ -24,22 +24,24 @@ mod meshopt;
 mod nodes;
 mod pointers;
 mod poser;
+mod rest;
 mod textures;
 mod uri;
 
-use std::path::Path;
+use std::{path::Path, sync::Arc};
 
 use glam::{DVec3, Vec3};
 use gltf::json::{Node, mesh::Primitive};
 use hashbrown::{HashMap, HashSet};
 
 use self::{
-    deform::Skin,
+    deform::{Skin, Weights},
     document::{Document, item},
-    geometry::{Part, Pose},
+    geometry::{Part, Reading},
     instancing::Places,
     materials::Materials,
     nodes::Nodes,
+    rest::{ReadMesh, ReadMeshes, RestKey, posed},
 };
 pub(crate) use self::{document::named_files, poser::Poser};
 use super::image::MAX_PIXELS;
@@ -51,7 +53,7 @@ use crate::{
             AnimationChoice, AnimationInfo, Camera, Instance, Light, LoadOptions, MaterialChoice, Mesh, Scene,
             SceneError, Transform, Up,
             error::Checked,
-            extent::{self, MeshOrigin},
+            extent,
             lacks::{Lacks, SAMPLES},
         },
     },
@@ -198,6 +200,8 @@ struct Loader<'a> {
     meshes: Vec<Mesh>,
     /// `None` for meshes without triangles.
     known: HashMap<MeshKey, Option<Known>>,
+    /// The meshes that have been read, if more poses follow.
+    read: Option<ReadMeshes>,
 }
 
 impl<'a> Loader<'a> {
@@ -211,7 +215,7 @@ impl<'a> Loader<'a> {
         let has_materials = replaced.is_some();
         let materials = Materials::new(document, replaced.unwrap_or_default());
         let (meshes, known, n_read) = (Vec::new(), HashMap::new(), before.n_triangles);
-        Self { document, nodes, before, n_read, has_materials, materials, meshes, known }
+        Self { document, nodes, before, n_read, has_materials, materials, meshes, known, read: None }
     }
 
     fn load(mut self, path: &Path) -> Checked<Scene> {
@@ -323,42 +327,70 @@ impl<'a> Loader<'a> {
             true => self.skin(skin.value(), node_ix),
             false => Err(format!("nodes[{node_ix}].skin: meshes[{mesh_ix}] has no joints")),
         });
-        let mut skin = skin.and_then(|skin| document.or_left_out(skin));
-        let is_turned = is_turned && skin.is_some();
-        let pose = Pose { weights, skin: skin.as_ref(), is_turned };
-        let (mut whole, mut materials, mut parts, mut is_skinned) = (Mesh::default(), Vec::new(), Vec::new(), false);
-        let attributes = geometry::attributes_of(primitives);
+        let skin = skin.and_then(|skin| document.or_left_out(skin));
+        let key = (mesh_ix, node.skin.map(|skin| skin.value()).filter(|_| skin.is_some()), is_turned && skin.is_some());
+        let read = self.read_mesh(key, (weights, skin.as_ref()), meter)?;
+        if read.rest.mesh.faces.is_empty() {
+            return Ok(None);
+        }
+        let (is_skinned, materials) = (read.rest.is_skinned, read.materials.clone());
+        let (mut mesh, origin) = posed(read, (weights, skin.as_ref()));
+        coincident::separate(&mut mesh);
+        mesh.name = document.root.meshes[mesh_ix].name.clone().unwrap_or_default();
+        self.meshes.push(mesh);
+        Ok(Some(Known { mesh_ix: self.meshes.len() - 1, materials, is_skinned, origin }))
+    }
+
+    /// Returns what is read of a mesh, which is read once if it serves all poses.
+    fn read_mesh(
+        &mut self,
+        key: RestKey,
+        (weights, skin): (&[f32], Option<&Skin>),
+        meter: &Meter,
+    ) -> Checked<Arc<ReadMesh>> {
+        let (mesh_ix, _, is_turned) = key;
+        let reading = |reads_all| Reading { weights: Weights { now: weights, reads_all }, skin, is_turned };
+        let known = self.read.as_ref().map(|known| known.get(&key).cloned());
+        match known {
+            Some(Some(Some(read))) => return Ok(read),
+            Some(None) if !self.document.morph_targets.change_surfaces(mesh_ix) => {
+                let n_notes = self.document.n_notes();
+                let read = Arc::new(self.read_parts(mesh_ix, reading(true), meter)?);
+                // What is left out may depend on the weights: targets of weight 0 are not asked for.
+                let serves_all = self.document.n_notes() == n_notes && read.rest.deformation.is_deformed();
+                if let Some(known) = &mut self.read {
+                    known.insert(key, serves_all.then(|| read.clone()));
+                }
+                if serves_all {
+                    return Ok(read);
+                }
+            }
+            _ => {}
+        }
+        self.read_parts(mesh_ix, reading(false), meter).map(Arc::new)
+    }
+
+    /// Reads the primitives of a mesh. `meter` counts them.
+    fn read_parts(&mut self, mesh_ix: usize, reading: Reading, meter: &Meter) -> Checked<ReadMesh> {
+        let document = self.document;
+        let primitives = &document.root.meshes[mesh_ix].primitives;
+        let whole = geometry::attributes_of(primitives);
+        let mut read = ReadMesh::default();
         for (ix, primitive) in primitives.iter().enumerate() {
             let path = format!("meshes[{mesh_ix}].primitives[{ix}]");
             self.note_morphs(primitive, &path);
             let material = if self.has_materials { self.materials.index(primitive.material, &path) } else { 0 };
             let targets = document.morph_targets.of(mesh_ix, ix);
-            let part = Part { primitive, targets, path, slot: materials.len() as u32, whole: attributes };
-            let mesh = geometry::mesh(document, &part, pose, &mut self.n_read)?;
+            let part = Part { primitive, targets, path, slot: read.materials.len() as u32, whole };
+            let rest = geometry::mesh(document, &part, reading, &mut self.n_read)?;
             meter.add(1);
-            let Some((mesh, is_moved)) = mesh else { continue };
-            is_skinned |= is_moved;
-            materials.push(material);
-            whole.append(mesh);
-            parts.push(part);
-        }
-        if whole.faces.is_empty() {
-            return Ok(None);
-        }
-        let far = MeshOrigin::Near.second(&whole.positions);
-        let origin = far.filter(|_| is_skinned).unwrap_or_default();
-        if let (Some(skin), true) = (&mut skin, origin != DVec3::ZERO) {
-            skin.origin = origin;
-            let (pose, mut n_read) = (Pose { weights, skin: Some(skin), is_turned }, 0);
-            whole = Mesh::default();
-            for part in &parts {
-                geometry::mesh(document, part, pose, &mut n_read)?.into_iter().for_each(|(mesh, _)| whole.append(mesh));
+            if let Some(rest) = rest {
+                read.materials.push(material);
+                read.rest.append(rest);
             }
         }
-        coincident::separate(&mut whole);
-        whole.name = document.root.meshes[mesh_ix].name.clone().unwrap_or_default();
-        self.meshes.push(whole);
-        Ok(Some(Known { mesh_ix: self.meshes.len() - 1, materials, is_skinned, origin }))
+        read.rest.recentre();
+        Ok(read)
     }
 
     /// Returns a skin in the pose of its joints.

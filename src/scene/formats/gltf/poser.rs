@@ -1,12 +1,12 @@
 //! A glTF file whose meshes are posed at one moment after the other. The file is read once, and so are the meshes that
-//! nothing deforms.
+//! nothing deforms, and the vertices of others at rest.
 
 use std::path::Path;
 
 use glam::DVec3;
 use hashbrown::HashMap;
 
-use super::{Document, Known, LoadedBefore, Loader, MeshKey, Nodes, cameras, lights, pointers, read};
+use super::{Document, Known, LoadedBefore, Loader, MeshKey, Nodes, cameras, lights, pointers, read, rest::ReadMeshes};
 use crate::scene::{
     formats::mesh_file::{MeshFormat, read_mesh},
     model::{AnimationChoice, Instance, LoadOptions, Mesh, Scene, SceneError},
@@ -20,6 +20,8 @@ pub(crate) struct Poser {
     meshes: Vec<Mesh>,
     /// Those of them that no skin and no morph target deforms.
     rigid: HashMap<MeshKey, Option<Known>>,
+    /// What has been read of the others.
+    read: ReadMeshes,
     /// The number of the file's instances.
     n_instances: usize,
     /// Whether the scene's lights are the file's, and which of the file's cameras is the scene's.
@@ -54,9 +56,9 @@ impl Poser {
         let has_lights = lights::lights(&document, &nodes, scene.origin) == scene.lights;
         let camera_ix = scene.cameras.iter().position(|(_, camera)| *camera == scene.camera);
         let rigid = known.into_iter().filter(|((_, skin, _, weights), _)| skin.is_none() && weights.is_empty());
-        let (rigid, options) = (rigid.collect(), options.clone());
+        let (rigid, read, options) = (rigid.collect(), ReadMeshes::default(), options.clone());
         let n_instances = first.len();
-        fits.then_some(Self { document, options, meshes, rigid, n_instances, has_lights, camera_ix })
+        fits.then_some(Self { document, options, meshes, rigid, read, n_instances, has_lights, camera_ix })
     }
 
     /// Chooses the animations that further moments show.
@@ -75,10 +77,11 @@ impl Poser {
         let n_known = self.meshes.len();
         let mut loader = Loader::new(&self.document, &nodes, LoadedBefore::default(), None);
         (loader.meshes, loader.known) = (std::mem::take(&mut self.meshes), self.rigid.clone());
+        loader.read = Some(std::mem::take(&mut self.read));
         let instances = loader.instances();
-        let Loader { mut meshes, .. } = loader;
+        let Loader { mut meshes, read, .. } = loader;
         let deformed = meshes.split_off(n_known);
-        self.meshes = meshes;
+        (self.meshes, self.read) = (meshes, read.unwrap_or_default());
         let Some(changed) = instances.ok().and_then(|now| self.put(&now, (n_known, deformed), scene)) else {
             return Ok(None);
         };

@@ -1,0 +1,290 @@
+//! Meshes that morph targets and joints deform. Twin of `glsl/passes/deform_vertices.comp`, which computes the same in
+//! the same order, so that positions have the same bits.
+
+use glam::{DMat4, DVec3, Vec3, Vec4};
+use rayon::prelude::*;
+
+use super::Mesh;
+
+/// What deforms the vertices of a mesh: first morph targets, then joints.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Deformation {
+    /// Positions at rest.
+    pub positions: Vec<Vec3>,
+    /// Normals at rest, one for each vertex or none: unit length, or zero.
+    pub normals: Vec<Vec3>,
+    /// Tangents at rest, one for each vertex or none: as those of [`Mesh::tangents`], or zero.
+    pub tangents: Vec<Vec4>,
+    /// What morph targets add to vertices: those of a vertex after those of the one before, in ascending order of
+    /// targets. A target that does not change a vertex is left out there.
+    pub deltas: Vec<MorphDelta>,
+    /// The index of the first delta of each vertex, and the number of deltas. Empty without deltas.
+    pub first_deltas: Vec<u32>,
+    /// The number of influences of each vertex. 0 if no joint moves the mesh.
+    pub n_influences: usize,
+    /// The influences of each vertex. Their weights add up to 1.
+    pub influences: Vec<Influence>,
+}
+
+/// What a morph target of weight 1 adds to a vertex.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MorphDelta {
+    /// The index of the target's weight in [`Pose::weights`].
+    pub target: u32,
+    /// Added to the position.
+    pub position: Vec3,
+    /// Added to the normal.
+    pub normal: Vec3,
+    /// Added to the direction of the tangent.
+    pub tangent: Vec3,
+}
+
+/// A joint's share in the place of a vertex.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Influence {
+    /// The index in [`Pose::joints`].
+    pub joint: u32,
+    /// The share. Negative shares are allowed.
+    pub weight: f32,
+}
+
+/// A moment of a deformation.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Pose {
+    /// Weights of the morph targets; missing ones are 0.
+    pub weights: Vec<f32>,
+    /// Transforms of the joints.
+    pub joints: Vec<JointMatrix>,
+}
+
+/// The transform from the mesh at rest to the space of the deformed mesh by a joint alone: an affine map, which may
+/// flatten.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct JointMatrix {
+    /// The images of the unit vectors x, y and z.
+    pub axes: [Vec3; 3],
+    /// The image of the origin.
+    pub translation: Vec3,
+}
+
+/// A vertex of a deformed mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Vertex {
+    /// Position.
+    pub position: Vec3,
+    /// Unit normal, or zero.
+    pub normal: Vec3,
+    /// Unit tangent with the bitangent's side as w, or zero.
+    pub tangent: Vec4,
+}
+
+impl JointMatrix {
+    /// Rounds a transform, whose last row is ignored, to single precision. `origin`: the point that becomes the origin.
+    pub fn new(matrix: DMat4, origin: DVec3) -> Self {
+        let axes = [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(|axis| axis.truncate().as_vec3());
+        Self { axes, translation: (matrix.w_axis.truncate() - origin).as_vec3() }
+    }
+
+    /// Adds a share of another transform.
+    fn add(self, weight: f32, other: &Self) -> Self {
+        let [x, y, z] = self.axes;
+        let axes = [x + weight * other.axes[0], y + weight * other.axes[1], z + weight * other.axes[2]];
+        Self { axes, translation: self.translation + weight * other.translation }
+    }
+
+    fn linear(&self, v: Vec3) -> Vec3 {
+        combined(self.axes, v)
+    }
+
+    /// Returns the cofactors of the linear map, which transform normals but for a positive factor, and whether it is a
+    /// reflection. The map is scaled first, so that nothing overflows.
+    fn cofactors(&self) -> ([Vec3; 3], bool) {
+        let largest = self.axes.map(|axis| axis.abs().max_element());
+        let scale = scale_to_one(largest[0].max(largest[1]).max(largest[2]));
+        let [x, y, z] = self.axes.map(|axis| axis * scale);
+        let cofactors = [y.cross(z), z.cross(x), x.cross(y)];
+        let mirrors = x.dot(cofactors[0]) < 0.0;
+        (if mirrors { cofactors.map(|axis| -axis) } else { cofactors }, mirrors)
+    }
+
+    fn apply(&self, vertex: Vertex) -> Vertex {
+        let (normals, mirrors) = self.cofactors();
+        let side = if mirrors { -vertex.tangent.w } else { vertex.tangent.w };
+        Vertex {
+            position: self.linear(vertex.position) + self.translation,
+            normal: combined(normals, vertex.normal),
+            // The cross product of reflected vectors is the reverse of their reflected cross product.
+            tangent: self.linear(vertex.tangent.truncate()).extend(side),
+        }
+    }
+}
+
+impl Deformation {
+    /// Returns whether targets or joints move the mesh.
+    pub fn is_deformed(&self) -> bool {
+        !self.deltas.is_empty() || self.n_influences > 0
+    }
+
+    /// Returns a vertex in a pose.
+    ///
+    /// # Panics
+    /// The pose lacks a joint, or there is no such vertex.
+    pub fn vertex(&self, ix: usize, pose: &Pose) -> Vertex {
+        let (mut vertex, is_morphed) = self.morphed(ix, &pose.weights);
+        if !is_morphed && self.n_influences == 0 {
+            return vertex;
+        }
+        vertex.tangent.w = side_of(vertex.tangent);
+        if self.n_influences > 0 {
+            let sum = |sum: JointMatrix, it: &Influence| sum.add(it.weight, &pose.joints[it.joint as usize]);
+            vertex = self.influences_of(ix).iter().fold(JointMatrix::default(), sum).apply(vertex);
+        }
+        let along = unit(vertex.tangent.truncate());
+        let tangent = if along == Vec3::ZERO { Vec4::ZERO } else { along.extend(vertex.tangent.w) };
+        Vertex { position: vertex.position, normal: unit(vertex.normal), tangent }
+    }
+
+    /// Returns a vertex with the deltas of its targets, and whether it has any.
+    fn morphed(&self, ix: usize, weights: &[f32]) -> (Vertex, bool) {
+        let normal = self.normals.get(ix).copied().unwrap_or_default();
+        let tangent = self.tangents.get(ix).copied().unwrap_or_default();
+        let mut vertex = Vertex { position: self.positions[ix], normal, tangent };
+        let mut is_morphed = false;
+        for delta in self.deltas_of(ix) {
+            let weight = weights.get(delta.target as usize).copied().unwrap_or(0.0);
+            if weight != 0.0 {
+                is_morphed = true;
+                vertex.position += weight * delta.position;
+                vertex.normal += weight * delta.normal;
+                vertex.tangent += (weight * delta.tangent).extend(0.0);
+            }
+        }
+        (vertex, is_morphed)
+    }
+
+    /// Returns what morph targets add to a vertex.
+    pub fn deltas_of(&self, ix: usize) -> &[MorphDelta] {
+        match self.first_deltas.get(ix..ix + 2) {
+            Some(ends) => &self.deltas[ends[0] as usize..ends[1] as usize],
+            None => &[],
+        }
+    }
+
+    /// Returns the influences of a vertex.
+    pub fn influences_of(&self, ix: usize) -> &[Influence] {
+        &self.influences[ix * self.n_influences..][..self.n_influences]
+    }
+
+    /// Adds the vertices of another deformation. Where one of them lacks normals or tangents that the other one has,
+    /// these are zero.
+    ///
+    /// # Panics
+    /// Joints move the vertices of one deformation alone.
+    pub fn append(&mut self, other: Self) {
+        if other.positions.is_empty() {
+            return;
+        }
+        if self.positions.is_empty() {
+            *self = other;
+            return;
+        }
+        assert_eq!(self.n_influences > 0, other.n_influences > 0, "joints move both");
+        let n = (self.positions.len(), self.positions.len() + other.positions.len());
+        append(&mut self.normals, other.normals, n);
+        append(&mut self.tangents, other.tangents, n);
+        let n_influences = self.n_influences.max(other.n_influences);
+        self.influences = widened(std::mem::take(&mut self.influences), self.n_influences, n_influences, n.0);
+        self.influences.extend(widened(other.influences, other.n_influences, n_influences, n.1 - n.0));
+        self.n_influences = n_influences;
+        if !(self.deltas.is_empty() && other.deltas.is_empty()) {
+            let n_deltas = self.deltas.len() as u32;
+            self.first_deltas.resize(n.0, n_deltas);
+            self.first_deltas.extend(other.first_deltas.iter().map(|first| n_deltas + first));
+            self.deltas.extend(other.deltas);
+            self.first_deltas.resize(n.1 + 1, self.deltas.len() as u32);
+        }
+        self.positions.extend(other.positions);
+    }
+
+    /// Gives a mesh, whose faces name the vertices, the positions, normals and tangents of a pose.
+    ///
+    /// # Panics
+    /// The pose lacks a joint, or a face names a vertex that there is not.
+    pub fn deform(&self, pose: &Pose, mesh: &mut Mesh) {
+        let vertices: Vec<Vertex> = (0..self.positions.len()).into_par_iter().map(|ix| self.vertex(ix, pose)).collect();
+        mesh.positions = vertices.par_iter().map(|vertex| vertex.position).collect();
+        let faces = &mesh.faces;
+        mesh.normals = match self.normals.is_empty() {
+            true => vec![[Vec3::ZERO; 3]; faces.len()],
+            false => corners(faces, |ix| vertices[ix].normal),
+        };
+        mesh.tangents = match self.tangents.is_empty() {
+            true => Vec::new(),
+            false => corners(faces, |ix| vertices[ix].tangent),
+        };
+    }
+
+    /// Gives a mesh, whose faces name the vertices, the positions, normals and tangents at rest.
+    ///
+    /// # Panics
+    /// A face names a vertex that there is not.
+    pub fn rest(self, mesh: &mut Mesh) {
+        mesh.normals = match self.normals.is_empty() {
+            true => vec![[Vec3::ZERO; 3]; mesh.faces.len()],
+            false => corners(&mesh.faces, |ix| self.normals[ix]),
+        };
+        mesh.tangents = match self.tangents.is_empty() {
+            true => Vec::new(),
+            false => corners(&mesh.faces, |ix| self.tangents[ix]),
+        };
+        mesh.positions = self.positions;
+    }
+}
+
+/// Returns the side of the bitangent, 1 or -1. A tangent that targets alone make has the side 1.
+pub(crate) fn side_of(tangent: Vec4) -> f32 {
+    if tangent.w < 0.0 { -1.0 } else { 1.0 }
+}
+
+/// Returns the sum of vectors times the coordinates of another one.
+fn combined([x, y, z]: [Vec3; 3], v: Vec3) -> Vec3 {
+    x * v.x + y * v.y + z * v.z
+}
+
+/// Returns the power of two that scales a positive number to at least 1 and below 2, or nearly so for the largest and
+/// the smallest numbers.
+fn scale_to_one(largest: f32) -> f32 {
+    f32::from_bits((254 - (largest.to_bits() >> 23).clamp(1, 253)) << 23)
+}
+
+/// Returns a vector of unit length, or zero if the vector has no direction.
+fn unit(v: Vec3) -> Vec3 {
+    let scaled = v * scale_to_one(v.abs().max_element());
+    let length = scaled.dot(scaled).sqrt();
+    if length > 0.0 && length < f32::INFINITY { scaled / length } else { Vec3::ZERO }
+}
+
+/// Joins two lists, each of which is empty or has an element for each vertex. `n`: vertices of the first list, of both.
+fn append<T: Copy + Default>(list: &mut Vec<T>, others: Vec<T>, n: (usize, usize)) {
+    if !(list.is_empty() && others.is_empty()) {
+        list.resize(n.0, T::default());
+        list.extend(others);
+        list.resize(n.1, T::default());
+    }
+}
+
+/// Returns influences with more of them for each of `n` vertices.
+fn widened(influences: Vec<Influence>, from: usize, to: usize, n: usize) -> Vec<Influence> {
+    if from == to {
+        return influences;
+    }
+    let mut widened = vec![Influence::default(); n * to];
+    let pairs = widened.chunks_exact_mut(to).zip(influences.chunks_exact(from));
+    pairs.for_each(|(to, of_vertex)| to[..from].copy_from_slice(of_vertex));
+    widened
+}
+
+/// Returns what belongs to the corners of faces.
+fn corners<T: Copy + Send>(faces: &[[u32; 3]], of: impl Fn(usize) -> T + Sync) -> Vec<[T; 3]> {
+    faces.par_iter().map(|face| face.map(|ix| of(ix as usize))).collect()
+}
