@@ -392,13 +392,17 @@ impl Commands<'_> {
     /// Overwrites the first bytes of a buffer with data that is stored in the command buffer.
     ///
     /// # Panics
-    /// The data exceeds 64 KiB or the buffer, or is not a multiple of 4 bytes.
+    /// The data exceeds the buffer, or is not a multiple of 4 bytes.
     pub fn update_buffer(&self, destination: &Arc<AnyBuffer>, data: &[impl Pod]) {
-        let bytes = bytemuck::cast_slice(data);
-        assert!(bytes.len() as u64 <= destination.bytes() && bytes.len() <= 1 << 16 && bytes.len().is_multiple_of(4));
+        let bytes: &[u8] = bytemuck::cast_slice(data);
+        assert!(bytes.len() as u64 <= destination.bytes() && bytes.len().is_multiple_of(4));
         self.keep(destination);
-        // SAFETY: the commands are being recorded, no rendering is open, and the buffer holds that many bytes.
-        unsafe { self.device.raw.cmd_update_buffer(self.raw, destination.raw(), 0, bytes) };
+        // Vulkan's limit of an update.
+        for (ix, part) in bytes.chunks(1 << 16).enumerate() {
+            let begin = (ix as u64) << 16;
+            // SAFETY: the commands are being recorded, no rendering is open, and the buffer holds that many bytes.
+            unsafe { self.device.raw.cmd_update_buffer(self.raw, destination.raw(), begin, part) };
+        }
     }
 
     /// Fills a buffer with zeros.
