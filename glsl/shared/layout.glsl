@@ -1822,4 +1822,91 @@ struct KdSlabExtent {
 // One `Slab` for each node.
 #define BIND_KD_SLAB_SLABS 203u
 
+// A mesh that is deformed: the push constants of the kernels that do it.
+//
+// - `n_vertices`, `n_faces`: their numbers.
+// - `n_influences`: the number of influences of each vertex. 0 if no joint moves the mesh.
+// - `has_tangents`: 1 if tangents are deformed, too, or else 0.
+// - `first_row`: the row of the triangles to which the first face is written.
+// - `first_corner_word`: the index in `texture_words` of the `CornerSurface` of that row's first corner. `NO_WORDS`: no
+//   tangents are written.
+struct DeformMesh {
+    uint n_vertices;
+    uint n_faces;
+    uint n_influences;
+    uint has_tangents;
+    uint first_row;
+    uint first_corner_word;
+};
+
+// A vertex of a mesh at rest, 48 bytes.
+//
+// - `position`, `normal`: unit length, or zero if there is no normal.
+// - `first_delta`, `n_deltas`: the first of its elements of `morph_deltas`, and their number.
+// - `tangent`: unit length, or zero if there is none. `side`: 1 or -1, the side of the bitangent.
+struct RestVertex {
+    vec3 position;
+    uint first_delta;
+    vec3 normal;
+    uint n_deltas;
+    vec3 tangent;
+    float side;
+};
+
+// What a morph target adds to a vertex, 48 bytes. `target` is the index of its weight.
+struct MorphDelta {
+    vec3 position;
+    uint target;
+    vec3 normal;
+    uint reserved_0;
+    vec3 tangent;
+    uint reserved_1;
+};
+
+// A joint's share in the place of a vertex.
+struct JointInfluence {
+    uint joint;
+    float weight;
+};
+
+// The transform by a joint, 48 bytes: a point p at rest goes to p.x `axis_x` + p.y `axis_y` + p.z `axis_z` +
+// (`translation_x`, `translation_y`, `translation_z`).
+struct JointRow {
+    vec3 axis_x;
+    float translation_x;
+    vec3 axis_y;
+    float translation_y;
+    vec3 axis_z;
+    float translation_z;
+};
+
+// A deformed vertex: its position, and its normal as in `Triangle`.
+struct DeformedVertex {
+    vec3 position;
+    uint normal;
+};
+
+// The descriptor set of the kernels that deform a mesh. These bindings are above those of texels.
+
+// One `RestVertex` for each vertex.
+#define BIND_DEFORM_VERTICES 224u
+// The `MorphDelta` of all vertices.
+#define BIND_DEFORM_DELTAS 225u
+// `n_influences` of `JointInfluence` for each vertex.
+#define BIND_DEFORM_INFLUENCES 226u
+// One `JointRow` for each joint.
+#define BIND_DEFORM_JOINTS 227u
+// A float for each morph target: its weight.
+#define BIND_DEFORM_WEIGHTS 228u
+// One `DeformedVertex` for each vertex.
+#define BIND_DEFORM_DEFORMED 229u
+// A word for each vertex: its tangent as in `CornerSurface`.
+#define BIND_DEFORM_TANGENTS 230u
+// Three words for each face: its vertices.
+#define BIND_DEFORM_FACES 231u
+// The world's triangles.
+#define BIND_DEFORM_TRIANGLES 232u
+// The world's `texture_words`.
+#define BIND_DEFORM_TEXTURE_WORDS 233u
+
 #endif

@@ -12,10 +12,10 @@ vec3 decode_normal(uint code) {
     return normalize(n);
 }
 
-// The code of a direction of any length.
+// The code of a direction of any length. `precise`, for kernels whose result must not depend on contraction.
 uint encode_normal(vec3 n) {
-    vec2 p = n.xy / (abs(n.x) + abs(n.y) + abs(n.z));
-    vec2 folded = (1.0 - abs(p.yx)) * vec2(p.x >= 0.0 ? 1.0 : -1.0, p.y >= 0.0 ? 1.0 : -1.0);
+    precise vec2 p = n.xy / (abs(n.x) + abs(n.y) + abs(n.z));
+    precise vec2 folded = (1.0 - abs(p.yx)) * vec2(p.x >= 0.0 ? 1.0 : -1.0, p.y >= 0.0 ? 1.0 : -1.0);
     return packSnorm2x16(n.z >= 0.0 ? p : folded);
 }
 

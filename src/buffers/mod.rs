@@ -14,6 +14,7 @@
 //! grid            the build of a grid
 //! kdtree          the build of a kd-tree
 //! kd_slabs        the slabs of a kd-tree, while they are computed
+//! deform          a mesh that is deformed
 //! cast            given rays, their hits, and the cast's descriptor set
 //! closest_point   given points, their hits, and the descriptor set of the search
 //! all_hits        given rays, all of their hits, and the descriptor set over them
@@ -23,6 +24,7 @@ mod accel;
 mod all_hits;
 mod cast;
 mod closest_point;
+mod deform;
 mod grid;
 mod kd_slabs;
 mod kdtree;
@@ -42,6 +44,7 @@ pub use self::{
     all_hits::AllHitsResources,
     cast::CastResources,
     closest_point::PointResources,
+    deform::{DeformBuffers, DeformTarget},
     grid::{GridBuffers, GridCapacities, PairSets},
     kd_slabs::{KdSlabBuffers, TreeBuffers},
     kdtree::{KdTreeBuffers, KdTreeCapacities, KdTreeRoom},

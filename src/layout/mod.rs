@@ -68,6 +68,12 @@ mod tests {
             BIND_KD_SLAB_PATCHES => Some("KdSlabPatch"),
             BIND_KD_SLAB_EXTENTS => Some("KdSlabExtent"),
             BIND_KD_SLAB_SLABS => Some("Slab"),
+            BIND_DEFORM_VERTICES => Some("RestVertex"),
+            BIND_DEFORM_DELTAS => Some("MorphDelta"),
+            BIND_DEFORM_INFLUENCES => Some("JointInfluence"),
+            BIND_DEFORM_JOINTS => Some("JointRow"),
+            BIND_DEFORM_DEFORMED => Some("DeformedVertex"),
+            BIND_DEFORM_TRIANGLES => Some("Triangle"),
             _ => None,
         }
     }
@@ -80,6 +86,7 @@ mod tests {
             kdtree if kdtree.starts_with("kdtree_") => "KdStage",
             "driver.rgen" => "DriverCast",
             "atrous_filter.comp" => "EdgeStep",
+            "deform_vertices.comp" | "deform_triangles.comp" => "DeformMesh",
             "false_color.comp" => "FalseColor",
             "present.frag" => "Present",
             "grid_sort_count.comp" | "grid_sort_scatter.comp" => "GridSort",

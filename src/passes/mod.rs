@@ -1,7 +1,7 @@
 //! The passes of a frame, one file each, with the pipelines of the pass and the functions that record its dispatches.
 //! The kernel of the same name is in `glsl/passes`, its twin on the CPU in `reference`, its test in `tests/passes`.
 //! The kernels that build a grid have a folder, `grid`, and those that build a kd-tree another, `kdtree`. Those that
-//! compute a kd-tree's slabs share a file, `kd_slabs`.
+//! compute a kd-tree's slabs share a file, `kd_slabs`, and those that deform a mesh share `deform`.
 //!
 //! # Needs and leaves
 //!
@@ -16,8 +16,8 @@
 //! The names are those of the buffers in the kernels, which are fields of [`Resources`](crate::buffers::Resources)
 //! and its parts. Not mentioned are the scene's arrays, which no pass writes, and `bounces` where it only gives a
 //! pass its range of rays and the size of its dispatch. The barriers between the passes of a frame are in
-//! [`plan`](crate::frame::plan). Only the builds of grids and kd-trees, the computation of slabs, the images of
-//! [`Visibility`] and the transfers within a pass have their own.
+//! [`plan`](crate::frame::plan). Only the builds of grids and kd-trees, the computation of slabs, the
+//! deformation of meshes, the images of [`Visibility`] and the transfers within a pass have their own.
 
 use std::sync::Arc;
 
@@ -39,6 +39,7 @@ mod auxiliary;
 mod cast;
 mod closest_point;
 mod compact;
+pub mod deform;
 mod demodulate;
 mod denoise;
 mod device_build;

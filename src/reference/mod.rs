@@ -21,6 +21,7 @@
 //! textures    texture, maps, alpha_test
 //! inputs      the data that kernels only read
 //! builds      kd_slabs
+//! meshes      deform
 //! counting    the same traversal with its reads counted
 //! ```
 
@@ -41,6 +42,7 @@ mod closest_instances;
 pub mod closest_point;
 pub mod compact;
 pub mod counting;
+pub mod deform;
 pub mod demodulate;
 pub mod denoise;
 pub mod display;

@@ -12,6 +12,7 @@ mod barriers;
 mod closest_point;
 mod compact;
 mod comparers;
+mod deform;
 mod demodulate;
 mod denoise;
 mod false_color;

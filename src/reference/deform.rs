@@ -1,0 +1,43 @@
+//! Deformation of meshes. Twin of the kernels `deform_vertices` and `deform_triangles`. Positions have the same bits.
+//! Codes of normals and tangents may differ by a step: a device may round divisions and roots differently.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use crate::{
+    layout::{DeformedVertex, FLAT_NORMAL, Triangle, normal::encode_octahedral},
+    scene::{
+        Transform,
+        deformation::{Deformation, Pose},
+    },
+    world::encode_tangent,
+};
+
+/// Returns the vertices of a pose, and the codes of their tangents.
+///
+/// # Panics
+/// The pose lacks a joint.
+pub fn deform_vertices(deformation: &Deformation, pose: &Pose) -> Vec<(DeformedVertex, u32)> {
+    let deformed = |ix| {
+        let vertex = deformation.vertex(ix, pose);
+        let normal = if vertex.normal == Vec3::ZERO { FLAT_NORMAL } else { encode_octahedral(vertex.normal) };
+        let tangent = encode_tangent(&Transform::IDENTITY, vertex.tangent);
+        (DeformedVertex { position: vertex.position, normal }, tangent)
+    };
+    (0..deformation.positions.len()).into_par_iter().map(deformed).collect()
+}
+
+/// Returns the triangles of deformed vertices, and the tangents of their corners.
+///
+/// # Panics
+/// A face names a vertex that there is not.
+pub fn deform_triangles(faces: &[[u32; 3]], vertices: &[(DeformedVertex, u32)]) -> Vec<(Triangle, [u32; 3])> {
+    let triangle = |face: &[u32; 3]| {
+        let [(a, _), (b, _), (c, _)] = face.map(|ix| vertices[ix as usize]);
+        let tangents = face.map(|ix| vertices[ix as usize].1);
+        let triangle =
+            Triangle { v0: a.position, n0: a.normal, v1: b.position, n1: b.normal, v2: c.position, n2: c.normal };
+        (triangle, tangents)
+    };
+    faces.par_iter().map(triangle).collect()
+}
