@@ -1,5 +1,6 @@
 //! Deformation of meshes by morph targets and joints: the device's vertices, triangles and tangents against the twin's,
-//! the twin against the definition in double precision, and rows against those of worlds.
+//! the twin against the definition in double precision, rows against those of worlds, and boxes of poses against their
+//! vertices.
 
 use std::sync::Arc;
 
@@ -11,7 +12,7 @@ use kdray::{
     passes::deform::Deform,
     reference::deform::{deform_triangles, deform_vertices},
     scene::{
-        LoadOptions, Mesh, Scene,
+        DeformedBounds, LoadOptions, Mesh, Scene,
         deformation::{Deformation, Influence, JointMatrix, MorphDelta, Pose},
     },
     world::FlatScene,
@@ -366,4 +367,66 @@ fn appended_meshes_keep_their_vertices() {
     let vertices = |it: &Deformation| -> Vec<_> { (0..it.positions.len()).map(|ix| it.vertex(ix, &pose)).collect() };
     assert_eq!(vertices(&whole), parts.iter().flat_map(vertices).collect::<Vec<_>>());
     assert_eq!((whole.n_influences, whole.first_deltas.len()), (8, 91));
+}
+
+/// Returns the box around vertices as they are computed.
+fn box_of(deformation: &Deformation, pose: &Pose) -> (Vec3, Vec3) {
+    let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    let places = (0..deformation.positions.len()).map(|ix| deformation.vertex(ix, pose).position);
+    places.fold(none, |(min, max), p| (min.min(p), max.max(p)))
+}
+
+fn holds((min, max): (Vec3, Vec3), (low, high): (Vec3, Vec3)) -> bool {
+    min.cmple(low).all() && max.cmpge(high).all()
+}
+
+#[test]
+fn boxes_of_poses_hold_their_vertices() {
+    let mut random = Random(7);
+    let single = Kind { n_influences: 1, n_joints: 1, ..SKINNED };
+    for kind in [SKINNED, MORPHED, BOTH, single, Kind { is_negative: false, ..BOTH }] {
+        for n in [1, 5, 300] {
+            let deformation = deformation(&mut random, n, kind);
+            let bounds = DeformedBounds::new(&deformation);
+            for _ in 0..20 {
+                let pose = pose(&mut random, kind);
+                let ((min, max), (low, high)) = (bounds.at(&pose), box_of(&deformation, &pose));
+                assert!(holds((min, max), (low, high)), "{min} {max}, not {low} {high}");
+                assert!(max.cmple(Vec3::splat(40.0)).all() && min.cmpge(Vec3::splat(-40.0)).all(), "{min} {max}");
+            }
+        }
+    }
+    // Boxes that know nothing of targets.
+    let deformation = deformation(&mut random, 300, MORPHED);
+    let pose = pose(&mut random, MORPHED);
+    let rest = Deformation { deltas: Vec::new(), first_deltas: Vec::new(), ..deformation.clone() };
+    assert!(!holds(DeformedBounds::new(&rest).at(&pose), box_of(&deformation, &pose)));
+    let none = DeformedBounds::new(&Deformation::default()).at(&Pose::default());
+    assert_eq!(none, (Vec3::INFINITY, Vec3::NEG_INFINITY));
+}
+
+/// Where a joint alone has all vertices at rest, the box is that of the vertices but for the margin.
+#[test]
+fn boxes_are_tight_where_nothing_is_blended() {
+    let mut random = Random(8);
+    let kind = Kind { n_influences: 1, n_joints: 1, ..SKINNED };
+    let deformation = deformation(&mut random, 100, kind);
+    let scale = DMat4::from_scale(DVec3::new(2.0, -1.0, 0.5));
+    let pose = Pose { joints: vec![JointMatrix::new(scale, DVec3::ZERO)], ..Pose::default() };
+    let ((min, max), (low, high)) = (DeformedBounds::new(&deformation).at(&pose), box_of(&deformation, &pose));
+    assert!((low - min).max_element() < 1e-4 && (max - high).max_element() < 1e-4, "{min} {max}, {low} {high}");
+}
+
+/// Two joints that pull a vertex in opposite directions: 1.5 times one place less 0.5 times the other.
+#[test]
+fn negative_weights_widen_the_box() {
+    let influences = vec![Influence { joint: 0, weight: 1.5 }, Influence { joint: 1, weight: -0.5 }];
+    let mut mesh = Deformation { positions: vec![Vec3::ZERO], n_influences: 2, influences, ..Deformation::default() };
+    let at = |x: f64| JointMatrix::new(DMat4::from_translation(DVec3::new(x, 0.0, 0.0)), DVec3::ZERO);
+    let pose = Pose { joints: vec![at(1.0), at(0.0)], ..Pose::default() };
+    assert_eq!(mesh.vertex(0, &pose).position, Vec3::new(1.5, 0.0, 0.0));
+    let (min, max) = DeformedBounds::new(&mesh).at(&pose);
+    assert!((1.5..1.50001).contains(&max.x) && (-0.50001..=-0.5).contains(&min.x), "{min} {max}");
+    mesh.influences = vec![Influence { joint: 0, weight: 0.5 }, Influence { joint: 1, weight: 0.5 }];
+    assert!(DeformedBounds::new(&mesh).at(&pose).1.x < 1.00001);
 }
