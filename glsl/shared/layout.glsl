@@ -1569,6 +1569,15 @@ struct KdStage {
     uint level_ix;
 };
 
+// Push constants of the kernel that relocates a kd-tree: where its arrays begin among those of all kd-trees.
+//
+// - `first_node`: of its root; even. `first_entry`: of its leaves. `first_row`: of its triangles.
+struct KdPlace {
+    uint first_node;
+    uint first_entry;
+    uint first_row;
+};
+
 // Slabs of a kd-tree, computed on a device (src/passes/kd_slabs.rs). kdtree/slab_build.glsl defines the terms.
 
 // The most entries below a node that gets a slab.

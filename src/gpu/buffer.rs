@@ -159,9 +159,34 @@ impl<T: Pod> Buffer<T> {
         })
     }
 
+    /// Overwrites the elements from index `first` on, and waits for the device. Commands that were submitted before
+    /// still read the previous ones.
+    ///
+    /// # Panics
+    /// The buffer has fewer elements.
+    pub fn upload_at(&self, first: usize, data: &[T]) -> Result<(), GpuError> {
+        let end = first + data.len();
+        assert!(end <= self.len, "`{}` holds {} elements, not {end}", self.any.name, self.len);
+        self.upload_from((first, true), data.len(), |first, part| {
+            let from = &data[first..][..part.len()];
+            copy_by_threads(bytemuck::cast_slice_mut(part), bytemuck::cast_slice(from));
+        })
+    }
+
     /// Overwrites the first `len` elements, part by part, and waits for the device. `write` is that of
     /// [`Buffer::written_by`].
-    fn upload_by(&self, len: usize, mut write: impl FnMut(usize, &mut [T])) -> Result<(), GpuError> {
+    fn upload_by(&self, len: usize, write: impl FnMut(usize, &mut [T])) -> Result<(), GpuError> {
+        self.upload_from((0, false), len, write)
+    }
+
+    /// Overwrites `len` elements as [`Buffer::upload_by`] does, from the index `begin` on. `is_read`: whether commands
+    /// that were submitted before read the buffer.
+    fn upload_from(
+        &self,
+        (begin, is_read): (usize, bool),
+        len: usize,
+        mut write: impl FnMut(usize, &mut [T]),
+    ) -> Result<(), GpuError> {
         if len == 0 {
             return Ok(());
         }
@@ -172,8 +197,11 @@ impl<T: Pod> Buffer<T> {
         for first in (0..len).step_by(most) {
             let bytes = most.min(len - first) * size_of::<T>();
             write(first, bytemuck::cast_slice_mut(&mut staging.bytes()[..bytes]));
-            let begin = (first * size_of::<T>()) as u64;
+            let begin = ((begin + first) * size_of::<T>()) as u64;
             context.run("upload", |commands| {
+                if is_read {
+                    commands.barrier(Access::AnyUse, Access::TransferWrite); // the buffer
+                }
                 commands.copy_buffer_to((&self.any, begin), &staging.buffer, bytes as u64);
                 commands.barrier(Access::TransferWrite, Access::AnyUse); // the buffer
             })?;

@@ -11,7 +11,10 @@ use kdray::{
     },
     buffers::KdTreeRoom,
     gpu::{Buffer, BufferUse, Context, Timer},
-    layout::{KD_BIN_BLOCK, KD_BLOCK_SIZE, KD_HAS_SLAB, KD_SMALL_CELL, KD_WORD_DEPTH, KdNode, Slab, Triangle},
+    layout::{
+        KD_BIN_BLOCK, KD_BLOCK_SIZE, KD_HAS_SLAB, KD_LEAF, KD_PAIR_SHIFT, KD_SMALL_CELL, KD_WORD_DEPTH, KdNode,
+        KdPlace, Slab, Triangle,
+    },
     passes::kdtree::{BuiltTree, KdTreeBuilder, KdTreeBuilderOptions},
     reference::{
         kd_slabs::kd_slabs,
@@ -257,5 +260,39 @@ fn whole_trees_have_slabs() {
     check_slabs(&context, "soup", &meshes::soup(1200, 7));
     check_slabs(&context, "needles", &needles());
     check_slabs(&context, "far", &meshes::placed(meshes::torus(40, 20), 0.3, vec3(1000.0, -70.0, 3.0)));
+    assert_silent(&context);
+}
+
+#[test]
+fn relocated_trees_have_the_indices_of_their_places() {
+    let context = device();
+    for n in [1, KD_BLOCK_SIZE as usize / 5, 3000] {
+        let triangles = meshes::soup(n, 4);
+        // There is room for more triangles than the tree has.
+        let all = meshes::soup(n + 500, 9);
+        let builder = builder(&context, &all, &bare());
+        builder.upload(&triangles).expect("an upload");
+        let built = builder.build_first(n, None).expect("a tree");
+        let expected = builder.read_back(&built).expect("its arrays");
+        check_twin(&context, "soup", &triangles, (&built, &expected));
+        let place = KdPlace { first_node: 14, first_entry: 1001, first_row: 77 };
+        let tree = builder.copy_relocated(&built, &place, BufferUse::Storage).expect("a copy");
+        let nodes = expected.nodes.iter().map(|&KdNode { split_or_first, axis_and_child }| {
+            if axis_and_child & KD_LEAF != 0 {
+                return KdNode { split_or_first: split_or_first + 1001, axis_and_child };
+            }
+            KdNode { split_or_first, axis_and_child: axis_and_child + (7 << KD_PAIR_SHIFT) }
+        });
+        assert_eq!(tree.nodes.download().expect("nodes"), nodes.collect::<Vec<_>>());
+        let parents: Vec<_> = expected.parents.iter().map(|parent| parent + 14).collect();
+        assert_eq!(tree.parents.download().expect("parents"), parents);
+        let entries = tree.leaf_triangles.download().expect("entries");
+        let rows: Vec<_> = expected.leaf_triangles.iter().map(|triangle_ix| triangle_ix + 77).collect();
+        assert_eq!(entries.iter().map(|entry| entry.triangle_ix).collect::<Vec<_>>(), rows);
+        assert_eq!(tree.leaf_planes.download().expect("planes"), expected.leaf_planes);
+        // The next build begins anew.
+        let again = builder.build_first(n, None).expect("a tree");
+        assert_eq!(builder.read_back(&again).expect("its arrays"), expected);
+    }
     assert_silent(&context);
 }

@@ -1,6 +1,6 @@
 //! Builds a kd-tree on a device, in buffers that are allocated once.
 
-use std::sync::Arc;
+use std::{iter, sync::Arc};
 
 use super::KdTreePasses;
 use crate::{
@@ -9,8 +9,8 @@ use crate::{
         kdtree::{BuildOptions, Parts, Statistics},
     },
     buffers::{KdTreeBuffers, KdTreeRoom, TreeBuffers},
-    gpu::{Buffer, BufferUse, CommandBuffer, Commands, Context, GpuError, Timer, TimerRow},
-    layout::{KD_MOST_ENTRIES, KdBuild, KdNode, LeafTriangle, Plane, Slab, Triangle},
+    gpu::{Access, AnyBuffer, Buffer, BufferUse, CommandBuffer, Commands, Context, GpuError, Timer, TimerRow},
+    layout::{KD_MOST_ENTRIES, KdBuild, KdNode, KdPlace, LeafTriangle, Plane, Slab, Triangle},
     passes::{device_build, kd_slabs::SlabBuilder, then},
 };
 
@@ -34,9 +34,10 @@ impl Default for KdTreeBuilderOptions {
 }
 
 /// Kernels and memory that build the kd-tree of an array of triangles. A build can be repeated any number of times,
-/// with other triangles in the same buffer.
+/// with other triangles in the same buffer, and also with fewer.
 pub struct KdTreeBuilder {
     context: Arc<Context>,
+    triangles: Buffer<Triangle>,
     options: KdTreeBuilderOptions,
     passes: KdTreePasses,
     buffers: KdTreeBuffers,
@@ -83,7 +84,8 @@ pub struct BuiltTree {
     state: KdBuild,
 }
 
-/// Copies of a tree's arrays, of exactly its size.
+/// Arrays that hold a tree, or several.
+#[derive(Clone)]
 pub struct DeviceTree {
     /// The nodes.
     pub nodes: Buffer<KdNode>,
@@ -95,6 +97,77 @@ pub struct DeviceTree {
     pub leaf_planes: Buffer<Plane>,
     /// A slab for each node; empty for a tree without slabs.
     pub slabs: Buffer<Slab>,
+}
+
+impl DeviceTree {
+    /// Copies trees of so many nodes and entries, which have the indices of the target already, to their place there.
+    /// Does not wait for the device, as [`KdTreeBuilder::place`].
+    ///
+    /// # Errors
+    /// Out of memory; a Vulkan call fails. Nothing has been copied then.
+    ///
+    /// # Panics
+    /// The arrays have no room there.
+    pub fn copy_to(&self, context: &Arc<Context>, sizes: (usize, usize), target: &Target) -> Result<(), GpuError> {
+        let from = self.sizes(0, 0).map(|(buffer, _)| buffer);
+        submit(context, "kdtree_copy", |commands| target.record(commands, from, sizes))
+    }
+
+    /// Returns the arrays, each with the number of bytes of a tree of so many nodes and entries.
+    fn sizes(&self, n_nodes: usize, n_entries: usize) -> [(&Arc<AnyBuffer>, usize); 5] {
+        let n_slabs = if self.slabs.is_empty() { 0 } else { n_nodes };
+        [
+            (self.nodes.any(), n_nodes * size_of::<KdNode>()),
+            (self.parents.any(), n_nodes / 2 * size_of::<u32>()),
+            (self.leaf_triangles.any(), n_entries * size_of::<LeafTriangle>()),
+            (self.leaf_planes.any(), n_entries * size_of::<Plane>()),
+            (self.slabs.any(), n_slabs * size_of::<Slab>()),
+        ]
+    }
+}
+
+/// Submits commands between whatever else uses their buffers, without a wait.
+fn submit(context: &Arc<Context>, name: &str, record: impl FnOnce(&Commands)) -> Result<(), GpuError> {
+    let commands = CommandBuffer::record(context, name, None, |commands| {
+        commands.barrier(Access::AnyUse, Access::AnyUse); // arrays of builds and frames before
+        record(commands);
+        commands.barrier(Access::AnyUse, Access::AnyUse); // the same arrays in builds and frames that follow
+    })?;
+    context.submit(vec![commands]).map(drop)
+}
+
+/// Arrays that hold the trees of several geometries, one after the other, and the place of one of them.
+pub struct Target<'a> {
+    /// The arrays of trees.
+    pub trees: &'a DeviceTree,
+    /// Where the geometry's parts of the arrays begin.
+    pub place: KdPlace,
+    /// What is copied together with the tree.
+    pub more: &'a [BufferCopy],
+}
+
+/// A copy of the first bytes of a buffer to another one, from the byte `begin` of that one on.
+pub struct BufferCopy {
+    /// The source.
+    pub from: Arc<AnyBuffer>,
+    /// The destination, and the byte at which the copy begins.
+    pub to: (Arc<AnyBuffer>, usize),
+    /// The number of bytes.
+    pub bytes: usize,
+}
+
+impl Target<'_> {
+    /// Records the copies of the arrays of a tree of so many nodes and entries.
+    fn record(&self, commands: &Commands, from: [&Arc<AnyBuffer>; 5], (n_nodes, n_entries): (usize, usize)) {
+        let sizes = self.trees.sizes(n_nodes, n_entries);
+        let begins = self.trees.sizes(self.place.first_node as usize, self.place.first_entry as usize);
+        let arrays =
+            iter::zip(from, sizes).zip(begins).map(|((from, (to, bytes)), (_, begin))| (from, to, begin, bytes));
+        let more = self.more.iter().map(|it| (&it.from, &it.to.0, it.to.1, it.bytes));
+        for (from, to, begin, bytes) in arrays.chain(more).filter(|(.., bytes)| *bytes > 0) {
+            commands.copy_buffer_part((from, 0), (to, begin as u64), bytes as u64);
+        }
+    }
 }
 
 impl BuiltTree {
@@ -126,6 +199,7 @@ impl KdTreeBuilder {
             slabs: options.tree.slabs.then(|| SlabStage::new(context, &buffers)).transpose()?,
             buffers,
             passes: KdTreePasses::new(context, &bindings)?,
+            triangles: triangles.clone(),
             context: context.clone(),
             options: options.clone(),
         })
@@ -150,15 +224,52 @@ impl KdTreeBuilder {
         KdTreePasses::n_stages(self.buffers.initial().max_depth) + of_slabs
     }
 
+    /// The number of triangles for which there is room.
+    pub fn capacity(&self) -> usize {
+        self.triangles.len()
+    }
+
+    /// Overwrites the first triangles, and waits for the device.
+    ///
+    /// # Errors
+    /// Out of memory; a Vulkan call fails.
+    ///
+    /// # Panics
+    /// There are more than [`KdTreeBuilder::capacity`].
+    pub fn upload(&self, triangles: &[Triangle]) -> Result<(), GpuError> {
+        self.triangles.upload_at(0, triangles)
+    }
+
+    /// Overwrites the first triangles by those of another array, `len` from the index `first` on. Later builds use
+    /// them.
+    ///
+    /// # Errors
+    /// Out of memory; a Vulkan call fails.
+    pub fn take(&self, from: &Buffer<Triangle>, (first, len): (usize, usize)) -> Result<(), GpuError> {
+        let [first, len] = [first, len].map(|n| (n * size_of::<Triangle>()) as u64);
+        self.submit("kdtree_take", |commands| {
+            commands.copy_buffer_part((from.any(), first), (self.triangles.any(), 0), len);
+        })
+    }
+
     /// Builds the tree and waits for the device. `timer`: takes the times of the dispatches, which are then all in one
     /// command buffer; it must have room for [`KdTreeBuilder::n_stages`] rows.
     ///
     /// # Errors
     /// Out of memory; a Vulkan call fails.
     pub fn build(&self, timer: Option<&Timer>) -> Result<BuiltTree, GpuError> {
+        self.build_first(self.capacity(), timer)
+    }
+
+    /// Builds the tree of the first `n_triangles` triangles, as [`KdTreeBuilder::build`] does.
+    ///
+    /// # Errors
+    /// Out of memory; a Vulkan call fails.
+    pub fn build_first(&self, n_triangles: usize, timer: Option<&Timer>) -> Result<BuiltTree, GpuError> {
+        let n_triangles = n_triangles as u32;
         let commands = match timer {
-            Some(_) => vec![self.record_all(timer)?],
-            None => self.record_parts()?,
+            Some(_) => vec![self.record_all(n_triangles, timer)?],
+            None => self.record_parts(n_triangles)?,
         };
         self.context.wait_for(self.context.submit(commands)?)?;
         let state = self.buffers.build.download()?[0];
@@ -200,7 +311,7 @@ impl KdTreeBuilder {
     /// Out of memory; a Vulkan call fails.
     pub fn copy(&self, built: &BuiltTree, usage: BufferUse) -> Result<DeviceTree, GpuError> {
         let (n_nodes, n_entries) = (built.n_nodes as usize, built.n_entries as usize);
-        let (context, from) = (&self.context, &self.buffers);
+        let context = &self.context;
         let to = DeviceTree {
             nodes: Buffer::new(context, "kd_nodes", n_nodes, usage)?,
             parents: Buffer::new(context, "kd_parents", n_nodes / 2, usage)?,
@@ -208,30 +319,73 @@ impl KdTreeBuilder {
             leaf_planes: Buffer::new(context, "leaf_planes", n_entries, usage)?,
             slabs: Buffer::new(context, "kd_slabs", if built.has_slabs { n_nodes } else { 0 }, usage)?,
         };
-        let mut arrays = vec![
-            (from.nodes.any(), to.nodes.any(), n_nodes * size_of::<KdNode>()),
-            (from.parents.any(), to.parents.any(), n_nodes / 2 * size_of::<u32>()),
-            (from.leaf_triangles.any(), to.leaf_triangles.any(), n_entries * size_of::<LeafTriangle>()),
-            (from.leaf_planes.any(), to.leaf_planes.any(), n_entries * size_of::<Plane>()),
-        ];
-        arrays.extend(self.slabs.iter().map(|it| (it.slabs.any(), to.slabs.any(), n_nodes * size_of::<Slab>())));
+        let arrays: Vec<_> = iter::zip(self.arrays(), to.sizes(n_nodes, n_entries))
+            .map(|(from, (to, bytes))| (from, to, bytes))
+            .collect();
         device_build::copy(context, "kdtree_copy", &arrays)?;
         Ok(to)
     }
 
-    fn record_all(&self, timer: Option<&Timer>) -> Result<CommandBuffer, GpuError> {
+    /// Copies the tree of the last build as [`KdTreeBuilder::copy`] does, with the indices that it has in arrays of
+    /// several trees. In the builder's buffers, too, the tree has these indices afterwards.
+    ///
+    /// # Errors
+    /// Out of memory; a Vulkan call fails.
+    pub fn copy_relocated(&self, built: &BuiltTree, place: &KdPlace, usage: BufferUse) -> Result<DeviceTree, GpuError> {
+        self.submit("kdtree_relocate", |commands| self.relocate(commands, built, place))?;
+        self.copy(built, usage)
+    }
+
+    /// Copies the tree of the last build into arrays of several trees. Does not wait for the device: the copies come
+    /// after all commands that were submitted before, and before all later ones. The tree in the builder's buffers
+    /// cannot be used any more.
+    ///
+    /// # Errors
+    /// Out of memory; a Vulkan call fails. Nothing has been copied then.
+    ///
+    /// # Panics
+    /// The arrays have no room there.
+    pub fn place(&self, built: &BuiltTree, target: &Target) -> Result<(), GpuError> {
+        self.submit("kdtree_place", |commands| {
+            self.relocate(commands, built, &target.place);
+            commands.barrier(Access::ComputeWrite, Access::TransferRead); // the relocated arrays
+            target.record(commands, self.arrays(), (built.n_nodes as usize, built.n_entries as usize));
+        })
+    }
+
+    /// The buffer of the triangles.
+    pub fn triangles(&self) -> &Buffer<Triangle> {
+        &self.triangles
+    }
+
+    /// The arrays of the tree in the order of [`DeviceTree::sizes`]. Without slabs, the last one is another one.
+    fn arrays(&self) -> [&Arc<AnyBuffer>; 5] {
+        let KdTreeBuffers { nodes, parents, leaf_triangles, leaf_planes, .. } = &self.buffers;
+        let slabs = self.slabs.as_ref().map_or(nodes.any(), |stage| stage.slabs.any());
+        [nodes.any(), parents.any(), leaf_triangles.any(), leaf_planes.any(), slabs]
+    }
+
+    fn relocate(&self, commands: &Commands, built: &BuiltTree, place: &KdPlace) {
+        self.passes.relocate(commands, &self.buffers, built.n_nodes.max(built.n_entries), place);
+    }
+
+    fn submit(&self, name: &str, record: impl FnOnce(&Commands)) -> Result<(), GpuError> {
+        submit(&self.context, name, record)
+    }
+
+    fn record_all(&self, n_triangles: u32, timer: Option<&Timer>) -> Result<CommandBuffer, GpuError> {
         CommandBuffer::record(&self.context, "kdtree_build", timer, |commands| {
             commands.reset_timer();
-            self.passes.setup(commands, &self.buffers);
+            self.passes.setup(commands, &self.buffers, n_triangles);
             (0..self.n_levels()).for_each(|level_ix| self.passes.level(commands, &self.buffers, level_ix));
             self.finish(commands);
         })
     }
 
     /// Records a command buffer for every `levels_per_submit` levels.
-    fn record_parts(&self) -> Result<Vec<CommandBuffer>, GpuError> {
+    fn record_parts(&self, n_triangles: u32) -> Result<Vec<CommandBuffer>, GpuError> {
         let record = |body: &dyn Fn(&Commands)| CommandBuffer::record(&self.context, "kdtree_build", None, body);
-        let mut parts = vec![record(&|commands| self.passes.setup(commands, &self.buffers))?];
+        let mut parts = vec![record(&|commands| self.passes.setup(commands, &self.buffers, n_triangles))?];
         let n_each = self.options.levels_per_submit.max(1);
         for first in (0..self.n_levels()).step_by(n_each as usize) {
             parts.push(record(&|commands| {

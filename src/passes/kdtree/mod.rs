@@ -23,6 +23,7 @@
 //!   place            writes the nodes in depth-first order
 //! leaves             writes the entries of leaves, with triangles and planes
 //! slabs, if wanted   src/passes/kd_slabs.rs
+//! relocate, if wanted   makes the indices those of arrays that hold several trees
 //! ```
 //!
 //! Prefix sums give all places, and atomics only add, or find a least or greatest integer. So the same device builds
@@ -36,14 +37,14 @@ mod builder;
 
 use std::{mem::offset_of, sync::Arc};
 
-pub use self::builder::{BuiltTree, DeviceTree, KdTreeBuilder, KdTreeBuilderOptions};
+pub use self::builder::{BufferCopy, BuiltTree, DeviceTree, KdTreeBuilder, KdTreeBuilderOptions, Target};
 use super::{Kernels, ONE_GROUP, spirv, then};
 use crate::{
     buffers::KdTreeBuffers,
     gpu::{Access, BindingLayout, Commands, ComputePipeline, Constants, Context, Dispatch, GpuError},
     layout::{
-        KD_BLOCK_SIZE, KD_GROUPS_X, KD_SCANS_CELLS, KD_SCANS_REFERENCES, KD_SCANS_TRIANGLES, KdBuild, KdLevel, KdStage,
-        constants,
+        KD_BLOCK_SIZE, KD_GROUPS_X, KD_SCANS_CELLS, KD_SCANS_REFERENCES, KD_SCANS_TRIANGLES, KdBuild, KdLevel, KdPlace,
+        KdStage, constants,
     },
 };
 
@@ -66,6 +67,7 @@ struct KdTreePasses {
     sum: ComputePipeline,
     place: ComputePipeline,
     leaves: ComputePipeline,
+    relocate: ComputePipeline,
 }
 
 /// Dispatches before the first level, of a level, and after all levels without those of `sum` and `place`.
@@ -100,6 +102,7 @@ impl KdTreePasses {
             sum: kernels.of_blocks("kdtree_sum", spirv!("kdtree_sum.comp"), &none)?,
             place: kernels.of_blocks("kdtree_place", spirv!("kdtree_place.comp"), &none)?,
             leaves: kernels.of_blocks("kdtree_leaves", spirv!("kdtree_leaves.comp"), &none)?,
+            relocate: kernels.of_blocks("kdtree_relocate", spirv!("kdtree_relocate.comp"), &none)?,
         })
     }
 
@@ -110,18 +113,17 @@ impl KdTreePasses {
         before + of_level * (max_depth + 1) + max_depth + max_depth + 1 + after
     }
 
-    /// Records what comes before the first level. Needs `triangles`. Leaves the root's level, its cell, and its
-    /// references.
-    fn setup(&self, commands: &Commands, buffers: &KdTreeBuffers) {
+    /// Records what comes before the first level. Needs the first `n_triangles` of `triangles`. Leaves the root's
+    /// level, its cell, and its references.
+    fn setup(&self, commands: &Commands, buffers: &KdTreeBuffers, n_triangles: u32) {
         let reset = || {
-            commands.update_buffer(buffers.build.any(), std::slice::from_ref(buffers.initial()));
+            commands.update_buffer(buffers.build.any(), &[KdBuild { n_triangles, ..*buffers.initial() }]);
             for buffer in [buffers.levels.any(), buffers.scale_counts.any(), buffers.bins.any()] {
                 commands.clear_buffer(buffer);
             }
             commands.barrier(Access::TransferWrite, Access::KernelUpdate); // build, levels, scale_counts, bins
         };
-        let n_groups = buffers.capacities.n_triangles.div_ceil(KD_BLOCK_SIZE);
-        let blocks = || Dispatch::Threads([n_groups.min(KD_GROUPS_X), n_groups.div_ceil(KD_GROUPS_X), 1], [1, 1, 1]);
+        let blocks = || over_blocks(n_triangles);
         let none = KdStage::default();
         commands.bind(buffers.set_of(0));
         commands.dispatch_after(reset, &self.bounds, None, &none, blocks());
@@ -181,6 +183,19 @@ impl KdTreePasses {
         let entries = offset_of!(KdBuild, entry_groups_x) as u64;
         commands.dispatch(&self.leaves, None, &KdStage::default(), Dispatch::Indirect(buffers.build.any(), entries));
     }
+
+    /// Records the relocation of a tree of at most `n` nodes and entries. Needs `build`. Updates `nodes`, `parents` and
+    /// `leaf_triangles`.
+    fn relocate(&self, commands: &Commands, buffers: &KdTreeBuffers, n: u32, place: &KdPlace) {
+        commands.bind(buffers.set_of(0));
+        commands.dispatch(&self.relocate, None, place, over_blocks(n));
+    }
+}
+
+/// Returns a dispatch of a workgroup for each block of `n` entries.
+fn over_blocks(n: u32) -> Dispatch<'static> {
+    let n_groups = n.div_ceil(KD_BLOCK_SIZE);
+    Dispatch::Threads([n_groups.min(KD_GROUPS_X), n_groups.div_ceil(KD_GROUPS_X), 1], [1, 1, 1])
 }
 
 #[cfg(test)]
