@@ -2,33 +2,71 @@
 
 use glam::Vec3;
 
-use super::{AccelOptions, grid::Grid, kdtree::KdTree};
+use super::{
+    AccelOptions,
+    grid::Grid,
+    kdtree::{BuildOptions, KdTree, LazyTree},
+};
 use crate::{
-    layout::{AccelConstants, GridCell, KdNode, Plane, Slab, Triangle},
+    layout::{AccelConstants, GridCell, KD_WORD_DEPTH, KdNode, Plane, Slab, Triangle},
     util::progress::Progress,
 };
 
-/// A structure over the triangles of a geometry, in its own space, which the host builds. An array that the structure
-/// does not have is empty.
+/// The fewest triangles of a geometry whose tree devices build. A device's build is hundreds of dispatches, one after
+/// the other, however few triangles there are. The host's build of fewer triangles takes less time.
+pub const LEAST_DEVICE_TRIANGLES: usize = 2048;
+
+/// A structure over the triangles of a geometry, in its own space. An array that the structure does not have is empty.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BottomLevel {
+    /// A kd-tree that the host has built.
     KdTree(KdTree),
+    /// A kd-tree that each device builds. The host's arrays exist after [`BottomLevel::build_on_host`].
+    LazyTree(Box<LazyTree>),
     Grid(Grid),
 }
 
 impl BottomLevel {
     /// Builds the structure on the current rayon pool, and reports the progress of a kd-tree's build.
     pub fn build(triangles: &[Triangle], options: &AccelOptions, progress: &Progress) -> Self {
+        let of_host = |options: &BuildOptions| Self::KdTree(KdTree::build_observed(triangles, options, progress));
         match options {
-            AccelOptions::KdTree(options) | AccelOptions::LazyTree(options) => {
-                Self::KdTree(KdTree::build_observed(triangles, options, progress))
+            AccelOptions::KdTree(options) => of_host(options),
+            AccelOptions::LazyTree(options) if triangles.len() >= LEAST_DEVICE_TRIANGLES => {
+                Self::LazyTree(Box::new(LazyTree::new(triangles, options.clone())))
+            }
+            // Kernels are made for trees as deep as those that devices build.
+            AccelOptions::LazyTree(options) => {
+                let max_depth = Some(options.depth_limit().min(KD_WORD_DEPTH));
+                of_host(&BuildOptions { max_depth, ..options.clone() })
             }
             AccelOptions::Grid(options) => Self::Grid(Grid::build(triangles, options)),
         }
     }
 
+    /// Builds the host's tree if devices build the structure, unless the host has done so already. `triangles`: those
+    /// of the geometry.
+    pub fn build_on_host(&self, triangles: &[Triangle]) {
+        if let Self::LazyTree(tree) = self {
+            tree.get(triangles);
+        }
+    }
+
+    /// The tree that each device builds, if it is one.
+    pub fn as_lazy(&self) -> Option<&LazyTree> {
+        if let Self::LazyTree(tree) = self { Some(tree) } else { None }
+    }
+
+    /// The host's kd-tree.
+    ///
+    /// # Panics
+    /// Devices build the tree, and the host has not.
     pub fn as_kdtree(&self) -> Option<&KdTree> {
-        if let Self::KdTree(tree) = self { Some(tree) } else { None }
+        match self {
+            Self::KdTree(tree) => Some(tree),
+            Self::LazyTree(tree) => Some(tree.on_host().expect("a tree that the host has built, too")),
+            Self::Grid(_) => None,
+        }
     }
 
     pub fn as_grid(&self) -> Option<&Grid> {
@@ -39,6 +77,7 @@ impl BottomLevel {
     pub fn bounds(&self) -> [Vec3; 2] {
         match self {
             Self::KdTree(tree) => tree.bounds(),
+            Self::LazyTree(tree) => tree.bounds(),
             Self::Grid(grid) => grid.bounds(),
         }
     }
@@ -46,6 +85,7 @@ impl BottomLevel {
     pub fn n_triangles(&self) -> usize {
         match self {
             Self::KdTree(tree) => tree.n_triangles(),
+            Self::LazyTree(tree) => tree.n_triangles(),
             Self::Grid(grid) => grid.n_triangles(),
         }
     }
@@ -54,6 +94,7 @@ impl BottomLevel {
     pub fn constants(&self) -> AccelConstants {
         match self {
             Self::KdTree(tree) => tree.constants(),
+            Self::LazyTree(tree) => tree.constants(),
             Self::Grid(grid) => grid.constants(),
         }
     }
@@ -61,16 +102,16 @@ impl BottomLevel {
     /// The indices of the triangles in leaves or cells.
     pub fn leaf_triangles(&self) -> &[u32] {
         match self {
-            Self::KdTree(tree) => tree.leaf_triangles(),
             Self::Grid(grid) => grid.leaf_triangles(),
+            _ => self.as_kdtree().map_or(&[], KdTree::leaf_triangles),
         }
     }
 
     /// The plane of each triangle in [`BottomLevel::leaf_triangles`].
     pub fn leaf_planes(&self) -> &[Plane] {
         match self {
-            Self::KdTree(tree) => tree.leaf_planes(),
             Self::Grid(grid) => grid.leaf_planes(),
+            _ => self.as_kdtree().map_or(&[], KdTree::leaf_planes),
         }
     }
 

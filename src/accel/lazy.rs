@@ -76,6 +76,26 @@ pub struct DeviceBuild {
     pub stages: Vec<BuildStage>,
 }
 
+impl DeviceBuild {
+    /// Returns the report of builds of kd-trees that a device has made one after the other: the sums of their sizes
+    /// and times. None if there are none.
+    pub(crate) fn sum(builds: Vec<Self>) -> Option<Self> {
+        builds.into_iter().reduce(|mut sum, build| {
+            sum.ms = sum.ms.zip(build.ms).map(|(sum, ms)| sum + ms);
+            for stage in build.stages {
+                match sum.stages.iter_mut().find(|known| known.name == stage.name) {
+                    Some(known) => known.ms = known.ms.zip(stage.ms).map(|(sum, ms)| sum + ms),
+                    None => sum.stages.push(stage),
+                }
+            }
+            if let (Statistics::KdTree(sum), Statistics::KdTree(own)) = (&mut sum.statistics, &build.statistics) {
+                sum.add(own);
+            }
+            sum
+        })
+    }
+}
+
 /// Stage of a build: all dispatches of one kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BuildStage {
@@ -108,6 +128,11 @@ impl<S: Structure> Lazy<S> {
     pub fn get(&self, triangles: &[Triangle]) -> &S {
         assert_eq!(triangles.len(), self.n_triangles, "the triangles of the structure");
         made_once(&self.on_host, || S::of(triangles, &self.options))
+    }
+
+    /// The host's structure, if it is built.
+    pub(crate) fn on_host(&self) -> Option<&S> {
+        self.on_host.get()
     }
 
     /// Keeps a device's report, if it is the first one.

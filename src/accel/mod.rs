@@ -18,7 +18,7 @@ use glam::Vec3;
 use self::{
     grid::{GridLevels, GridOptions, LazyGrid},
     kdtree::{BuildOptions, KdTree, LazyTree},
-    two_level::{StructuresId, TwoLevel},
+    two_level::{GeometriesId, StructuresId, TwoLevel},
 };
 pub use self::{
     lazy::{BuildStage, DeviceBuild, Lazy, Structure},
@@ -39,7 +39,7 @@ pub enum Accel {
     LazyTree(LazyTree),
     /// A grid. Each device builds its own grid. The host builds a grid only at the first [`Lazy::get`].
     Grid(LazyGrid),
-    /// A kd-tree or a grid for each geometry, and a hierarchy over the instances, which the host builds.
+    /// A kd-tree or a grid for each geometry, and a hierarchy over the instances. Devices may build kd-trees.
     TwoLevel(Box<TwoLevel>),
 }
 
@@ -48,8 +48,8 @@ pub enum Accel {
 pub enum AccelOptions {
     /// Options of a kd-tree that the host builds.
     KdTree(BuildOptions),
-    /// Options of a kd-tree that each device builds, of at most 32 levels. The trees of instances are those of
-    /// [`AccelOptions::KdTree`].
+    /// Options of a kd-tree that each device builds, of at most 32 levels. Of kept meshes, each device builds the trees
+    /// of those with 2048 triangles or more, and the host builds the others.
     LazyTree(BuildOptions),
     /// Options of a grid.
     Grid(GridOptions),
@@ -151,10 +151,16 @@ impl Accel {
     /// The report of the first device that has built the structure, if there is one.
     pub fn device_build(&self) -> Option<&DeviceBuild> {
         match self {
-            Self::KdTree(_) | Self::TwoLevel(_) => None,
+            Self::KdTree(_) => None,
+            Self::TwoLevel(two) => two.device_build(),
             Self::LazyTree(tree) => tree.device_build(),
             Self::Grid(grid) => grid.device_build(),
         }
+    }
+
+    /// What tells geometries, however they are deformed, from all others; none without instances.
+    pub(crate) fn geometries_id(&self) -> Option<&GeometriesId> {
+        if let Self::TwoLevel(two) = self { Some(two.geometries_id()) } else { None }
     }
 
     /// What tells the structures of geometries from all others; none without instances.

@@ -1,15 +1,15 @@
 //! The structure of a world of instances: a kd-tree or a grid for each geometry, and a hierarchy over the instances.
 
 use std::{
-    ops::AddAssign,
-    sync::{Arc, Weak},
+    iter,
+    sync::{Arc, OnceLock, Weak},
 };
 
 use glam::Vec3;
 use rayon::prelude::*;
 
 use super::{
-    AccelOptions, Statistics,
+    AccelOptions, DeviceBuild, Statistics,
     bottom_level::BottomLevel,
     grid::{self, Grid},
     kdtree::{self, BuildOptions, KdTree},
@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{
     layout::{GeometryConstants, Instance, KD_MAX_ORIGIN_DISTANCE, KD_NODE_BYTES, Triangle},
-    util::progress::Progress,
+    util::{once::made_once, progress::Progress},
 };
 
 /// Where a geometry's triangles are among all stored ones.
@@ -46,14 +46,33 @@ impl PartialEq for StructuresId {
     }
 }
 
+/// Identity of a world's geometries and of all worlds in which only their vertices, normals and tangents differ.
+#[derive(Clone, Debug)]
+pub struct GeometriesId(Arc<()>);
+
+impl PartialEq for GeometriesId {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+}
+
 /// The structures of all geometries, and the hierarchy over their instances.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct TwoLevel {
     /// A structure for each geometry, in its own space. All are of one kind.
     structures: Arc<Vec<Arc<BottomLevel>>>,
-    /// The index at which each tree's nodes begin where all trees are stored one after the other. All are even.
-    node_begins: Arc<Vec<usize>>,
+    /// The index at which each of the host's trees begins where all are stored one after the other. All are even.
+    node_begins: Arc<OnceLock<Vec<usize>>>,
     top: TopLevel,
+    geometries_id: GeometriesId,
+    /// The report of the first device that has built trees for this world.
+    on_device: OnceLock<DeviceBuild>,
+}
+
+impl PartialEq for TwoLevel {
+    fn eq(&self, other: &Self) -> bool {
+        self.structures == other.structures && self.top == other.top
+    }
 }
 
 impl TwoLevel {
@@ -80,13 +99,14 @@ impl TwoLevel {
         let build = |((range, given), part): ((&StoredRange, Option<_>), Progress)| {
             given.unwrap_or_else(|| Arc::new(BottomLevel::build(range.of(stored), options, &part)))
         };
-        Self::of_structures(ranges.par_iter().zip(given).zip(parts).map(build).collect(), instances)
+        let structures = ranges.par_iter().zip(given).zip(parts).map(build).collect();
+        Self::of_structures(structures, instances, GeometriesId(Arc::new(())))
     }
 
-    fn of_structures(structures: Vec<Arc<BottomLevel>>, instances: &[Instance]) -> Self {
+    fn of_structures(structures: Vec<Arc<BottomLevel>>, instances: &[Instance], geometries_id: GeometriesId) -> Self {
         let top = Self::top_of(&structures, instances);
-        let node_begins = begins(structures.iter().map(|it| it.nodes().len()));
-        Self { structures: Arc::new(structures), node_begins: Arc::new(node_begins), top }
+        let (node_begins, on_device) = Default::default();
+        Self { structures: Arc::new(structures), node_begins, top, geometries_id, on_device }
     }
 
     /// Returns the structure of geometries some of which have other vertices. Only their structures are built, and the
@@ -102,13 +122,46 @@ impl TwoLevel {
         let built: Vec<_> = deformed.par_iter().map(build).collect();
         let mut structures = Vec::clone(&self.structures);
         deformed.iter().zip(built).for_each(|(ix, structure)| structures[*ix] = structure);
-        Self::of_structures(structures, instances)
+        Self::of_structures(structures, instances, self.geometries_id.clone())
     }
 
     /// Returns the structure of the same geometries in other places. Only the hierarchy is built. `instances`: as many
     /// as before, each of the same geometry.
     pub fn moved(&self, instances: &[Instance]) -> Self {
-        Self { top: Self::top_of(&self.structures, instances), ..self.clone() }
+        Self { top: Self::top_of(&self.structures, instances), on_device: OnceLock::new(), ..self.clone() }
+    }
+
+    /// Returns what tells these geometries, however they are deformed, from all others.
+    pub fn geometries_id(&self) -> &GeometriesId {
+        &self.geometries_id
+    }
+
+    /// Whether devices build some of the trees.
+    pub fn has_device_trees(&self) -> bool {
+        self.structures.iter().any(|it| it.as_lazy().is_some())
+    }
+
+    /// Builds the trees on the host that only devices have built. `stored`: the triangles of all geometries.
+    pub fn build_on_host(&self, stored: &[Triangle]) {
+        let geometries = self.with_triangles(stored).collect::<Vec<_>>();
+        geometries.into_par_iter().for_each(|(structure, triangles)| structure.build_on_host(triangles));
+    }
+
+    /// Returns each structure with its triangles.
+    fn with_triangles<'a>(&'a self, stored: &'a [Triangle]) -> impl Iterator<Item = (&'a BottomLevel, &'a [Triangle])> {
+        let rows = begins(self.structures.iter().map(|it| it.n_triangles()));
+        iter::zip(self.structures.iter(), rows)
+            .map(|(structure, row)| (&**structure, &stored[row..][..structure.n_triangles()]))
+    }
+
+    /// Keeps a device's report, if it is the first one.
+    pub fn note(&self, build: DeviceBuild) {
+        let _ = self.on_device.set(build);
+    }
+
+    /// The report of the first device that has built trees for this world, if there is one.
+    pub fn device_build(&self) -> Option<&DeviceBuild> {
+        self.on_device.get()
     }
 
     /// Returns what tells these structures, and those of all worlds that share them, from all others.
@@ -126,7 +179,10 @@ impl TwoLevel {
         &self.structures
     }
 
-    /// The kd-trees of all geometries; none if they have grids.
+    /// The host's kd-trees of all geometries; none if they have grids.
+    ///
+    /// # Panics
+    /// The host has not built all.
     pub fn trees(&self) -> impl Iterator<Item = &KdTree> {
         self.structures.iter().filter_map(|it| it.as_kdtree())
     }
@@ -167,30 +223,34 @@ impl TwoLevel {
         self.trees().map(KdTree::depth).max().unwrap_or_default()
     }
 
-    /// Computes the statistics of all structures together. `options`: those that they were built with.
-    pub fn statistics(&self, options: &AccelOptions) -> Statistics {
+    /// Computes the statistics of all structures together. `options`: those that they were built with. `stored`: the
+    /// triangles of all geometries. The host builds the trees that only devices build, and none has built.
+    pub fn statistics(&self, options: &AccelOptions, stored: &[Triangle]) -> Statistics {
         match options {
             AccelOptions::KdTree(options) | AccelOptions::LazyTree(options) => {
-                Statistics::KdTree(self.tree_statistics(options))
+                Statistics::KdTree(self.tree_statistics(options, stored))
             }
             AccelOptions::Grid(_) => Statistics::Grid(self.grid_statistics()),
         }
     }
 
     /// The cost is the mean over the trees, weighted by their triangles.
-    fn tree_statistics(&self, options: &BuildOptions) -> kdtree::Statistics {
+    fn tree_statistics(&self, options: &BuildOptions, stored: &[Triangle]) -> kdtree::Statistics {
         let n_stored = self.n_stored().max(1) as f64;
-        let mut all = kdtree::Statistics { depth: self.depth(), ..Default::default() };
-        for tree in self.trees() {
-            let own = tree.statistics(tree.n_triangles(), options);
-            all.n_nodes += own.n_nodes;
-            all.n_leaves += own.n_leaves;
-            add(&mut all.n_empty_leaves, own.n_empty_leaves);
-            add(&mut all.n_slabs, own.n_slabs);
-            all.n_references += own.n_references;
-            add(&mut all.sah_cost, own.sah_cost.map(|cost| cost * tree.n_triangles() as f64 / n_stored));
-            all.bytes += own.bytes;
-        }
+        let own = |(structure, triangles): (&BottomLevel, &[Triangle])| {
+            let statistics = match structure {
+                BottomLevel::LazyTree(tree) => tree.statistics(triangles),
+                _ => Statistics::KdTree(structure.as_kdtree()?.statistics(triangles.len(), options)),
+            };
+            let Statistics::KdTree(own) = statistics else { return None };
+            let share = triangles.len() as f64 / n_stored;
+            Some(kdtree::Statistics { sah_cost: own.sah_cost.map(|cost| cost * share), ..own })
+        };
+        let sum = self.with_triangles(stored).filter_map(own).reduce(|mut sum, own| {
+            sum.add(&own);
+            sum
+        });
+        let mut all = sum.unwrap_or_default();
         all.references_per_triangle = all.n_references as f64 / n_stored;
         all.bytes += size_of_val(&self.top.nodes[..]) as u64;
         all
@@ -212,10 +272,15 @@ impl TwoLevel {
         all
     }
 
-    /// The index at which each tree's nodes begin where all trees are stored one after the other, and the number of all
-    /// nodes. All are even.
+    /// The index at which each of the host's trees begins where all are stored one after the other, and the number of
+    /// all nodes. All are even.
+    ///
+    /// # Panics
+    /// The host has not built all trees.
     pub fn node_begins(&self) -> &[usize] {
-        &self.node_begins
+        let made: &Vec<usize> =
+            made_once(&self.node_begins, || begins(self.structures.iter().map(|it| it.nodes().len())));
+        made
     }
 
     /// The share of the distance of a ray's origin by which the hierarchy's boxes are too small for the ray, if the
@@ -234,8 +299,9 @@ impl TwoLevel {
         begins(self.structures.iter().map(|it| it.cells().len()))
     }
 
-    /// Returns what a search through each geometry needs beside the arrays.
-    pub fn geometry_constants(&self) -> Vec<GeometryConstants> {
+    /// Returns what a search through each geometry needs beside the arrays. `roots`: the index of each tree's root
+    /// among the nodes of all.
+    pub fn geometry_constants(&self, roots: &[usize]) -> Vec<GeometryConstants> {
         let rows = begins(self.structures.iter().map(|it| it.n_triangles()));
         let cells = self.cell_begins();
         let constants = |(ix, structure): (usize, &Arc<BottomLevel>)| {
@@ -245,7 +311,7 @@ impl TwoLevel {
                 plane_epsilon: own.plane_epsilon,
                 box_max: own.box_max,
                 origin_reach: own.origin_reach,
-                root_offset: KD_NODE_BYTES * self.node_begins[ix] as u32,
+                root_offset: KD_NODE_BYTES * roots[ix] as u32,
                 first_row: rows[ix] as u32,
                 n_triangles: structure.n_triangles() as u32,
                 first_cell: cells[ix] as u32,
@@ -266,9 +332,4 @@ fn begins(lens: impl Iterator<Item = usize>) -> Vec<usize> {
         Some(*sum)
     });
     std::iter::once(0).chain(sums).collect()
-}
-
-/// Adds a figure that is known.
-fn add<T: Default + AddAssign>(sum: &mut Option<T>, figure: Option<T>) {
-    *sum.get_or_insert_default() += figure.unwrap_or_default();
 }

@@ -7,10 +7,11 @@ use rayon::prelude::*;
 
 use super::{
     SuspendedRays,
+    device_trees::{Arrays, DeviceTrees, Geometries},
     scene_arrays::{Content, Contents, SceneAccess, SceneArrays},
     surface_kinds::SurfaceKinds,
     texture_words::TextureWords,
-    two_level::{Joined, instance_rows},
+    two_level::{Joined, instance_rows, leaf_triangle},
 };
 use crate::{
     accel::{
@@ -67,6 +68,8 @@ pub struct AccelBuffers {
     surface_kinds: SurfaceKinds,
     /// The contents of `constants`.
     uploaded: AccelConstants,
+    /// Where the trees of geometries are; none unless the device has built some of them.
+    trees: Option<Arc<DeviceTrees>>,
 }
 
 impl AccelBuffers {
@@ -141,7 +144,16 @@ impl AccelBuffers {
             Accel::Grid(grid) => Self::of_grid(context, triangles, grid.get(triangles), common()),
             Accel::TwoLevel(two) => {
                 let instances = geometry.instances().expect("a structure of two levels is over instances");
-                Self::of_two_level(context, triangles, (two, instances), common())
+                let all = Geometries { two, instances, stored: triangles };
+                let of_host = || Self::of_two_level(context, triangles, (two, instances), common());
+                match two.has_device_trees().then(|| Self::of_device_trees(context, &all, common)) {
+                    Some(Err(error)) if error.is_lack_of_room() => {
+                        tracing::warn!("the host builds the kd-trees, since the device has too little room: {error}");
+                        of_host()
+                    }
+                    Some(made) => made,
+                    None => of_host(),
+                }
             }
         }?;
         made.n_triangles = geometry.n_triangles();
@@ -156,10 +168,11 @@ impl AccelBuffers {
         (two, instances): (&TwoLevel, &Instances),
         common: Contents,
     ) -> Result<Self, GpuError> {
+        two.build_on_host(triangles);
         let joined = Joined::new(two, instances);
         joined.check()?;
         let mut constants = AccelConstants::default();
-        let rows = instance_rows(two, instances, &mut constants);
+        let rows = instance_rows(two, instances, two.node_begins(), &mut constants);
         let (n_nodes, n_entries) = (joined.n_nodes(), joined.n_entries());
         let n_slabs = if context.predicates_branches() { 0 } else { joined.n_slabs() };
         let write_entries = |first: usize, part: &mut [LeafTriangle]| joined.write_entries(triangles, first, part);
@@ -187,6 +200,37 @@ impl AccelBuffers {
             n_levels => Structure::Grid { n_levels },
         };
         Self::with(context, contents, &constants, structure)
+    }
+
+    /// Uploads the geometries, some of whose trees the device builds. `common`: returns the contents without a
+    /// structure.
+    fn of_device_trees<'a>(
+        context: &Arc<Context>,
+        all: &Geometries<'a>,
+        common: impl Fn() -> Contents<'a>,
+    ) -> Result<Self, GpuError> {
+        let on_device = Buffer::with(context, "triangles", all.stored, BufferUse::Texels)?;
+        let (trees, new) = DeviceTrees::build(context, &on_device, all)?;
+        let mut constants = AccelConstants::default();
+        let rows = instance_rows(all.two, all.instances, &trees.roots(), &mut constants);
+        let reserved = || Contents { instance_rows: Content::Elements(&rows), ..trees.reserved(common()) };
+        let usage = SceneAccess::of(context, &reserved()).buffer_use();
+        let arrays = trees.arrays(context, usage, (all, new))?;
+        let contents = Contents {
+            kd_nodes: Content::OnDevice(arrays.nodes, usage),
+            kd_parents: Content::OnDevice(arrays.parents, usage),
+            leaf_triangles: Content::OnDevice(arrays.leaf_triangles, usage),
+            leaf_planes: Content::OnDevice(arrays.leaf_planes, usage),
+            kd_slabs: Content::OnDevice(arrays.slabs, usage),
+            ..reserved()
+        };
+        // Triangles that are read by address are uploaded once more.
+        let contents = match usage {
+            BufferUse::Texels => Contents { triangles: Content::OnDevice(on_device, usage), ..contents },
+            _ => contents,
+        };
+        let made = Self::with(context, contents, &constants, Structure::KdTree { mask_words: 1 })?;
+        Ok(Self { trees: Some(Arc::new(trees)), ..made })
     }
 
     /// Uploads triangles and their kd-tree.
@@ -328,6 +372,7 @@ impl AccelBuffers {
             structure,
             is_instanced: false,
             uploaded,
+            trees: None,
         };
         made.upload_constants(context)?;
         Ok(made)
@@ -373,16 +418,17 @@ impl AccelBuffers {
         if traversal == Traversal::Brute && value > limit {
             return Err(GpuError::Limit { what: "triangles without a tree", value, limit });
         }
-        let mut links = match accel {
+        let mut links = match (accel, &self.trees) {
             // The nodes may be the device's own.
-            Accel::LazyTree(tree) if traversal.needs_boxes() || traversal.needs_ropes() => {
+            (Accel::LazyTree(tree), _) if traversal.needs_boxes() || traversal.needs_ropes() => {
                 tree.links_of(self.arrays.kd_nodes.download()?, traversal)
             }
-            Accel::LazyTree(_) => TraversalLinks::default(),
+            (Accel::LazyTree(_), _) => TraversalLinks::default(),
+            (Accel::TwoLevel(two), Some(trees)) => trees.links(&self.arrays.kd_nodes, two, traversal)?,
             _ => TraversalLinks::of(accel, geometry.triangles(), traversal),
         };
         let joined = match (accel, instances) {
-            (Accel::TwoLevel(two), Some(instances)) => Some(Joined::new(two, instances)),
+            (Accel::TwoLevel(two), Some(instances)) if self.trees.is_none() => Some(Joined::new(two, instances)),
             _ => None,
         };
         if let (Some(joined), false) = (&joined, links.ropes.is_empty()) {
@@ -416,10 +462,52 @@ impl AccelBuffers {
     pub(crate) fn set_instances(&mut self, context: &Arc<Context>, geometry: Geometry) -> Result<(), GpuError> {
         let (Accel::TwoLevel(two), Some(instances)) = (geometry.accel(), geometry.instances()) else { return Ok(()) };
         let mut next = self.clone();
-        let rows = instance_rows(two, instances, &mut next.uploaded);
+        let roots = self.trees.as_ref().map_or_else(|| two.node_begins().to_vec(), |trees| trees.roots());
+        let rows = instance_rows(two, instances, &roots, &mut next.uploaded);
         next.arrays.instance_rows = Content::Elements(&rows).upload(context, "instance_rows", self.access)?;
         next.upload_constants(context)?;
         *self = next;
+        Ok(())
+    }
+
+    /// Builds the trees of geometries that are deformed in another pose of the world, and uploads their triangles and
+    /// what textures need at their corners, into the arrays that are there. `n_owners`: the number of clones of these
+    /// buffers that may see the change. Returns whether it was possible; if not, everything has to be uploaded.
+    ///
+    /// # Errors
+    /// Memory runs out, or a call fails. Some of the geometries may have changed then.
+    pub(crate) fn set_pose(&self, context: &Arc<Context>, world: &World, n_owners: usize) -> Result<bool, GpuError> {
+        let geometry = world.geometry();
+        let (Accel::TwoLevel(two), Some(instances)) = (geometry.accel(), geometry.instances()) else {
+            return Ok(false);
+        };
+        let Some(trees) = &self.trees else { return Ok(false) };
+        // Links are those of certain trees.
+        let others_read = Arc::strong_count(trees) > n_owners || !self.arrays.kd_links.is_empty();
+        let all = Geometries { two, instances, stored: geometry.triangles() };
+        let corners_begin = self.uploaded.corners_begin;
+        let corners = if corners_begin == NO_WORDS { &[] } else { &world.scene().textures.corners[..] };
+        let arrays = Arrays {
+            arrays: &self.arrays,
+            corners: cast_slice(corners),
+            n_stored: all.stored.len(),
+            corners_begin: corners_begin as usize,
+        };
+        trees.update(context, &arrays, (&all, others_read))
+    }
+
+    /// Returns what makes others notice that these buffers are in use, as a clone does.
+    pub(crate) fn shared(&self) -> Option<Arc<DeviceTrees>> {
+        self.trees.clone()
+    }
+
+    /// Takes what rays pass through from other buffers of the same triangles.
+    pub(crate) fn hide_as(&mut self, context: &Arc<Context>, other: &Self) -> Result<(), GpuError> {
+        if other.filters {
+            let hidden = other.arrays.triangle_materials.download()?;
+            self.add_materials(context, &hidden)?;
+            self.filters = true;
+        }
         Ok(())
     }
 
@@ -496,10 +584,7 @@ impl AccelBuffers {
 /// Writes the triangles of the leaves' entries from entry `first` on. `entries`: the index of each entry's triangle.
 pub(super) fn leaf_triangles(triangles: &[Triangle], entries: &[u32], first: usize, part: &mut [LeafTriangle]) {
     let numbers = &entries[first..][..part.len()];
-    part.par_iter_mut().zip(numbers).for_each(|(entry, &triangle_ix)| {
-        let Triangle { v0, v1, v2, .. } = triangles[triangle_ix as usize];
-        *entry = LeafTriangle { v0, triangle_ix, v1, v2, ..LeafTriangle::default() };
-    });
+    part.par_iter_mut().zip(numbers).for_each(|(entry, &triangle_ix)| *entry = leaf_triangle(triangles, triangle_ix));
 }
 
 /// Returns for each triangle `TRIANGLE_HIDDEN` if its index is in `hidden`, else 0.

@@ -212,8 +212,8 @@ impl Resources {
         })
     }
 
-    /// Makes the resources for a world that differs in its instances. `emitters_differ`: whether it also differs in its
-    /// emitters.
+    /// Makes the resources for a world that differs in its instances, and in the places of as many lights.
+    /// `differs`: whether it differs in its lights, and in its emitters.
     ///
     /// # Errors
     /// A buffer is beyond the device's limits, or memory runs out.
@@ -221,10 +221,13 @@ impl Resources {
         &self,
         context: &Arc<Context>,
         world: &World,
-        emitters_differ: bool,
+        [lights_differ, emitters_differ]: [bool; 2],
     ) -> Result<Self, GpuError> {
         self.changed(|next| {
             next.accel.set_instances(context, world.geometry())?;
+            if lights_differ {
+                next.lights = Buffer::with(context, "lights", &world.scene().lights, BufferUse::Storage)?;
+            }
             if emitters_differ { next.accel.set_emitters(context, world) } else { Ok(()) }
         })
     }

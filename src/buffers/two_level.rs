@@ -9,7 +9,7 @@ use crate::{
     gpu::GpuError,
     layout::{
         AccelConstants, GEOMETRY_ROWS, GridCell, INSTANCE_ROWS, InstanceRow, KD_LEAF, KD_NODE_BYTES, KD_PAIR_SHIFT,
-        KdNode, KdRope, LeafTriangle, Plane, Slab, TOP_NODE_ROWS, Triangle,
+        KdNode, KdPlace, KdRope, LeafTriangle, Plane, Slab, TOP_NODE_ROWS, Triangle,
     },
     world::Instances,
 };
@@ -90,15 +90,12 @@ impl<'a> Joined<'a> {
 
     pub fn write_nodes(&self, first: usize, part: &mut [KdNode]) {
         Self::write(self.first_nodes, first, part, |geometry_ix, ix| {
-            let KdNode { split_or_first, axis_and_child } = self.structure(geometry_ix).nodes()[ix];
-            if axis_and_child & KD_LEAF != 0 {
-                return KdNode {
-                    split_or_first: split_or_first + self.first_entries[geometry_ix] as u32,
-                    axis_and_child,
-                };
-            }
-            let first_pair = (self.first_nodes[geometry_ix] / 2) as u32;
-            KdNode { split_or_first, axis_and_child: axis_and_child + (first_pair << KD_PAIR_SHIFT) }
+            let place = KdPlace {
+                first_node: self.first_nodes[geometry_ix] as u32,
+                first_entry: self.first_entries[geometry_ix] as u32,
+                first_row: self.first_rows[geometry_ix],
+            };
+            relocated(self.structure(geometry_ix).nodes()[ix], &place)
         });
     }
 
@@ -111,9 +108,7 @@ impl<'a> Joined<'a> {
 
     pub fn write_entries(&self, stored: &[Triangle], first: usize, part: &mut [LeafTriangle]) {
         Self::write(&self.first_entries, first, part, |geometry_ix, ix| {
-            let triangle_ix = self.first_rows[geometry_ix] + self.structure(geometry_ix).leaf_triangles()[ix];
-            let Triangle { v0, v1, v2, .. } = stored[triangle_ix as usize];
-            LeafTriangle { v0, triangle_ix, v1, v2, ..LeafTriangle::default() }
+            leaf_triangle(stored, self.first_rows[geometry_ix] + self.structure(geometry_ix).leaf_triangles()[ix])
         });
     }
 
@@ -153,8 +148,27 @@ impl<'a> Joined<'a> {
     }
 }
 
-/// Returns the rows of `instance_rows`, and notes where its parts begin.
-pub fn instance_rows(two: &TwoLevel, instances: &Instances, constants: &mut AccelConstants) -> Vec<InstanceRow> {
+/// Returns a tree's node as it is among those of several trees. Twin of glsl/passes/kdtree_relocate.comp.
+pub fn relocated(KdNode { split_or_first, axis_and_child }: KdNode, place: &KdPlace) -> KdNode {
+    match axis_and_child & KD_LEAF != 0 {
+        true => KdNode { split_or_first: split_or_first + place.first_entry, axis_and_child },
+        false => KdNode { split_or_first, axis_and_child: axis_and_child + ((place.first_node / 2) << KD_PAIR_SHIFT) },
+    }
+}
+
+/// Returns a leaf's entry of a stored triangle.
+pub fn leaf_triangle(stored: &[Triangle], triangle_ix: u32) -> LeafTriangle {
+    let Triangle { v0, v1, v2, .. } = stored[triangle_ix as usize];
+    LeafTriangle { v0, triangle_ix, v1, v2, ..LeafTriangle::default() }
+}
+
+/// Returns the rows of `instance_rows`, and notes where its parts begin. `roots`: the index of each tree's root.
+pub fn instance_rows(
+    two: &TwoLevel,
+    instances: &Instances,
+    roots: &[usize],
+    constants: &mut AccelConstants,
+) -> Vec<InstanceRow> {
     let firsts: Vec<u32> = instances.list.iter().map(|it| it.first_triangle).collect();
     let words = |words: &[u32]| {
         let row = |four: &[u32]| {
@@ -166,7 +180,7 @@ pub fn instance_rows(two: &TwoLevel, instances: &Instances, constants: &mut Acce
     let mut rows: Vec<InstanceRow> = cast_slice(&instances.list).to_vec();
     debug_assert_eq!(rows.len(), INSTANCE_ROWS as usize * instances.list.len());
     constants.geometries_begin = rows.len() as u32;
-    rows.extend_from_slice(cast_slice(&two.geometry_constants()));
+    rows.extend_from_slice(cast_slice(&two.geometry_constants(roots)));
     constants.top_nodes_begin = rows.len() as u32;
     debug_assert_eq!(
         constants.top_nodes_begin - constants.geometries_begin,

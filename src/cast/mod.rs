@@ -48,7 +48,7 @@ use crate::{
     accel::{
         AccelKind, Query,
         kdtree::{Traversal, TraversalLinks},
-        two_level::StructuresId,
+        two_level::{GeometriesId, StructuresId},
         wide_bvh::WideBvh,
     },
     buffers::{AccelBuffers, CastResources, ResumePass, hidden_words},
@@ -89,6 +89,8 @@ pub struct GpuCaster {
     tree: AccelBuffers,
     /// What tells the trees of geometries from others; none without instances.
     structures_id: Option<StructuresId>,
+    /// What tells the geometries from others, however they are deformed.
+    geometries_id: Option<GeometriesId>,
     bindings: Arc<BindingLayout>,
     traversal: Traversal,
     /// The kernel for [`Query::Closest`], created at its first use.
@@ -124,6 +126,7 @@ impl GpuCaster {
             context: Arc::clone(context),
             tree: buffers,
             structures_id: geometry.accel().structures_id(),
+            geometries_id: geometry.accel().geometries_id().cloned(),
             bindings,
             traversal,
             closest: None,
@@ -148,20 +151,34 @@ impl GpuCaster {
         Ok(self)
     }
 
-    /// Casts rays into a world whose instances have changed ([`World::with_instances_changed`]). Only they are
-    /// uploaded.
+    /// Casts rays into a world whose instances have changed ([`World::with_instances_changed`]), or into another moment
+    /// of the same film. Only the instances are uploaded. Where meshes are deformed and the device builds their trees,
+    /// it builds these again.
     ///
     /// # Errors
-    /// The world was not made of this caster's, or memory runs out. Then nothing has changed.
+    /// The world was not made of this caster's, or memory runs out. Then nothing has changed, unless several meshes are
+    /// deformed: some of them may have changed until a world is set again.
     pub fn set_world(&mut self, world: &World) -> Result<(), GpuError> {
         let geometry = world.geometry();
-        check_structures(self.structures_id.as_ref(), geometry)?;
-        let mut tree = self.tree.clone();
-        tree.set_instances(&self.context, geometry)?;
-        self.resources = self.resources.with_accel(&self.bindings, &tree)?;
-        self.tree = tree;
-        self.point_search = None;
+        check_geometries(self.geometries_id.as_ref(), geometry)?;
+        let shares_structures = self.structures_id == geometry.accel().structures_id();
         self.lanes.clear();
+        let mut tree = self.tree.clone();
+        if tree.shared().is_some() || shares_structures {
+            tree.set_instances(&self.context, geometry)?;
+            let resources = self.resources.with_accel(&self.bindings, &tree)?;
+            // This clone and the caster's own.
+            if tree.shared().is_none() || tree.set_pose(&self.context, world, 2)? {
+                (self.resources, self.tree, self.point_search) = (resources, tree, None);
+                self.structures_id = geometry.accel().structures_id();
+                return Ok(());
+            }
+        }
+        let mut next = Self::new(&self.context, geometry, self.traversal)?;
+        next.tree.hide_as(&self.context, &self.tree)?;
+        next.bindings = CastResources::bindings(&next.context, &next.tree)?;
+        next.resources = CastResources::new(&next.context, &next.bindings, &next.tree, 0)?;
+        *self = next.with_batches_of(self.rays_per_batch);
         Ok(())
     }
 
@@ -305,9 +322,10 @@ fn checked_mask(mask: u8) -> Result<u8, BadOptions> {
     Ok(mask)
 }
 
-/// Checks that a world differs in its instances at most. `structures_id`: that of the world before.
-fn check_structures(structures_id: Option<&StructuresId>, geometry: Geometry) -> Result<(), GpuError> {
-    let is_same = structures_id.is_some() && structures_id == geometry.accel().structures_id().as_ref();
+/// Checks that a world differs in its instances, and in the shapes of its geometries, at most. `geometries_id`: that of
+/// the world before.
+fn check_geometries(geometries_id: Option<&GeometriesId>, geometry: Geometry) -> Result<(), GpuError> {
+    let is_same = geometries_id.is_some() && geometries_id == geometry.accel().geometries_id();
     let wrong = || Mismatch::Scene("the world has other geometries than the caster's".to_owned());
     if is_same { Ok(()) } else { Err(wrong().into()) }
 }
@@ -387,7 +405,11 @@ impl<'a> CpuCaster<'a> {
     /// # Errors
     /// The world was not made of this caster's.
     pub fn set_world(&mut self, world: &World) -> Result<(), GpuError> {
-        check_structures(self.geometry().accel().structures_id().as_ref(), world.geometry())?;
+        let (before, geometry) = (self.geometry().accel(), world.geometry());
+        check_geometries(before.geometries_id(), geometry)?;
+        if before.structures_id() != geometry.accel().structures_id() {
+            self.links = TraversalLinks::of(geometry.accel(), geometry.triangles(), self.traversal);
+        }
         self.held = Held::Kept(world.clone());
         Ok(())
     }

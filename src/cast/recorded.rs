@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{GpuCaster, Hit, Ray, most_rays};
 use crate::{
     accel::Query,
-    buffers::{CastResources, ResumePass, SuspendedRays},
+    buffers::{CastResources, DeviceTrees, ResumePass, SuspendedRays},
     gpu::{BindingSet, Context, ExternalBuffer, ExternalCommands, GpuError},
     passes::{self, Masked},
 };
@@ -18,6 +18,8 @@ pub struct RecordedCast {
     set: BindingSet,
     suspended_rays: SuspendedRays,
     rays: Masked,
+    /// Keeps the caster from building trees of deformed meshes in place.
+    _trees: Option<Arc<DeviceTrees>>,
 }
 
 impl GpuCaster {
@@ -43,6 +45,7 @@ impl GpuCaster {
             context: Arc::clone(&self.context),
             kernel: self.prepare_kernel(query)?,
             set: CastResources::external(&self.bindings, &tree, rays, hits)?,
+            _trees: tree.shared(),
             suspended_rays: tree.suspended_rays,
             rays: self.masked(n_rays as u32),
         })

@@ -54,11 +54,12 @@ impl<'a> Caster<'a> {
         }))
     }
 
-    /// Casts rays into a world whose instances have changed ([`World::with_instances_changed`]). Only they are
-    /// uploaded.
+    /// Casts rays into a world whose instances have changed, or into another moment of the same film, as
+    /// [`GpuCaster::set_world`](cast::GpuCaster::set_world) does.
     ///
     /// # Errors
-    /// The world was not made of this caster's, or memory runs out. Then nothing has changed.
+    /// The world was not made of this caster's, or memory runs out. Then nothing has changed, unless several meshes are
+    /// deformed: some of them may have changed until a world is set again.
     pub fn set_world(&mut self, world: &World) -> Result<(), GpuError> {
         match &mut self.0 {
             Backend::Device(caster) => caster.set_world(world),

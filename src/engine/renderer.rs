@@ -65,12 +65,15 @@ impl Renderer {
     }
 
     /// Draws another world from now on. If the world was made of this renderer's by
-    /// [`World::with_instances_changed`], only the instances are uploaded, and emitters that have changed. The camera
-    /// of the next picture is the one that [`Renderer::draw`] is given.
+    /// [`World::with_instances_changed`], only the instances are uploaded, and emitters that have changed. If it is
+    /// another moment of the same film, and devices build the trees of kept meshes, deformed meshes are uploaded in
+    /// addition, and devices build their trees. The camera of the next picture is the one that [`Renderer::draw`] is
+    /// given.
     ///
     /// # Errors
-    /// The world exceeds the limits or the memory of all devices. Then nothing has changed. If it exceeds those of
-    /// some, these draw nothing more, and a warning says so.
+    /// The world exceeds the limits or the memory of all devices. Then nothing has changed, unless several meshes are
+    /// deformed: some of them may have changed until a world is set again. If the world exceeds the limits of some
+    /// devices, these draw nothing more, and a warning says so.
     pub fn set_world(&mut self, world: &World) -> Result<(), GpuError> {
         match &mut self.backend {
             Backend::Device(renderer) => renderer.set_world(world),

@@ -250,6 +250,7 @@ impl<'a> KernelInputs<'a> {
             Accel::LazyTree(tree) => Self::of_tree(triangles, tree.get(triangles)),
             Accel::Grid(grid) => Self::of_grid(triangles, grid.get(triangles)),
             Accel::TwoLevel(two) => {
+                two.build_on_host(triangles);
                 let [box_min, box_max] = two.bounds();
                 let origin_reach = two.origin_reach();
                 let constants = AccelConstants { box_min, box_max, origin_reach, ..AccelConstants::default() };

@@ -11,7 +11,7 @@ use crate::{
     layout::{Frame, constants},
     passes::FramePasses,
     scene::Camera,
-    world::World,
+    world::{Emitters, World},
 };
 
 impl GpuRenderer {
@@ -72,35 +72,60 @@ impl GpuRenderer {
 
     /// Draws another world from now on. The next sample is the first of a new picture. If the world was made of this
     /// renderer's by [`World::with_instances_changed`], only the instances are uploaded, and emitters that have
-    /// changed. The picture that is displayed stays so until another one is drawn.
+    /// changed. If it is another moment of the same film, and the device builds the trees of kept meshes, only these
+    /// and deformed meshes are uploaded, and only the trees of those meshes are built. The picture that is displayed
+    /// stays so until another one is drawn.
     ///
     /// # Errors
-    /// The world exceeds the device's limits or memory, or the driver refuses a kernel. Then nothing has changed.
+    /// The world exceeds the device's limits or memory, or the driver refuses a kernel. Then nothing has changed,
+    /// unless several meshes are deformed: some of them may have changed until a world is set again.
     pub fn set_world(&mut self, world: &World) -> Result<(), GpuError> {
-        if !world.shares_geometries(&self.world) {
-            let scene = (self.context.clone(), world);
-            let mut next = Self::with_capacity(scene, &self.options, self.budget.fixed_capacity, None)?;
-            if let Some(resources) = next.resources.with_pixels_of(&self.resources, &self.in_use)? {
-                (next.resources, next.displayed) = (resources, self.displayed);
-            }
-            self.become_other(next);
+        if world.is_pose_of(&self.world) && self.set_pose(world)? {
             return Ok(());
         }
+        let scene = (self.context.clone(), world);
+        let mut next = Self::with_capacity(scene, &self.options, self.budget.fixed_capacity, None)?;
+        if let Some(resources) = next.resources.with_pixels_of(&self.resources, &self.in_use)? {
+            (next.resources, next.displayed) = (resources, self.displayed);
+        }
+        self.become_other(next);
+        Ok(())
+    }
+
+    /// Uploads what differs in another pose of the world, and builds the trees of deformed meshes. Returns whether that
+    /// was possible.
+    fn set_pose(&mut self, world: &World) -> Result<bool, GpuError> {
+        let lights = [world, &self.world].map(|world| &world.scene().lights);
+        let has_device_trees = self.resources.accel.shared().is_some();
+        if lights[0].len() != lights[1].len() || !(has_device_trees || world.shares_geometries(&self.world)) {
+            return Ok(false);
+        }
         let of_paths = self.in_use.integrator == Integrator::Path;
-        let emitters_differ = of_paths && !ptr::eq(world.emitters(), self.world.emitters());
-        let mut resources = self.resources.with_instances(&self.context, world, emitters_differ)?;
+        let emitters = || [world, &self.world].map(World::emitters);
+        let are_same = |[now, before]: [&Emitters; 2]| ptr::eq(now, before) || now == before;
+        let differs = [lights[0] != lights[1], of_paths && !are_same(emitters())];
+        let mut resources = self.resources.with_instances(&self.context, world, differs)?;
         let mut constants = *resources.constants();
         constants.set_light_of(&world.frame_constants(&self.in_use));
         resources.set_constants(&constants);
         // Kernels are made for kinds of emitters.
         let kinds = if of_paths { world.emitters().kinds() } else { 0 };
-        if of_paths && kinds != self.world.emitters().kinds() {
+        let passes = if of_paths && kinds != self.world.emitters().kinds() {
             resources.bindings = resources.bindings.with_constant(constants::EMITTERS, kinds);
-            self.passes = FramePasses::new(&self.context, &resources.bindings, &self.in_use)?;
+            Some(FramePasses::new(&self.context, &resources.bindings, &self.in_use)?)
+        } else {
+            None
+        };
+        // The successor, and the present resources, which are released.
+        if has_device_trees && !resources.accel.set_pose(&self.context, world, 2)? {
+            return Ok(false);
         }
         self.reset_samples();
         (self.resources, self.world) = (resources, world.clone());
-        Ok(())
+        if let Some(passes) = passes {
+            self.passes = passes;
+        }
+        Ok(true)
     }
 
     /// Creates the buffers and kernels that the changed options need, and then installs them by steps that cannot

@@ -20,7 +20,6 @@ mod mips;
 mod mismatch;
 mod moved;
 mod path_materials;
-#[cfg(feature = "files")]
 mod posed;
 mod rebuilt;
 mod scene_hash;
@@ -206,7 +205,7 @@ impl World {
             (Accel::KdTree(tree), AccelOptions::KdTree(options)) => {
                 Statistics::KdTree(tree.statistics(scene.triangles.len(), options))
             }
-            (Accel::TwoLevel(two), options) => two.statistics(options),
+            (Accel::TwoLevel(two), options) => two.statistics(options, &scene.triangles),
             (Accel::LazyTree(tree), _) => tree.statistics(&scene.triangles),
             (Accel::Grid(grid), _) => grid.statistics(&scene.triangles),
             (Accel::KdTree(_), AccelOptions::LazyTree(_) | AccelOptions::Grid(_)) => {
@@ -215,8 +214,8 @@ impl World {
         }
     }
 
-    /// The report of the first device that has built the world's structure, if there is one. The host builds the
-    /// structures of instances.
+    /// The report of the first device that has built the world's structure, if there is one; of instances, the sum over
+    /// the kd-trees that it has built for this world. Those that it had before do not count.
     pub fn device_build(&self) -> Option<&DeviceBuild> {
         self.0.accel.device_build()
     }

@@ -21,7 +21,8 @@ impl World {
     ///
     /// # Errors
     /// The scene's parts do not fit together, or a vertex is too far from the origin.
-    pub(crate) fn posed(&self, scene: &Scene, deformed: &[usize]) -> Result<Option<Self>, Mismatch> {
+    #[doc(hidden)]
+    pub fn posed(&self, scene: &Scene, deformed: &[usize]) -> Result<Option<Self>, Mismatch> {
         let Accel::TwoLevel(two) = self.accel() else { return Ok(None) };
         let Some((flat, changed)) = self.scene().posed(scene, deformed)? else { return Ok(None) };
         check(&flat)?;
@@ -29,6 +30,15 @@ impl World {
         let two = two.deformed(&changed, (&flat.triangles, &instances.ranges), &instances.list, self.accel_options());
         let accel = Accel::TwoLevel(Box::new(two));
         Ok(Some(Self::of_parts(flat, accel, self.accel_options().clone())))
+    }
+}
+
+impl World {
+    /// Whether both worlds have the same geometries, but for vertices, normals and tangents: one was made of the other
+    /// by [`World::posed`] or [`World::with_instances_changed`].
+    pub(crate) fn is_pose_of(&self, other: &Self) -> bool {
+        let own = self.accel().geometries_id();
+        self.shares_geometries(other) || own.is_some() && own == other.accel().geometries_id()
     }
 }
 

@@ -7,6 +7,7 @@ mod all_hits;
 mod casts;
 mod closest_points;
 mod costs;
+mod deformed;
 mod grids;
 mod margins;
 mod masks;

@@ -27,6 +27,7 @@ impl TraversalLinks {
             Accel::Grid(_) => Self::default(),
             Accel::TwoLevel(two) => {
                 let mut all = Self::default();
+                two.build_on_host(triangles);
                 for tree in two.trees() {
                     let Self { boxes, ropes } = Self::new(tree, traversal);
                     all.boxes.extend(boxes);

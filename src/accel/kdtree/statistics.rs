@@ -1,5 +1,7 @@
 //! Sizes and cost of kd-trees.
 
+use std::ops::Add;
+
 use serde::Serialize;
 
 use super::{BuildOptions, KdTree, Node};
@@ -77,6 +79,24 @@ impl KdTree {
 }
 
 impl Statistics {
+    /// Adds the figures of another tree, but for `references_per_triangle`. A figure that one of them lacks is lost.
+    pub(in crate::accel) fn add(&mut self, other: &Self) {
+        fn sum<T: Add<Output = T>>(a: Option<T>, b: Option<T>) -> Option<T> {
+            a.zip(b).map(|(a, b)| a + b)
+        }
+        *self = Self {
+            n_nodes: self.n_nodes + other.n_nodes,
+            n_leaves: self.n_leaves + other.n_leaves,
+            n_empty_leaves: sum(self.n_empty_leaves, other.n_empty_leaves),
+            n_slabs: sum(self.n_slabs, other.n_slabs),
+            depth: self.depth.max(other.depth),
+            n_references: self.n_references + other.n_references,
+            references_per_triangle: self.references_per_triangle,
+            sah_cost: sum(self.sah_cost, other.sah_cost),
+            bytes: self.bytes + other.bytes,
+        };
+    }
+
     /// Returns what is known of a tree by its numbers of nodes, with the unused node 1, and of references.
     /// `has_slabs`: whether there is room for slabs.
     pub(crate) fn of_device(
