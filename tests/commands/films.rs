@@ -53,6 +53,72 @@ fn frames_of_an_animation_are_pictures_at_their_times() {
     }
 }
 
+/// Returns [`moving`] with a sheet of 3200 triangles, which becomes a wave, in place of the square that grows.
+fn with_wave() -> Value {
+    const N: u32 = 40;
+    let at = |ix: u32| [(ix % (N + 1)) as f32 / N as f32, (ix / (N + 1)) as f32 / N as f32];
+    let corners: Vec<[f32; 3]> = (0..(N + 1) * (N + 1)).map(|ix| [at(ix)[0], at(ix)[1], 0.0]).collect();
+    let raised = |[x, y, _]: &[f32; 3]| [0.3 * (9.0 * y).sin(), 0.0, 0.4 * (11.0 * x + 3.0 * y).sin()];
+    let added: Vec<[f32; 3]> = corners.iter().map(raised).collect();
+    let quad = |ix: u32| {
+        let a = ix / N * (N + 1) + ix % N;
+        [a, a + 1, a + N + 2, a, a + N + 2, a + N + 1]
+    };
+    let indices: Vec<u32> = (0..N * N).flat_map(quad).collect();
+    let parts = [bytemuck::cast_slice(&corners), bytemuck::cast_slice(&added), bytemuck::cast_slice::<_, u8>(&indices)];
+    let mut file = moving(true);
+    let push = |file: &mut Value, list: &str, item: Value| {
+        let list = file[list].as_array_mut().unwrap();
+        list.push(item);
+        list.len() - 1
+    };
+    let data = parts.concat();
+    let uri = format!("data:application/octet-stream;base64,{}", STANDARD.encode(&data));
+    let buffer = push(&mut file, "buffers", json!({ "byteLength": data.len(), "uri": uri }));
+    let mut begin = 0;
+    let accessors = parts.map(|part| {
+        let view = json!({ "buffer": buffer, "byteOffset": begin, "byteLength": part.len() });
+        begin += part.len();
+        let view = push(&mut file, "bufferViews", view);
+        let (kind, component, n) = match part.len() == 4 * indices.len() {
+            true => ("SCALAR", 5125, indices.len()),
+            false => ("VEC3", 5126, corners.len()),
+        };
+        push(
+            &mut file,
+            "accessors",
+            json!({ "bufferView": view, "componentType": component, "count": n, "type": kind }),
+        )
+    });
+    let [positions, target, indices] = accessors;
+    file["meshes"][1]["primitives"] = json!([
+        { "attributes": { "POSITION": positions }, "indices": indices, "targets": [{ "POSITION": target }] }
+    ]);
+    file
+}
+
+/// The device builds the tree of the wave in each frame, and the one of the square is the host's.
+#[test]
+fn films_are_the_same_by_the_devices_trees_of_deformed_meshes() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    fs::write(path.join("wave.gltf"), with_wave().to_string()).unwrap();
+    let render = |build: &str| {
+        let file = format!("{build}#.png");
+        let more = ["--validate", "--instances", "keep", "--build", build, "--frames", "0-3", "--fps", "2"];
+        let files = ["--profile", "p.json", "-o", &file];
+        succeed(path, &[&["render", "wave.gltf"], &SMALL[..], &more, &files].concat());
+        let frames = [0, 1, 2, 3].map(|frame| pixels(&path.join(format!("{build}{frame}.png"))));
+        let profile: Value = serde_json::from_slice(&fs::read(path.join("p.json")).unwrap()).unwrap();
+        (frames, profile)
+    };
+    let ((expected, of_host), (found, of_device)) = (render("best"), render("gpu"));
+    assert!(found == expected);
+    assert!(found.windows(2).all(|pair| pair[0] != pair[1]), "something moves in each frame");
+    assert!(of_host["device_build"].is_null() && of_device["device_build"]["stages"].is_array(), "{of_device}");
+    assert_eq!(of_device["last_moment"]["n_deformed"], json!(1));
+}
+
 #[test]
 fn what_does_not_move_is_no_film() {
     let directory = with_model(false);
