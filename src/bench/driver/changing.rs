@@ -23,9 +23,20 @@ pub struct ChangingFrames {
     pub build_ms: f64,
     /// Time of the build and of each number of [`MRAYS`], milliseconds.
     pub ms: [f64; 4],
-    /// The number of rays a frame, millions, from which this structure is ahead of the driver's that is built anew;
-    /// none if that is never so.
-    pub ahead_from_mrays: Option<f64>,
+    /// When this structure takes less time than the driver's that is built anew; none for that one.
+    pub ahead: Option<Ahead>,
+}
+
+/// When a structure takes less time than another one, by the number of rays a frame, millions.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Ahead {
+    Always,
+    Never,
+    /// It is built later, but its rays are faster.
+    From(f64),
+    /// It is built earlier, but its rays are slower.
+    UpTo(f64),
 }
 
 /// A structure: the time of its build, and the time of a million rays, milliseconds.
@@ -42,13 +53,14 @@ impl Costs {
         Some(Self { by: by.into(), build_ms: build_ms?, ms_per_mray: 1e3 / rate })
     }
 
-    /// Returns the number of rays, millions, from which this structure is ahead of another one.
-    fn ahead_from(&self, other: &Self) -> Option<f64> {
+    fn ahead_of(&self, other: &Self) -> Ahead {
         let (later, gain) = (self.build_ms - other.build_ms, other.ms_per_mray - self.ms_per_mray);
-        if later < 0.0 && gain >= 0.0 {
-            return Some(0.0);
+        match (later < 0.0, gain >= 0.0) {
+            (true, true) => Ahead::Always,
+            (true, false) => Ahead::UpTo(later / gain),
+            (false, true) if gain > 0.0 => Ahead::From(later / gain),
+            (false, _) => Ahead::Never,
         }
-        (gain > 0.0).then(|| later / gain)
     }
 }
 
@@ -63,7 +75,7 @@ fn frames_of(builds: &Builds, set: &SetResult) -> Vec<ChangingFrames> {
     };
     let refitted = Costs::new("driver, refitted", builds.refit_ms.map(|ms| ms.median), &set.driver);
     let of_kdray = builds.on_device.iter().filter_map(|built| {
-        let search = if built.accel == AccelKind::KdTree.name() { GPU_TREE } else { &built.accel };
+        let search = if built.accel == AccelKind::KdTree.to_string() { GPU_TREE } else { &built.accel };
         let result = set.kdray.iter().find(|result| result.traversal == search)?;
         Costs::new(&built.accel, built.ms.map(|ms| ms.median), &result.timing)
     });
@@ -72,7 +84,7 @@ fn frames_of(builds: &Builds, set: &SetResult) -> Vec<ChangingFrames> {
         by: costs.by.clone(),
         build_ms: costs.build_ms,
         ms: MRAYS.map(|mrays| costs.build_ms + costs.ms_per_mray * f64::from(mrays)),
-        ahead_from_mrays: costs.ahead_from(&rebuilt).filter(|_| costs.by != rebuilt.by),
+        ahead: (costs.by != rebuilt.by).then(|| costs.ahead_of(&rebuilt)),
     };
     let others: Vec<_> = refitted.into_iter().chain(of_kdray).collect();
     std::iter::once(&rebuilt).chain(&others).map(frames).collect()
@@ -89,10 +101,10 @@ mod tests {
     #[test]
     fn a_slower_build_pays_off_after_some_rays() {
         let driver = costs(2.0, 1.0);
-        assert_eq!(costs(12.0, 0.5).ahead_from(&driver), Some(20.0));
-        assert_eq!(costs(1.0, 0.5).ahead_from(&driver), Some(0.0));
-        assert_eq!(costs(1.0, 1.0).ahead_from(&driver), Some(0.0));
-        assert_eq!(costs(3.0, 1.0).ahead_from(&driver), None);
-        assert_eq!(costs(3.0, 2.0).ahead_from(&driver), None);
+        assert_eq!(costs(12.0, 0.5).ahead_of(&driver), Ahead::From(20.0));
+        assert_eq!(costs(1.0, 1.5).ahead_of(&driver), Ahead::UpTo(2.0));
+        assert_eq!(costs(1.0, 1.0).ahead_of(&driver), Ahead::Always);
+        assert_eq!(costs(3.0, 1.0).ahead_of(&driver), Ahead::Never);
+        assert_eq!(costs(3.0, 2.0).ahead_of(&driver), Ahead::Never);
     }
 }

@@ -7,7 +7,7 @@ use kdray::{
         driver::{
             DeviceStage,
             builds::Builds,
-            changing::{ChangingFrames, MRAYS, changing_frames},
+            changing::{Ahead, ChangingFrames, MRAYS, changing_frames},
             report::{RasterResult, Report, SetResult, Timing},
         },
         rays::{RayKind, ray_sets},
@@ -120,15 +120,21 @@ fn changing_text(frames: &[ChangingFrames]) -> String {
     }
     let row = |frame: &ChangingFrames| {
         let [a, b, c, d] = frame.ms.map(|ms| format!("{ms:.2}"));
-        let ahead = decimal(frame.ahead_from_mrays, 1);
+        let ahead = match frame.ahead {
+            None => "-".to_owned(),
+            Some(Ahead::Always) => "always".to_owned(),
+            Some(Ahead::Never) => "never".to_owned(),
+            Some(Ahead::From(mrays)) => format!("from {mrays:.1} M"),
+            Some(Ahead::UpTo(mrays)) => format!("to {mrays:.1} M"),
+        };
         [frame.rays.name().to_owned(), frame.by.clone(), format!("{:.2}", frame.build_ms), a, b, c, d, ahead]
     };
     let [a, b, c, d] = MRAYS.map(|mrays| format!("{mrays} M"));
     let rows: Vec<_> = frames.iter().map(row).collect();
-    "\nA frame in which all triangles have moved, ms: the build of a structure, and so many rays. Ahead from: million\n\
-     rays a frame from which it takes less time than the driver's structure, built anew.\n\n"
+    "\nA frame in which all triangles have moved, ms: the build of a structure, and so many rays. Ahead: for which\n\
+     numbers of rays it takes less time than the driver's structure, built anew.\n\n"
         .to_owned()
-        + &table(["rays", "by", "build", &a, &b, &c, &d, "ahead from"], &rows)
+        + &table(["rays", "by", "build", &a, &b, &c, &d, "ahead"], &rows)
 }
 
 fn cells(set: &SetResult, by: &str, timing: &Timing, ratio: Option<f64>, n_differing: Option<u64>) -> [String; 8] {
@@ -249,13 +255,16 @@ mod tests {
         assert!(rows.contains(&vec!["primary", "4", "4", "driver", "8.000", "0.0", "1.00", "-"]), "{text}");
         assert!(rows.contains(&vec!["primary", "4", "4", "raster", "2.000", "0.0", "4.00", "-"]), "{text}");
         assert!(rows.contains(&vec!["diffuse", "4", "4", "mask", "4.000", "0.0", "2.00", "0"]), "{text}");
-        assert_eq!(rows.iter().filter(|row| row.get(1) == Some(&"4")).count(), 4 * 3 + 2, "{text}");
+        assert_eq!(rows.iter().filter(|row| row.get(1) == Some(&"4")).count(), 4 * 4 + 2, "{text}");
         assert!(
             text.contains(
                 "in 1.500 ms of the GPU (median of 5), the kd-tree in 1234 ms of 2 CPU threads, `grid` in 0.500 ms"
             ),
             "{text}"
         );
+        // The grid is built in 0.5 ms for the driver's 1.5, and takes 0.5 s a million rays for the driver's 2.
+        let grid = ["diffuse", "grid", "0.50", "500000.50", "2500000.50", "10000000.50", "25000000.50", "always"];
+        assert!(rows.contains(&grid.to_vec()), "{text}");
         assert!(text.contains("`raster`: visibility 0.500 ms, primary_hit 1.500 ms."), "{text}");
     }
 
@@ -273,8 +282,8 @@ mod tests {
         assert_eq!((&json["raster"][0]["ratio"], &json["builds"]["bvh_ms"]["median"]), (&4.0.into(), &1.5.into()));
         let chart = report.chart();
         let names: Vec<_> = chart.series.iter().map(|series| series.name.as_str()).collect();
-        assert_eq!(names, ["driver", "kdray, mask", "kdray, stack", "kdray, raster", "kdray, compute"]);
-        assert_eq!(chart.series[3].values, [Some(0.002), None, None, None]);
+        assert_eq!(names, ["driver", "kdray, mask", "kdray, stack", "kdray, grid", "kdray, raster", "kdray, compute"]);
+        assert_eq!(chart.series[4].values, [Some(0.002), None, None, None]);
         assert!(chart.svg().contains("d &lt; e"));
     }
 
