@@ -21,7 +21,7 @@ use super::{
     first_view,
 };
 use crate::{
-    accel::{Accel, AccelKind},
+    accel::{Accel, bottom_level::BottomLevel},
     cpu::metered_exposure,
     frame::RenderOptions,
     gpu::GpuError,
@@ -263,8 +263,12 @@ impl Builder {
         let world = World::with_accel_observed(flat, &accel.options(self.processor), &self.progress)?;
         let build_ms = begin.elapsed().as_secs_f64() * 1e3;
         // A structure that devices build is not built here, too, for some warnings.
-        let is_built = matches!(world.accel(), Accel::KdTree(_)) || world.scene().instances.is_some();
-        if let (Work::Pictures { .. }, AccelKind::KdTree, true) = (work, world.accel().kind(), is_built) {
+        let is_built = match world.accel() {
+            Accel::KdTree(_) => true,
+            Accel::TwoLevel(two) => two.structures().iter().all(|it| matches!(**it, BottomLevel::KdTree(_))),
+            Accel::LazyTree(_) | Accel::Grid(_) => false,
+        };
+        if let (Work::Pictures { .. }, true) = (work, is_built) {
             first_view::warn(&world, &options);
         }
         if is_metered {

@@ -55,7 +55,7 @@ impl LoadedScene {
             && settings.request.scene.animation != AnimationChoice::None;
         let first = is_animated.then(|| opened.scene.clone());
         let request = settings.builder.request;
-        let request = if is_animated { request.for_motion() } else { request };
+        let request = if is_animated { request.for_motion(settings.builder.processor) } else { request };
         let built = Builder { request, ..settings.builder.clone() }.build(opened, &settings.request.work)?;
         let (path, statistics) = (path.map(Path::to_owned), built.world.statistics());
         // When the file is read again, nobody waits for it, and the window keeps its exposure.

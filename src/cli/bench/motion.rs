@@ -39,7 +39,8 @@ pub fn run(args: &MotionArgs) -> Result<(), CliError> {
     let options = ContextOptions::new(args.device.clone(), false);
     let device = if args.cpu { None } else { Some(open_device(&options, &progress)?) };
     let engine = device.clone().map_or_else(Engine::on_cpu, Engine::on_device);
-    let engine = engine.with_request(args.picture.request().for_motion());
+    let request_of_motion = args.picture.request().for_motion(engine.processor());
+    let engine = engine.with_request(request_of_motion);
     let (n_triangles, scene) = (opened.scene.n_triangles(), opened.scene.clone());
     let building = format!("building the structure of {n_triangles} triangles");
     let (built, _) = progress.stage(&building, || engine.build(opened, &request.work));

@@ -245,9 +245,13 @@ impl<'a> Session<'a> {
             n_at_once: if draws_whole_frames(engine, views) { engine.devices().count() as u32 } else { 1 },
         };
         let asked = args.picture.request();
-        let request = if is_animated && args.moves() { asked.for_motion() } else { asked };
-        if request != asked {
+        let moves = is_animated && args.moves();
+        let request = if moves { asked.for_motion(engine.processor()) } else { asked };
+        if request.instances != asked.instances {
             progress.note("meshes are kept apart, since some move; --instances flatten stores them as one");
+        }
+        if request.build != asked.build {
+            progress.note("the GPU builds the kd-trees, since meshes may change; with --build best, the CPU does");
         }
         let engine = engine.clone().with_request(request);
         let building = engine.builder().describe(&opened.scene);

@@ -158,11 +158,18 @@ impl Workload {
 }
 
 impl Request {
-    /// Returns the request for a scene in which instances move: what moves is stored apart from what does not, unless
-    /// the user has chosen otherwise.
-    pub fn for_motion(self) -> Self {
-        let is_open = self.instances == Instancing::Auto;
-        Self { instances: if is_open { Instancing::Keep } else { self.instances }, ..self }
+    /// Returns the request for a scene in which instances move or meshes change: what moves is stored apart from what
+    /// does not, and a GPU builds its trees, unless the user has chosen otherwise.
+    pub fn for_motion(self, processor: Processor) -> Self {
+        let instances = match self.instances {
+            Instancing::Auto => Instancing::Keep,
+            chosen => chosen,
+        };
+        let build = match (self.build, processor) {
+            (BuildPolicy::Auto, Processor::Gpu) => BuildPolicy::Gpu,
+            (chosen, _) => chosen,
+        };
+        Self { instances, build, ..self }
     }
 
     /// Returns the requested kind of acceleration structure for `n_triangles` triangles. For a kd-tree, it is the
@@ -240,6 +247,16 @@ mod tests {
         }
         let candidates = [whole, crop].map(|workload| Candidates::of_traversals(100_000, workload.n_rays));
         assert_eq!(candidates[0], candidates[1]);
+    }
+
+    #[test]
+    fn only_gpus_build_the_trees_of_what_moves() {
+        let build = |request: Request, processor| request.for_motion(processor).build;
+        assert_eq!(build(Request::default(), Processor::Gpu), BuildPolicy::Gpu);
+        assert_eq!(build(Request::default(), Processor::SoftwareDriver), BuildPolicy::Auto);
+        assert_eq!(build(Request::default(), Processor::Cpu), BuildPolicy::Auto);
+        let best = Request { build: BuildPolicy::Best, ..Request::default() };
+        assert_eq!(build(best, Processor::Gpu), BuildPolicy::Best);
     }
 
     #[test]
