@@ -7,8 +7,13 @@ use std::{ops::RangeInclusive, sync::Arc};
 use fearless_simd::Level;
 use glam::{Vec3, vec3};
 use kdray::{
-    accel::{Accel, AccelOptions, Query, grid::GridOptions, kdtree::Traversal, wide_bvh::WideBvh},
-    cast::{GpuCaster, Hit, NO_TRIANGLE, Ray, cast_on_cpu},
+    accel::{
+        Accel, AccelOptions, Query,
+        grid::GridOptions,
+        kdtree::{BuildOptions, Traversal},
+        wide_bvh::WideBvh,
+    },
+    cast::{GpuCaster, Hit, NO_TRIANGLE, QueryPoint, Ray, cast_on_cpu},
     cpu::wide_traverser::WideTraverser,
     gpu::{Context, DeviceOverrides},
     layout::{KD_MAX_DEPTH, KD_WORD_DEPTH, PathRay},
@@ -146,6 +151,37 @@ fn finds_what_brute_force_finds() {
     let device = Device::new();
     for world in worlds() {
         check(&device, &world, &some_rays(&world, 20_000, -20.0..=20.0));
+    }
+}
+
+/// Every query through trees that the device builds finds what it finds through the host's trees.
+#[test]
+fn a_device_s_tree_has_the_same_hits() {
+    let device = Device::new();
+    for world in worlds() {
+        let lazy = Accel::new(&world.triangles, &AccelOptions::LazyTree(BuildOptions::default()));
+        let geometry = Geometry::new(&world.triangles, &lazy).expect("a tree of these triangles");
+        let flat = Geometry::new(&world.triangles, &world.accel).expect("a tree of these triangles");
+        let of = |geometry| GpuCaster::new(&device.0, geometry, Traversal::Mask).expect("a caster");
+        let (mut expected, mut found) = (of(flat), of(geometry));
+        assert!(matches!(&lazy, Accel::LazyTree(tree) if tree.device_build().is_some()));
+        let rays = some_rays(&world, 4000, -20.0..=20.0);
+        for query in [Query::Closest, Query::Any] {
+            let [expected, found] =
+                [&mut expected, &mut found].map(|it| it.cast(&rays, query, 1).expect("a cast").hits);
+            match query {
+                Query::Closest => compare::exact(&expected, &found).unwrap(),
+                Query::Any => assert_eq!(occluded(&expected), occluded(&found)),
+            }
+        }
+        let [counts, of_lazy] = [&mut expected, &mut found].map(|it| it.count_hits(&rays).expect("counts"));
+        assert_eq!(counts, of_lazy);
+        let [lists, of_lazy] = [&mut expected, &mut found].map(|it| it.all_hits(&rays, None).expect("hits"));
+        assert_eq!(lists, of_lazy);
+        let points: Vec<_> = rays.iter().map(|ray| QueryPoint { position: ray.origin, t_max: f32::INFINITY }).collect();
+        let [nearest, of_lazy] =
+            [&mut expected, &mut found].map(|it| it.closest_points(&points, 1).expect("points").hits);
+        compare::exact(&nearest, &of_lazy).unwrap();
     }
 }
 

@@ -252,7 +252,7 @@ impl Builder {
         }
         let keeps_instances = self.request.instances.keeps(&scene);
         let workload = work.workload(&scene, &options);
-        let accel = self.request.choose_accel(self.processor, scene.n_triangles(), &workload);
+        let accel = self.request.choose_accel(self.processor, scene.n_triangles(), (&workload, keeps_instances));
         self.require_for_build(accel, &scene)?;
         let flat = if keeps_instances { FlatScene::with_instances(&scene)? } else { FlatScene::new(&scene)? };
         notes.extend(note_of_instances(&flat, self.request.instances));

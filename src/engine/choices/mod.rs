@@ -155,6 +155,10 @@ impl Workload {
     pub fn of_rays(n_rays: u64) -> Self {
         Self { n_rays, ..Self::of_window((0, 0)) }
     }
+
+    fn is_of_rays(&self) -> bool {
+        self.size == (0, 0)
+    }
 }
 
 impl Request {
@@ -173,9 +177,20 @@ impl Request {
     }
 
     /// Returns the requested kind of acceleration structure for `n_triangles` triangles. For a kd-tree, it is the
-    /// user's tree, or else the rule's.
-    pub fn choose_accel(&self, processor: Processor, n_triangles: usize, workload: &Workload) -> ChosenAccel {
-        let by_rule = || TreeKind::by_rule(processor, n_triangles, workload.n_rays);
+    /// user's tree, or else the rule's. `keeps_instances`: whether meshes are stored once.
+    pub fn choose_accel(
+        &self,
+        processor: Processor,
+        n_triangles: usize,
+        (workload, keeps_instances): (&Workload, bool),
+    ) -> ChosenAccel {
+        // Pictures have warnings about the first view, and a metered exposure, which need a tree of the host's. Many
+        // meshes are built at once by the host, one by one by a device.
+        let is_open_to_gpu = processor == Processor::Gpu && workload.is_of_rays() && !keeps_instances;
+        let by_rule = || match TreeKind::by_rule(processor, n_triangles, workload.n_rays) {
+            TreeKind::Fast if is_open_to_gpu => TreeKind::Gpu,
+            kind => kind,
+        };
         match self.accel {
             AccelKind::KdTree => ChosenAccel::KdTree(Chosen::pinned_or(self.build.pinned(), by_rule)),
             AccelKind::Grid => ChosenAccel::Grid,
@@ -242,7 +257,7 @@ mod tests {
         assert_eq!(whole.n_rays, 640 * 480 * 2 * 4 * 2);
         let request = Request::default();
         for processor in [Processor::Cpu, Processor::SoftwareDriver, Processor::Gpu] {
-            let choose = |workload| request.choose_accel(processor, 100_000, workload);
+            let choose = |workload| request.choose_accel(processor, 100_000, (workload, false));
             assert_eq!(choose(&whole), choose(&crop));
         }
         let candidates = [whole, crop].map(|workload| Candidates::of_traversals(100_000, workload.n_rays));
@@ -260,6 +275,21 @@ mod tests {
     }
 
     #[test]
+    fn only_gpus_build_the_trees_of_few_rays_into_one_mesh() {
+        let kind = |processor, workload: Workload, keeps| {
+            let accel = Request::default().choose_accel(processor, 1000, (&workload, keeps));
+            accel.tree_kind().map(|chosen| chosen.value)
+        };
+        let (few, many) = (Workload::of_rays(1000), Workload::of_rays(10_000_000));
+        assert_eq!(kind(Processor::Gpu, few, false), Some(TreeKind::Gpu));
+        assert_eq!(kind(Processor::Gpu, many, false), Some(TreeKind::Best));
+        assert_eq!(kind(Processor::Gpu, few, true), Some(TreeKind::Fast));
+        assert_eq!(kind(Processor::SoftwareDriver, few, false), Some(TreeKind::Fast));
+        let picture = Workload::of_pictures(&RenderOptions { width: 8, height: 8, ..Default::default() }, 1, 1);
+        assert_eq!(kind(Processor::Gpu, picture, false), Some(TreeKind::Fast));
+    }
+
+    #[test]
     fn what_is_pinned_is_taken() {
         let request = Request {
             build: BuildPolicy::Best,
@@ -267,7 +297,7 @@ mod tests {
             primary: Some(Primary::Trace),
             ..Request::default()
         };
-        let accel = request.choose_accel(Processor::Gpu, usize::MAX, &Workload::of_rays(0));
+        let accel = request.choose_accel(Processor::Gpu, usize::MAX, (&Workload::of_rays(0), false));
         assert_eq!(accel, ChosenAccel::KdTree(Chosen { value: TreeKind::Best, by: Reason::Pinned }));
         let Methods { traversal, primary, traversal_ns, .. } = request.methods_by_rule(None, 10, (10, 10));
         assert_eq!(
