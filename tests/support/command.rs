@@ -28,7 +28,8 @@ pub fn kdray(directory: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_kdray"));
     // Tests do not depend on what a user has measured.
     command.current_dir(directory).args(arguments).env("KDRAY_CACHE", "").stdin(Stdio::null());
-    let has_instances = matches!(arguments.first(), Some(&("render" | "cast"))) && !arguments.contains(&"--instances");
+    let has_instances =
+        matches!(arguments.first(), Some(&("render" | "cast" | "view"))) && !arguments.contains(&"--instances");
     if has_instances && kept::is_asked_for() {
         command.args(["--instances", "keep"]);
     }
