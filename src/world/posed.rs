@@ -73,7 +73,10 @@ impl FlatScene {
             posed.triangles[rows.clone()].copy_from_slice(&parts.triangles);
             if !self.textures.corners.is_empty() {
                 let corners = corner_surfaces(&[(mesh, &kept.transform)]);
-                posed.textures.corners[rows].copy_from_slice(&corners);
+                // A change makes a copy of all that textures need.
+                if self.textures.corners[rows.clone()] != corners {
+                    posed.textures.corners[rows].copy_from_slice(&corners);
+                }
             }
             changed.push(geometry_ix);
         }
