@@ -82,12 +82,7 @@ impl DeviceBuild {
     pub(crate) fn sum(builds: Vec<Self>) -> Option<Self> {
         builds.into_iter().reduce(|mut sum, build| {
             sum.ms = sum.ms.zip(build.ms).map(|(sum, ms)| sum + ms);
-            for stage in build.stages {
-                match sum.stages.iter_mut().find(|known| known.name == stage.name) {
-                    Some(known) => known.ms = known.ms.zip(stage.ms).map(|(sum, ms)| sum + ms),
-                    None => sum.stages.push(stage),
-                }
-            }
+            build.stages.into_iter().for_each(|stage| stage.add_to(&mut sum.stages));
             if let (Statistics::KdTree(sum), Statistics::KdTree(own)) = (&mut sum.statistics, &build.statistics) {
                 sum.add(own);
             }
@@ -103,6 +98,16 @@ pub struct BuildStage {
     pub name: &'static str,
     /// The duration of the stage, milliseconds; none if the device has no timestamps.
     pub ms: Option<f64>,
+}
+
+impl BuildStage {
+    /// Adds the duration to that of the stage of this name, or the stage to the others if there is none.
+    pub(crate) fn add_to(self, stages: &mut Vec<Self>) {
+        match stages.iter_mut().find(|stage| stage.name == self.name) {
+            Some(stage) => stage.ms = stage.ms.zip(self.ms).map(|(sum, ms)| sum + ms),
+            None => stages.push(self),
+        }
+    }
 }
 
 impl<S: Structure> Lazy<S> {

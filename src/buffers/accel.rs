@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::{
     SuspendedRays,
-    device_trees::{Arrays, DeviceTrees, Geometries},
+    device_trees::{Arrays, DeviceTrees, Geometries, builder_options, with_room_for},
     scene_arrays::{Content, Contents, SceneAccess, SceneArrays},
     surface_kinds::SurfaceKinds,
     texture_words::TextureWords,
@@ -17,7 +17,7 @@ use crate::{
     accel::{
         Accel, AccelKind,
         grid::{Grid, LazyGrid},
-        kdtree::{BuildOptions, KdTree, LazyTree, Traversal, TraversalLinks},
+        kdtree::{KdTree, LazyTree, Traversal, TraversalLinks},
         two_level::TwoLevel,
     },
     gpu::{Binding, Buffer, BufferUse, Constants, Context, GpuError, Timer},
@@ -27,7 +27,7 @@ use crate::{
     },
     passes::{
         grid::GridBuilder,
-        kdtree::{BuiltTree, KdTreeBuilder, KdTreeBuilderOptions},
+        kdtree::{DeviceTree, KdTreeBuilder},
     },
     world::{Emitters, Geometry, Instances, World},
 };
@@ -216,19 +216,7 @@ impl AccelBuffers {
         let reserved = || Contents { instance_rows: Content::Elements(&rows), ..trees.reserved(common()) };
         let usage = SceneAccess::of(context, &reserved()).buffer_use();
         let arrays = trees.arrays(context, usage, (all, new))?;
-        let contents = Contents {
-            kd_nodes: Content::OnDevice(arrays.nodes, usage),
-            kd_parents: Content::OnDevice(arrays.parents, usage),
-            leaf_triangles: Content::OnDevice(arrays.leaf_triangles, usage),
-            leaf_planes: Content::OnDevice(arrays.leaf_planes, usage),
-            kd_slabs: Content::OnDevice(arrays.slabs, usage),
-            ..reserved()
-        };
-        // Triangles that are read by address are uploaded once more.
-        let contents = match usage {
-            BufferUse::Texels => Contents { triangles: Content::OnDevice(on_device, usage), ..contents },
-            _ => contents,
-        };
+        let contents = with_triangles(on_device, usage, with_trees(arrays, usage, reserved()));
         let made = Self::with(context, contents, &constants, Structure::KdTree { mask_words: 1 })?;
         Ok(Self { trees: Some(Arc::new(trees)), ..made })
     }
@@ -268,29 +256,16 @@ impl AccelBuffers {
         common: impl Fn() -> Contents<'a>,
     ) -> Result<Self, GpuError> {
         let on_device = Buffer::with(context, "triangles", triangles, BufferUse::Texels)?;
-        let slabs = tree.options().slabs && !context.predicates_branches();
-        let tree_options = BuildOptions { slabs, ..tree.options().clone() };
-        let options = KdTreeBuilderOptions { tree: tree_options, ..KdTreeBuilderOptions::default() };
-        let builder = KdTreeBuilder::new(context, &on_device, &options)?;
+        let builder = KdTreeBuilder::new(context, &on_device, &builder_options(context, tree))?;
         let timer = Timer::new(context, builder.n_stages())?;
         let built = builder.build(Some(&timer))?;
-        let usage = SceneAccess::of(context, &with_room_for(&built, common())).buffer_use();
+        let sizes = (built.n_nodes as usize, built.n_entries as usize);
+        let reserved = || with_room_for(sizes, built.has_slabs, common());
+        let usage = SceneAccess::of(context, &reserved()).buffer_use();
         let arrays = builder.copy(&built, usage)?;
         drop(builder); // its memory is larger than the tree's
         tree.note(built.report(triangles.len()));
-        let contents = Contents {
-            kd_nodes: Content::OnDevice(arrays.nodes, usage),
-            kd_parents: Content::OnDevice(arrays.parents, usage),
-            leaf_triangles: Content::OnDevice(arrays.leaf_triangles, usage),
-            leaf_planes: Content::OnDevice(arrays.leaf_planes, usage),
-            kd_slabs: Content::OnDevice(arrays.slabs, usage),
-            ..with_room_for(&built, common())
-        };
-        // Triangles that are read by address are uploaded once more.
-        let contents = match usage {
-            BufferUse::Texels => Contents { triangles: Content::OnDevice(on_device, usage), ..contents },
-            _ => contents,
-        };
+        let contents = with_triangles(on_device, usage, with_trees(arrays, usage, reserved()));
         Self::with(context, contents, &tree.constants(), Structure::KdTree { mask_words: 1 })
     }
 
@@ -501,7 +476,7 @@ impl AccelBuffers {
         self.trees.clone()
     }
 
-    /// Takes what rays pass through from other buffers of the same triangles.
+    /// Hides the triangles that other buffers of the same triangles hide.
     pub(crate) fn hide_as(&mut self, context: &Arc<Context>, other: &Self) -> Result<(), GpuError> {
         if other.filters {
             let hidden = other.arrays.triangle_materials.download()?;
@@ -594,17 +569,24 @@ pub(crate) fn hidden_words(n_triangles: usize, hidden: &[u32]) -> Vec<u32> {
     words
 }
 
-/// Returns the contents with room for the tree and for its links.
-fn with_room_for<'a>(built: &BuiltTree, contents: Contents<'a>) -> Contents<'a> {
-    let (n_nodes, n_entries) = (built.n_nodes as usize, built.n_entries as usize);
+/// Returns the contents with trees that a device has built, in arrays for `usage`.
+fn with_trees<'a>(trees: DeviceTree, usage: BufferUse, contents: Contents<'a>) -> Contents<'a> {
     Contents {
-        kd_nodes: Content::Reserved(n_nodes),
-        kd_parents: Content::Reserved(n_nodes / 2),
-        leaf_triangles: Content::Reserved(n_entries),
-        leaf_planes: Content::Reserved(n_entries),
-        kd_slabs: Content::Reserved(if built.has_slabs { n_nodes } else { 0 }),
-        kd_links: Content::Reserved(6 * n_nodes),
+        kd_nodes: Content::OnDevice(trees.nodes, usage),
+        kd_parents: Content::OnDevice(trees.parents, usage),
+        leaf_triangles: Content::OnDevice(trees.leaf_triangles, usage),
+        leaf_planes: Content::OnDevice(trees.leaf_planes, usage),
+        kd_slabs: Content::OnDevice(trees.slabs, usage),
         ..contents
+    }
+}
+
+/// Returns the contents with triangles that are on the device already. Those that are read by address are uploaded once
+/// more.
+fn with_triangles<'a>(on_device: Buffer<Triangle>, usage: BufferUse, contents: Contents<'a>) -> Contents<'a> {
+    match usage {
+        BufferUse::Texels => Contents { triangles: Content::OnDevice(on_device, usage), ..contents },
+        _ => contents,
     }
 }
 

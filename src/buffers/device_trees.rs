@@ -95,12 +95,7 @@ impl TreeBuilder {
         tree: &LazyTree,
     ) -> Result<Self, GpuError> {
         let triangles = Buffer::new(context, "kd_build_triangles", n_triangles, BufferUse::Storage)?;
-        let slabs = has_slabs(context, tree);
-        let options = KdTreeBuilderOptions {
-            tree: BuildOptions { slabs, ..tree.options().clone() },
-            ..KdTreeBuilderOptions::default()
-        };
-        let kernels = KdTreeBuilder::new(context, &triangles, &options)?;
+        let kernels = KdTreeBuilder::new(context, &triangles, &builder_options(context, tree))?;
         let timer = Timer::new(context, kernels.n_stages())?;
         let corners = Buffer::new(context, "kd_build_corners", n_corner_words, BufferUse::Storage)?;
         Ok(Self { kernels, timer, corners })
@@ -126,6 +121,29 @@ impl TreeBuilder {
 /// Whether the device needs the tree's slabs. The kernels of devices that predicate branches do not read any.
 fn has_slabs(context: &Context, tree: &LazyTree) -> bool {
     tree.options().slabs && !context.predicates_branches()
+}
+
+/// Returns the options with which a device builds such a tree.
+pub(super) fn builder_options(context: &Context, tree: &LazyTree) -> KdTreeBuilderOptions {
+    let tree = BuildOptions { slabs: has_slabs(context, tree), ..tree.options().clone() };
+    KdTreeBuilderOptions { tree, ..KdTreeBuilderOptions::default() }
+}
+
+/// Returns the contents with room for trees of so many nodes and entries, and for their links.
+pub(super) fn with_room_for(
+    (n_nodes, n_entries): (usize, usize),
+    has_slabs: bool,
+    contents: Contents<'_>,
+) -> Contents<'_> {
+    Contents {
+        kd_nodes: Content::Reserved(n_nodes),
+        kd_parents: Content::Reserved(n_nodes / 2),
+        leaf_triangles: Content::Reserved(n_entries),
+        leaf_planes: Content::Reserved(n_entries),
+        kd_slabs: Content::Reserved(if has_slabs { n_nodes } else { 0 }),
+        kd_links: Content::Reserved(6 * n_nodes),
+        ..contents
+    }
 }
 
 /// The geometries of a world, and their triangles.
@@ -214,16 +232,7 @@ impl DeviceTrees {
 
     /// Returns the contents with room for the trees and their links.
     pub fn reserved<'a>(&self, contents: Contents<'a>) -> Contents<'a> {
-        let [n_nodes, n_entries] = [self.end.nodes.end, self.end.entries.end];
-        Contents {
-            kd_nodes: Content::Reserved(n_nodes),
-            kd_parents: Content::Reserved(n_nodes / 2),
-            leaf_triangles: Content::Reserved(n_entries),
-            leaf_planes: Content::Reserved(n_entries),
-            kd_slabs: Content::Reserved(if self.has_slabs { n_nodes } else { 0 }),
-            kd_links: Content::Reserved(6 * n_nodes),
-            ..contents
-        }
+        with_room_for((self.end.nodes.end, self.end.entries.end), self.has_slabs, contents)
     }
 
     /// Makes the arrays of all trees.
@@ -237,13 +246,7 @@ impl DeviceTrees {
         (all, new): (&Geometries, NewTrees),
     ) -> Result<DeviceTree, GpuError> {
         let [n_nodes, n_entries] = [self.end.nodes.end, self.end.entries.end];
-        let arrays = DeviceTree {
-            nodes: Buffer::new(context, "kd_nodes", n_nodes, usage)?,
-            parents: Buffer::new(context, "kd_parents", n_nodes / 2, usage)?,
-            leaf_triangles: Buffer::new(context, "leaf_triangles", n_entries, usage)?,
-            leaf_planes: Buffer::new(context, "leaf_planes", n_entries, usage)?,
-            slabs: Buffer::new(context, "kd_slabs", if self.has_slabs { n_nodes } else { 0 }, usage)?,
-        };
+        let arrays = DeviceTree::new(context, (n_nodes, n_entries), self.has_slabs, usage)?;
         let mut state = self.lock();
         let of_host = all.of_host(0..self.regions.len());
         self.upload(context, &arrays, (all, &of_host, &[]))?;

@@ -19,11 +19,7 @@ pub fn report(statistics: Statistics, rows: &[TimerRow]) -> DeviceBuild {
 fn stages_of(rows: &[TimerRow]) -> Vec<BuildStage> {
     let mut stages: Vec<BuildStage> = Vec::new();
     for row in rows {
-        let ms = row.span_ms.map(|(begin, end)| end - begin);
-        match stages.iter_mut().find(|stage| stage.name == row.name) {
-            Some(stage) => stage.ms = stage.ms.zip(ms).map(|(sum, ms)| sum + ms),
-            None => stages.push(BuildStage { name: row.name, ms }),
-        }
+        BuildStage { name: row.name, ms: row.span_ms.map(|(begin, end)| end - begin) }.add_to(&mut stages);
     }
     stages
 }

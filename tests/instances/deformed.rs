@@ -258,7 +258,7 @@ fn an_update_makes_few_objects_and_a_failed_one_changes_nothing() {
 }
 
 #[test]
-fn a_tree_without_room_makes_everything_anew() {
+fn a_tree_without_room_uploads_everything() {
     let context = device();
     let mut scene = scene();
     let positions = scene.meshes[LARGE].positions.clone();

@@ -290,9 +290,17 @@ fn relocated_trees_have_the_indices_of_their_places() {
         let rows: Vec<_> = expected.leaf_triangles.iter().map(|triangle_ix| triangle_ix + 77).collect();
         assert_eq!(entries.iter().map(|entry| entry.triangle_ix).collect::<Vec<_>>(), rows);
         assert_eq!(tree.leaf_planes.download().expect("planes"), expected.leaf_planes);
-        // The next build begins anew.
+        // The next build does not depend on this one.
         let again = builder.build_first(n, None).expect("a tree");
         assert_eq!(builder.read_back(&again).expect("its arrays"), expected);
     }
     assert_silent(&context);
+}
+
+#[test]
+#[should_panic(expected = "4 triangles, room for 3")]
+fn more_triangles_than_there_is_room_for_are_refused() {
+    let context = device();
+    let builder = builder(&context, &meshes::soup(3, 1), &bare());
+    let _ = builder.build_first(4, None);
 }

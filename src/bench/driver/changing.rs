@@ -23,7 +23,7 @@ pub struct ChangingFrames {
     pub build_ms: f64,
     /// Time of the build and of each number of [`MRAYS`], milliseconds.
     pub ms: [f64; 4],
-    /// When this structure takes less time than the driver's that is built anew; none for that one.
+    /// When this structure takes less time than the driver's that is rebuilt; none for that one.
     pub ahead: Option<Ahead>,
 }
 

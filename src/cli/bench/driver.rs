@@ -132,7 +132,7 @@ fn changing_text(frames: &[ChangingFrames]) -> String {
     let [a, b, c, d] = MRAYS.map(|mrays| format!("{mrays} M"));
     let rows: Vec<_> = frames.iter().map(row).collect();
     "\nA frame in which all triangles have moved, ms: the build of a structure, and so many rays. Ahead: for which\n\
-     numbers of rays it takes less time than the driver's structure, built anew.\n\n"
+     numbers of rays it takes less time than the driver's structure, rebuilt.\n\n"
         .to_owned()
         + &table(["rays", "by", "build", &a, &b, &c, &d, "ahead"], &rows)
 }

@@ -100,6 +100,25 @@ pub struct DeviceTree {
 }
 
 impl DeviceTree {
+    /// Makes arrays for so many nodes and entries, of which none is defined.
+    ///
+    /// # Errors
+    /// An array exceeds the device's limits, or memory runs out.
+    pub fn new(
+        context: &Arc<Context>,
+        (n_nodes, n_entries): (usize, usize),
+        has_slabs: bool,
+        usage: BufferUse,
+    ) -> Result<Self, GpuError> {
+        Ok(Self {
+            nodes: Buffer::new(context, "kd_nodes", n_nodes, usage)?,
+            parents: Buffer::new(context, "kd_parents", n_nodes / 2, usage)?,
+            leaf_triangles: Buffer::new(context, "leaf_triangles", n_entries, usage)?,
+            leaf_planes: Buffer::new(context, "leaf_planes", n_entries, usage)?,
+            slabs: Buffer::new(context, "kd_slabs", if has_slabs { n_nodes } else { 0 }, usage)?,
+        })
+    }
+
     /// Copies trees of so many nodes and entries, which have the indices of the target already, to their place there.
     /// Does not wait for the device, as [`KdTreeBuilder::place`].
     ///
@@ -265,7 +284,11 @@ impl KdTreeBuilder {
     ///
     /// # Errors
     /// Out of memory; a Vulkan call fails.
+    ///
+    /// # Panics
+    /// There are more than [`KdTreeBuilder::capacity`].
     pub fn build_first(&self, n_triangles: usize, timer: Option<&Timer>) -> Result<BuiltTree, GpuError> {
+        assert!(n_triangles <= self.capacity(), "{n_triangles} triangles, room for {}", self.capacity());
         let n_triangles = n_triangles as u32;
         let commands = match timer {
             Some(_) => vec![self.record_all(n_triangles, timer)?],
@@ -311,18 +334,11 @@ impl KdTreeBuilder {
     /// Out of memory; a Vulkan call fails.
     pub fn copy(&self, built: &BuiltTree, usage: BufferUse) -> Result<DeviceTree, GpuError> {
         let (n_nodes, n_entries) = (built.n_nodes as usize, built.n_entries as usize);
-        let context = &self.context;
-        let to = DeviceTree {
-            nodes: Buffer::new(context, "kd_nodes", n_nodes, usage)?,
-            parents: Buffer::new(context, "kd_parents", n_nodes / 2, usage)?,
-            leaf_triangles: Buffer::new(context, "leaf_triangles", n_entries, usage)?,
-            leaf_planes: Buffer::new(context, "leaf_planes", n_entries, usage)?,
-            slabs: Buffer::new(context, "kd_slabs", if built.has_slabs { n_nodes } else { 0 }, usage)?,
-        };
+        let to = DeviceTree::new(&self.context, (n_nodes, n_entries), built.has_slabs, usage)?;
         let arrays: Vec<_> = iter::zip(self.arrays(), to.sizes(n_nodes, n_entries))
             .map(|(from, (to, bytes))| (from, to, bytes))
             .collect();
-        device_build::copy(context, "kdtree_copy", &arrays)?;
+        device_build::copy(&self.context, "kdtree_copy", &arrays)?;
         Ok(to)
     }
 

@@ -341,7 +341,7 @@ impl<'a> Loader<'a> {
         Ok(Some(Known { mesh_ix: self.meshes.len() - 1, materials, is_skinned, origin }))
     }
 
-    /// Returns what is read of a mesh, which is read once if it serves all poses.
+    /// Returns a mesh as it is read. A mesh that serves all poses is read once.
     fn read_mesh(
         &mut self,
         key: RestKey,
