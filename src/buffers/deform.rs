@@ -69,7 +69,7 @@ impl DeformBuffers {
     /// A buffer exceeds the device's limits; out of memory.
     ///
     /// # Panics
-    /// A face names a vertex that there is not, or the target lacks a row or its corners.
+    /// A face names a vertex that there is not, a vertex lacks influences, or the target lacks a row or its corners.
     pub fn new(
         context: &Arc<Context>,
         bindings: &Arc<BindingLayout>,
@@ -78,6 +78,8 @@ impl DeformBuffers {
     ) -> Result<Self, GpuError> {
         let n_vertices = deformation.positions.len();
         assert!(faces.as_flattened().par_iter().all(|ix| (*ix as usize) < n_vertices), "the vertices of all faces");
+        let n_influences = n_vertices * deformation.n_influences;
+        assert_eq!(deformation.influences.len(), n_influences, "the influences of all vertices");
         let mesh = DeformMesh {
             n_vertices: n_vertices as u32,
             n_faces: faces.len() as u32,

@@ -49,7 +49,7 @@ impl Deform {
     /// A buffer exceeds the device's limits; out of memory.
     ///
     /// # Panics
-    /// A face names a vertex that there is not, or the target lacks a row or its corners.
+    /// A face names a vertex that there is not, a vertex lacks influences, or the target lacks a row or its corners.
     pub fn mesh(&self, mesh: (&Deformation, &[[u32; 3]]), target: DeformTarget) -> Result<DeformedMesh, GpuError> {
         Ok(DeformedMesh { buffers: DeformBuffers::new(&self.context, &self.bindings, mesh, target)? })
     }

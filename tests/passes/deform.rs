@@ -430,3 +430,11 @@ fn negative_weights_widen_the_box() {
     mesh.influences = vec![Influence { joint: 0, weight: 0.5 }, Influence { joint: 1, weight: 0.5 }];
     assert!(DeformedBounds::new(&mesh).at(&pose).1.x < 1.00001);
 }
+
+#[test]
+#[should_panic(expected = "the influences of all vertices")]
+fn vertices_without_influences_are_refused() {
+    let mut deformation = deformation(&mut Random(5), 4, SKINNED);
+    deformation.influences.pop();
+    run(&device(), &deformation, &[[0, 1, 2]], &[]);
+}
