@@ -1,10 +1,9 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 // Deformation of a mesh, 1 of 2: moves a vertex by morph targets, then by its joints, whose transforms are blended. One
-// invocation per vertex. `precise`: positions have the bits of src/scene/model/deformation.rs, the twin.
+// invocation per vertex. `precise`: results have the bits of src/scene/model/deformation.rs, the twin.
 // Reads rest_vertices, deltas, influences, joints and weights; writes deformed and tangents.
 #include "deform.glsl"
-#include "octahedral.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_DEFORM_VERTICES) readonly buffer VerticesBlock { RestVertex rest_vertices[]; };
@@ -44,13 +43,26 @@ float dot_in_order(vec3 a, vec3 b) {
     return sum;
 }
 
-// A vector of unit length, or zero if the vector has no direction.
-vec3 unit(vec3 v) {
+// The octahedral code of a direction of any length, without a division: devices round those differently. Newton's
+// iteration begins with a reciprocal that is off by an eighth. On the border of the square, where two codes stand for
+// each direction, the one with the larger other half is returned. Twin of src/layout/normal.rs.
+uint encode_exactly(vec3 v) {
     precise vec3 scaled = v * scale_to_one(largest_of(v));
-    precise float length = sqrt(dot_in_order(scaled, scaled));
+    precise float sum = abs(scaled.x) + abs(scaled.y) + abs(scaled.z);
     const float infinity = uintBitsToFloat(0x7f800000u);
-    precise vec3 direction = scaled / length;
-    return length > 0.0 && length < infinity ? direction : vec3(0.0);
+    if (!(sum >= 1.0 && sum < infinity)) return FLAT_NORMAL;
+    precise float reciprocal = uintBitsToFloat(0x7ef311c7u - floatBitsToUint(sum));
+    for (uint i = 0u; i < 4u; ++i) {
+        precise float next = reciprocal * (2.0 - sum * reciprocal);
+        reciprocal = next;
+    }
+    precise vec2 p = scaled.xy * reciprocal;
+    precise vec2 folded = (1.0 - abs(p.yx)) * vec2(p.x < 0.0 ? -1.0 : 1.0, p.y < 0.0 ? -1.0 : 1.0);
+    const float epsilon = uintBitsToFloat(0x34000000u);
+    precise vec2 steps = floor(clamp(scaled.z < -epsilon ? folded : p, -1.0, 1.0) * 32767.0 + 0.5);
+    ivec2 code = ivec2(steps), positive = abs(code);
+    code = mix(code, positive, equal(positive.yx, ivec2(32767)));
+    return uint(code.x) & 0xffffu | uint(code.y) << 16;
 }
 
 // The sum of the transforms of a vertex's joints, each times its weight.
@@ -81,12 +93,9 @@ void skin(Affine map, inout vec3 position, inout vec3 normal, inout vec3 tangent
     side = mirrors ? -side : side;
 }
 
-uint normal_code(vec3 normal) {
-    return normal == vec3(0.0) ? FLAT_NORMAL : encode_normal(normal);
-}
-
 uint tangent_code(vec3 tangent, float side) {
-    return tangent == vec3(0.0) ? FLAT_NORMAL : encode_normal(tangent) & ~1u | (side > 0.0 ? 1u : 0u);
+    uint code = encode_exactly(tangent);
+    return code == FLAT_NORMAL ? code : code & ~1u | (side > 0.0 ? 1u : 0u);
 }
 
 void main() {
@@ -94,12 +103,10 @@ void main() {
     if (vertex_ix >= mesh.n_vertices) return;
     RestVertex rest = rest_vertices[vertex_ix];
     precise vec3 position = rest.position, normal = rest.normal, tangent = rest.tangent;
-    bool is_moved = mesh.n_influences > 0u;
     for (uint i = 0u; i < rest.n_deltas; ++i) {
         MorphDelta delta = deltas[rest.first_delta + i];
         float weight = weights[delta.target];
         if (weight != 0.0) {
-            is_moved = true;
             position += weight * delta.position;
             normal += weight * delta.normal;
             tangent += weight * delta.tangent;
@@ -107,10 +114,6 @@ void main() {
     }
     float side = rest.side;
     if (mesh.n_influences > 0u) skin(blended(vertex_ix), position, normal, tangent, side);
-    if (is_moved) {
-        normal = unit(normal);
-        tangent = unit(tangent);
-    }
-    deformed[vertex_ix] = DeformedVertex(position, normal_code(normal));
+    deformed[vertex_ix] = DeformedVertex(position, encode_exactly(normal));
     if (mesh.has_tangents != 0u) tangents[vertex_ix] = tangent_code(tangent, side);
 }

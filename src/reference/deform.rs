@@ -1,16 +1,10 @@
-//! Deformation of meshes. Twin of the kernels `deform_vertices` and `deform_triangles`. Positions have the same bits.
-//! Codes of normals and tangents may differ by a step: a device may round divisions and roots differently.
+//! Deformation of meshes. Twin of the kernels `deform_vertices` and `deform_triangles`, with the same bits.
 
-use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::{
-    layout::{DeformedVertex, FLAT_NORMAL, Triangle, normal::encode_octahedral},
-    scene::{
-        Transform,
-        deformation::{Deformation, Pose},
-    },
-    world::encode_tangent,
+    layout::{DeformedVertex, Triangle},
+    scene::deformation::{Deformation, Pose, Vertex},
 };
 
 /// Returns the vertices of a pose, and the codes of their tangents.
@@ -19,10 +13,8 @@ use crate::{
 /// The pose lacks a joint.
 pub fn deform_vertices(deformation: &Deformation, pose: &Pose) -> Vec<(DeformedVertex, u32)> {
     let deformed = |ix| {
-        let vertex = deformation.vertex(ix, pose);
-        let normal = if vertex.normal == Vec3::ZERO { FLAT_NORMAL } else { encode_octahedral(vertex.normal) };
-        let tangent = encode_tangent(&Transform::IDENTITY, vertex.tangent);
-        (DeformedVertex { position: vertex.position, normal }, tangent)
+        let Vertex { position, normal, tangent } = deformation.vertex(ix, pose);
+        (DeformedVertex { position, normal }, tangent)
     };
     (0..deformation.positions.len()).into_par_iter().map(deformed).collect()
 }

@@ -23,7 +23,7 @@ mod poser;
 mod scene_file;
 
 #[doc(hidden)]
-pub use self::model::{deformation, deformed_bounds::DeformedBounds};
+pub use self::model::deformation;
 #[cfg(feature = "files")]
 pub(crate) use self::{files::pack, poser::Poser};
 #[cfg(feature = "files")]

@@ -52,7 +52,7 @@ fn corner_surface(mesh: &Mesh, transform: &Transform, face: usize, corner: usize
 
 /// Encodes a tangent of object space. The cross product of two reflected vectors is the reverse of their reflected
 /// cross product, so a reflection changes the side of the bitangent.
-pub(crate) fn encode_tangent(transform: &Transform, tangent: Vec4) -> u32 {
+fn encode_tangent(transform: &Transform, tangent: Vec4) -> u32 {
     match transform.tangent(tangent.truncate()) {
         Vec3::ZERO => FLAT_NORMAL,
         direction => {

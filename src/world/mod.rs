@@ -33,7 +33,6 @@ use std::sync::{Arc, OnceLock};
 use glam::Vec3;
 
 use self::ambient_approximation::AmbientApproximation;
-pub(crate) use self::corners::encode_tangent;
 #[cfg(test)]
 pub(crate) use self::texture_arrays::tests::{arrays_of, scene_of};
 pub use self::{

@@ -1,10 +1,14 @@
 //! Meshes that morph targets and joints deform. Twin of `glsl/passes/deform_vertices.comp`, which computes the same in
-//! the same order, so that positions have the same bits.
+//! the same order and has the same bits.
 
 use glam::{DMat4, DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::Mesh;
+use crate::layout::{
+    FLAT_NORMAL,
+    normal::{decode_exactly, encode_exactly, scale_to_one},
+};
 
 /// What deforms the vertices of a mesh: first morph targets, then joints.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -57,6 +61,12 @@ pub struct Pose {
     pub joints: Vec<JointMatrix>,
 }
 
+impl Pose {
+    fn weight(&self, target: u32) -> f32 {
+        self.weights.get(target as usize).copied().unwrap_or(0.0)
+    }
+}
+
 /// The transform from the mesh at rest to the space of the deformed mesh by a joint alone: an affine map, which may
 /// flatten.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -72,10 +82,19 @@ pub struct JointMatrix {
 pub struct Vertex {
     /// Position.
     pub position: Vec3,
-    /// Unit normal, or zero.
-    pub normal: Vec3,
-    /// Unit tangent with the bitangent's side as w, or zero.
-    pub tangent: Vec4,
+    /// The code of the normal ([`encode_exactly`]).
+    pub normal: u32,
+    /// The code of the tangent, whose lowest bit is 1 if the bitangent's side is positive; or `FLAT_NORMAL`.
+    pub tangent: u32,
+}
+
+/// A vertex whose vectors have any length.
+#[derive(Clone, Copy)]
+struct Moved {
+    position: Vec3,
+    normal: Vec3,
+    /// With the bitangent's side as w.
+    tangent: Vec4,
 }
 
 impl JointMatrix {
@@ -107,10 +126,10 @@ impl JointMatrix {
         (if mirrors { cofactors.map(|axis| -axis) } else { cofactors }, mirrors)
     }
 
-    fn apply(&self, vertex: Vertex) -> Vertex {
+    fn apply(&self, vertex: Moved) -> Moved {
         let (normals, mirrors) = self.cofactors();
         let side = if mirrors { -vertex.tangent.w } else { vertex.tangent.w };
-        Vertex {
+        Moved {
             position: self.linear(vertex.position) + self.translation,
             normal: combined(normals, vertex.normal),
             // The cross product of reflected vectors is the reverse of their reflected cross product.
@@ -130,36 +149,57 @@ impl Deformation {
     /// # Panics
     /// The pose lacks a joint, or there is no such vertex.
     pub fn vertex(&self, ix: usize, pose: &Pose) -> Vertex {
-        let (mut vertex, is_morphed) = self.morphed(ix, &pose.weights);
-        if !is_morphed && self.n_influences == 0 {
-            return vertex;
-        }
-        vertex.tangent.w = side_of(vertex.tangent);
+        let mut moved = self.morphed(ix, pose);
         if self.n_influences > 0 {
-            let sum = |sum: JointMatrix, it: &Influence| sum.add(it.weight, &pose.joints[it.joint as usize]);
-            vertex = self.influences_of(ix).iter().fold(JointMatrix::default(), sum).apply(vertex);
+            moved = self.blended(ix, pose).apply(moved);
         }
-        let along = unit(vertex.tangent.truncate());
-        let tangent = if along == Vec3::ZERO { Vec4::ZERO } else { along.extend(vertex.tangent.w) };
-        Vertex { position: vertex.position, normal: unit(vertex.normal), tangent }
+        let tangent = match encode_exactly(moved.tangent.truncate()) {
+            FLAT_NORMAL => FLAT_NORMAL,
+            code => code & !1 | u32::from(moved.tangent.w > 0.0),
+        };
+        Vertex { position: moved.position, normal: encode_exactly(moved.normal), tangent }
     }
 
-    /// Returns a vertex with the deltas of its targets, and whether it has any.
-    fn morphed(&self, ix: usize, weights: &[f32]) -> (Vertex, bool) {
-        let normal = self.normals.get(ix).copied().unwrap_or_default();
-        let tangent = self.tangents.get(ix).copied().unwrap_or_default();
-        let mut vertex = Vertex { position: self.positions[ix], normal, tangent };
-        let mut is_morphed = false;
+    /// Returns the position of a vertex in a pose: that of [`Deformation::vertex`].
+    ///
+    /// # Panics
+    /// The pose lacks a joint, or there is no such vertex.
+    pub fn position(&self, ix: usize, pose: &Pose) -> Vec3 {
+        let mut position = self.positions[ix];
         for delta in self.deltas_of(ix) {
-            let weight = weights.get(delta.target as usize).copied().unwrap_or(0.0);
+            let weight = pose.weight(delta.target);
             if weight != 0.0 {
-                is_morphed = true;
-                vertex.position += weight * delta.position;
-                vertex.normal += weight * delta.normal;
-                vertex.tangent += (weight * delta.tangent).extend(0.0);
+                position += weight * delta.position;
             }
         }
-        (vertex, is_morphed)
+        if self.n_influences == 0 {
+            return position;
+        }
+        let map = self.blended(ix, pose);
+        map.linear(position) + map.translation
+    }
+
+    /// Returns the sum of the transforms of a vertex's joints, each times its weight.
+    fn blended(&self, ix: usize, pose: &Pose) -> JointMatrix {
+        let sum = |sum: JointMatrix, it: &Influence| sum.add(it.weight, &pose.joints[it.joint as usize]);
+        self.influences_of(ix).iter().fold(JointMatrix::default(), sum)
+    }
+
+    /// Returns a vertex with the deltas of its targets.
+    fn morphed(&self, ix: usize, pose: &Pose) -> Moved {
+        let normal = self.normals.get(ix).copied().unwrap_or_default();
+        let tangent = self.tangents.get(ix).copied().unwrap_or_default();
+        let mut moved =
+            Moved { position: self.positions[ix], normal, tangent: tangent.truncate().extend(side_of(tangent)) };
+        for delta in self.deltas_of(ix) {
+            let weight = pose.weight(delta.target);
+            if weight != 0.0 {
+                moved.position += weight * delta.position;
+                moved.normal += weight * delta.normal;
+                moved.tangent += (weight * delta.tangent).extend(0.0);
+            }
+        }
+        moved
     }
 
     /// Returns what morph targets add to a vertex.
@@ -206,7 +246,8 @@ impl Deformation {
         self.positions.extend(other.positions);
     }
 
-    /// Gives a mesh, whose faces name the vertices, the positions, normals and tangents of a pose.
+    /// Gives a mesh, whose faces name the vertices, the positions, normals and tangents of a pose. Normals and tangents
+    /// are those of codes, so that the triangles of a world have these codes.
     ///
     /// # Panics
     /// The pose lacks a joint, or a face names a vertex that there is not.
@@ -216,11 +257,11 @@ impl Deformation {
         let faces = &mesh.faces;
         mesh.normals = match self.normals.is_empty() {
             true => vec![[Vec3::ZERO; 3]; faces.len()],
-            false => corners(faces, |ix| vertices[ix].normal),
+            false => corners(faces, |ix| decode_exactly(vertices[ix].normal)),
         };
         mesh.tangents = match self.tangents.is_empty() {
             true => Vec::new(),
-            false => corners(faces, |ix| vertices[ix].tangent),
+            false => corners(faces, |ix| decoded_tangent(vertices[ix].tangent)),
         };
     }
 
@@ -251,17 +292,12 @@ fn combined([x, y, z]: [Vec3; 3], v: Vec3) -> Vec3 {
     x * v.x + y * v.y + z * v.z
 }
 
-/// Returns the power of two that scales a positive number to at least 1 and below 2, or nearly so for the largest and
-/// the smallest numbers.
-fn scale_to_one(largest: f32) -> f32 {
-    f32::from_bits((254 - (largest.to_bits() >> 23).clamp(1, 253)) << 23)
-}
-
-/// Returns a vector of unit length, or zero if the vector has no direction.
-fn unit(v: Vec3) -> Vec3 {
-    let scaled = v * scale_to_one(v.abs().max_element());
-    let length = scaled.dot(scaled).sqrt();
-    if length > 0.0 && length < f32::INFINITY { scaled / length } else { Vec3::ZERO }
+/// Returns the unit tangent of a code with the bitangent's side as w, or zero.
+fn decoded_tangent(code: u32) -> Vec4 {
+    match code {
+        FLAT_NORMAL => Vec4::ZERO,
+        code => decode_exactly(code & !1).extend(if code & 1 == 1 { 1.0 } else { -1.0 }),
+    }
 }
 
 /// Joins two lists, each of which is empty or has an element for each vertex. `n`: vertices of the first list, of both.

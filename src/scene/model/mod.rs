@@ -4,7 +4,6 @@
 pub(crate) mod camera;
 pub(crate) mod defaults;
 pub mod deformation;
-pub(crate) mod deformed_bounds;
 pub(crate) mod environment;
 pub(crate) mod error;
 pub(crate) mod extent;
