@@ -44,6 +44,21 @@ impl BottomLevel {
         }
     }
 
+    /// Returns the tree that devices build over `n` triangles, whose corners a function returns; none if the host
+    /// builds the structure of so many triangles.
+    pub fn of_corners(
+        n: usize,
+        corners: impl Fn(usize) -> [Vec3; 3] + Sync + Send,
+        options: &AccelOptions,
+    ) -> Option<Self> {
+        match options {
+            AccelOptions::LazyTree(options) if n >= LEAST_DEVICE_TRIANGLES => {
+                Some(Self::LazyTree(Box::new(LazyTree::of_corners(n, corners, options.clone()))))
+            }
+            _ => None,
+        }
+    }
+
     /// Builds the host's tree if devices build the structure, unless the host has done so already. `triangles`: those
     /// of the geometry.
     pub fn build_on_host(&self, triangles: &[Triangle]) {

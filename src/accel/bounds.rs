@@ -37,8 +37,16 @@ impl Bounds {
 
     /// Returns the bounds of all triangles whose corners are finite, or a box of zeros if there are none.
     pub fn of_all(triangles: &[Triangle]) -> Self {
-        let finite = triangles.par_iter().filter(|triangle| is_finite(triangle));
-        finite.map(Self::of).reduce_with(|a, b| a.union(&b)).unwrap_or(Self { min: [0.0; 3], max: [0.0; 3] })
+        Self::of_each(triangles.len(), |ix| triangles[ix])
+    }
+
+    /// Does what [`Bounds::of_all`] does, for `n` triangles that a function returns.
+    pub fn of_each(n: usize, triangle: impl Fn(usize) -> Triangle + Sync + Send) -> Self {
+        let finite = (0..n).into_par_iter().map(triangle).filter(is_finite);
+        finite
+            .map(|triangle| Self::of(&triangle))
+            .reduce_with(|a, b| a.union(&b))
+            .unwrap_or(Self { min: [0.0; 3], max: [0.0; 3] })
     }
 
     /// Returns the box with all faces moved outwards by a margin, world units. It stays finite.

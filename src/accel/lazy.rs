@@ -113,13 +113,30 @@ impl BuildStage {
 impl<S: Structure> Lazy<S> {
     /// Keeps the options of a structure over these triangles. The structure itself is not built.
     pub fn new(triangles: &[Triangle], options: S::Options) -> Self {
-        let exact_bounds = Bounds::of_all(triangles);
+        Self::of_each(triangles.len(), |ix| triangles[ix], options)
+    }
+
+    /// Does what [`Lazy::new`] does, for `n` triangles whose corners a function returns.
+    pub(crate) fn of_corners(
+        n: usize,
+        corners: impl Fn(usize) -> [Vec3; 3] + Sync + Send,
+        options: S::Options,
+    ) -> Self {
+        let triangle = |ix| {
+            let [v0, v1, v2] = corners(ix);
+            Triangle { v0, v1, v2, ..Triangle::default() }
+        };
+        Self::of_each(n, triangle, options)
+    }
+
+    fn of_each(n: usize, triangle: impl Fn(usize) -> Triangle + Sync + Send, options: S::Options) -> Self {
+        let exact_bounds = Bounds::of_each(n, &triangle);
         let bounds = exact_bounds.grown(exact_bounds.margin());
         Self {
             options,
-            n_triangles: triangles.len(),
+            n_triangles: n,
             bounds: [bounds.min.into(), bounds.max.into()],
-            origin_reach: Scales::new(triangles, &exact_bounds).origin_reach(bounds.largest_coordinate()),
+            origin_reach: Scales::of_each(n, triangle, &exact_bounds).origin_reach(bounds.largest_coordinate()),
             on_host: OnceLock::new(),
             on_device: OnceLock::new(),
         }

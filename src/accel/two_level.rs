@@ -109,19 +109,11 @@ impl TwoLevel {
         Self { structures: Arc::new(structures), node_begins, top, geometries_id, on_device }
     }
 
-    /// Returns the structure of geometries some of which have other vertices. Only their structures are built, and the
-    /// hierarchy. `deformed`: their indices. The other arguments are those of [`TwoLevel::build`].
-    pub fn deformed(
-        &self,
-        deformed: &[usize],
-        (stored, ranges): (&[Triangle], &[StoredRange]),
-        instances: &[Instance],
-        options: &AccelOptions,
-    ) -> Self {
-        let build = |ix: &usize| Arc::new(BottomLevel::build(ranges[*ix].of(stored), options, &Progress::default()));
-        let built: Vec<_> = deformed.par_iter().map(build).collect();
+    /// Returns the structure of geometries some of which have other vertices: the structures of these, with their
+    /// indices. Only the hierarchy is built. `instances`: of the same geometries.
+    pub fn deformed(&self, deformed: Vec<(usize, BottomLevel)>, instances: &[Instance]) -> Self {
         let mut structures = Vec::clone(&self.structures);
-        deformed.iter().zip(built).for_each(|(ix, structure)| structures[*ix] = structure);
+        deformed.into_iter().for_each(|(ix, structure)| structures[ix] = Arc::new(structure));
         Self::of_structures(structures, instances, self.geometries_id.clone())
     }
 

@@ -7,10 +7,11 @@ use rayon::prelude::*;
 
 use super::{
     SuspendedRays,
-    device_trees::{Arrays, DeviceTrees, Geometries, builder_options, with_room_for},
+    device_trees::{Arrays, DeviceTrees, Geometries, with_room_for},
     scene_arrays::{Content, Contents, SceneAccess, SceneArrays},
     surface_kinds::SurfaceKinds,
     texture_words::TextureWords,
+    tree_builder::builder_options,
     two_level::{Joined, instance_rows, leaf_triangle},
 };
 use crate::{
@@ -29,7 +30,7 @@ use crate::{
         grid::GridBuilder,
         kdtree::{DeviceTree, KdTreeBuilder},
     },
-    world::{Emitters, Geometry, Instances, World},
+    world::{Emitters, Geometry, Instances, Poses, World},
 };
 
 /// Returns the numbers of the bindings of [`AccelBuffers`].
@@ -144,7 +145,7 @@ impl AccelBuffers {
             Accel::Grid(grid) => Self::of_grid(context, triangles, grid.get(triangles), common()),
             Accel::TwoLevel(two) => {
                 let instances = geometry.instances().expect("a structure of two levels is over instances");
-                let all = Geometries { two, instances, stored: triangles };
+                let all = Geometries { two, instances, geometry, poses: &Poses::default() };
                 let of_host = || Self::of_two_level(context, triangles, (two, instances), common());
                 match two.has_device_trees().then(|| Self::of_device_trees(context, &all, common)) {
                     Some(Err(error)) if error.is_lack_of_room() => {
@@ -209,7 +210,7 @@ impl AccelBuffers {
         all: &Geometries<'a>,
         common: impl Fn() -> Contents<'a>,
     ) -> Result<Self, GpuError> {
-        let on_device = Buffer::with(context, "triangles", all.stored, BufferUse::Texels)?;
+        let on_device = Buffer::with(context, "triangles", all.geometry.triangles(), BufferUse::Texels)?;
         let (trees, new) = DeviceTrees::build(context, &on_device, all)?;
         let mut constants = AccelConstants::default();
         let rows = instance_rows(all.two, all.instances, &trees.roots(), &mut constants);
@@ -459,15 +460,10 @@ impl AccelBuffers {
         let Some(trees) = &self.trees else { return Ok(false) };
         // Links are those of certain trees.
         let others_read = Arc::strong_count(trees) > n_owners || !self.arrays.kd_links.is_empty();
-        let all = Geometries { two, instances, stored: geometry.triangles() };
+        let all = Geometries { two, instances, geometry, poses: world.poses() };
         let corners_begin = self.uploaded.corners_begin;
-        let corners = if corners_begin == NO_WORDS { &[] } else { &world.scene().textures.corners[..] };
-        let arrays = Arrays {
-            arrays: &self.arrays,
-            corners: cast_slice(corners),
-            n_stored: all.stored.len(),
-            corners_begin: corners_begin as usize,
-        };
+        let corners = (corners_begin != NO_WORDS).then(|| &world.scene().textures.corners);
+        let arrays = Arrays { arrays: &self.arrays, corners, corners_begin: corners_begin as usize };
         trees.update(context, &arrays, (&all, others_read))
     }
 

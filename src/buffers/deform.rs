@@ -91,7 +91,12 @@ impl DeformBuffers {
         target.check(context, faces.len())?;
         let storage = BufferUse::Storage;
         let rest: Vec<RestVertex> = (0..n_vertices).into_par_iter().map(|ix| rest_vertex(deformation, ix)).collect();
-        let deltas: Vec<MorphDelta> = deformation.deltas.par_iter().map(MorphDelta::from).collect();
+        let has_normals = !deformation.normals.is_empty();
+        let delta = |delta: &deformation::MorphDelta| match has_normals {
+            true => MorphDelta::from(delta),
+            false => MorphDelta { normal: Vec3::ZERO, ..MorphDelta::from(delta) },
+        };
+        let deltas: Vec<MorphDelta> = deformation.deltas.par_iter().map(delta).collect();
         let influences: Vec<JointInfluence> = deformation.influences.iter().map(JointInfluence::from).collect();
         let n_joints = influences.iter().map(|it| it.joint as usize + 1).max().unwrap_or(0);
         let n_targets = deltas.iter().map(|it| it.target as usize + 1).max().unwrap_or(0);

@@ -6,23 +6,28 @@ use std::{
     sync::{Arc, Mutex, MutexGuard, PoisonError, Weak},
 };
 
+use bytemuck::cast_slice;
+
 use super::{
     scene_arrays::{Content, Contents, SceneArrays},
+    tree_builder::{TreeBuilder, has_slabs},
     two_level::{leaf_triangle, relocated},
 };
 use crate::{
     accel::{
         DeviceBuild,
         bottom_level::BottomLevel,
-        kdtree::{BuildOptions, KdTree, LazyTree, Traversal, TraversalLinks},
+        kdtree::{KdTree, LazyTree, Traversal, TraversalLinks},
         two_level::{GeometriesId, TwoLevel},
     },
-    gpu::{AnyBuffer, Buffer, BufferUse, Context, GpuError, Timer},
+    gpu::{AnyBuffer, Buffer, BufferUse, Context, GpuError},
     layout::{
-        KD_LEAF, KD_NODE_BYTES, KD_PAIR_SHIFT, KdBox, KdNode, KdPlace, KdRope, LeafTriangle, Plane, Slab, Triangle,
+        CornerSurface, KD_LEAF, KD_NODE_BYTES, KD_PAIR_SHIFT, KdBox, KdNode, KdPlace, KdRope, LeafTriangle, Plane,
+        Slab, Triangle,
     },
-    passes::kdtree::{BufferCopy, BuiltTree, DeviceTree, KdTreeBuilder, KdTreeBuilderOptions, Target},
-    world::Instances,
+    passes::kdtree::{BufferCopy, BuiltTree, DeviceTree, Target},
+    util::Shared,
+    world::{Geometry, Instances, Poses},
 };
 
 /// A region is larger than its first tree by this part of it. The trees of a deformed mesh differ a little in size.
@@ -79,56 +84,6 @@ struct State {
     builder: Option<TreeBuilder>,
 }
 
-/// Builds trees of geometries, one after the other.
-struct TreeBuilder {
-    kernels: KdTreeBuilder,
-    timer: Timer,
-    /// What belongs to the corners of triangles, on its way to the arrays.
-    corners: Buffer<u32>,
-}
-
-impl TreeBuilder {
-    /// `tree`: the options of a tree of a world.
-    fn new(
-        context: &Arc<Context>,
-        (n_triangles, n_corner_words): (usize, usize),
-        tree: &LazyTree,
-    ) -> Result<Self, GpuError> {
-        let triangles = Buffer::new(context, "kd_build_triangles", n_triangles, BufferUse::Storage)?;
-        let kernels = KdTreeBuilder::new(context, &triangles, &builder_options(context, tree))?;
-        let timer = Timer::new(context, kernels.n_stages())?;
-        let corners = Buffer::new(context, "kd_build_corners", n_corner_words, BufferUse::Storage)?;
-        Ok(Self { kernels, timer, corners })
-    }
-
-    /// Builds the tree of the first `n_triangles` triangles that are in the builder. Returns it with its sizes, and
-    /// adds the report to `reports`.
-    fn build(
-        &self,
-        n_triangles: usize,
-        tree: &LazyTree,
-        reports: &mut Vec<DeviceBuild>,
-    ) -> Result<(BuiltTree, (usize, usize)), GpuError> {
-        let built = self.kernels.build_first(n_triangles, Some(&self.timer))?;
-        let report = built.report(n_triangles);
-        tree.note(report.clone());
-        reports.push(report);
-        let sizes = (built.n_nodes as usize, built.n_entries as usize);
-        Ok((built, sizes))
-    }
-}
-
-/// Whether the device needs the tree's slabs. The kernels of devices that predicate branches do not read any.
-fn has_slabs(context: &Context, tree: &LazyTree) -> bool {
-    tree.options().slabs && !context.predicates_branches()
-}
-
-/// Returns the options with which a device builds such a tree.
-pub(super) fn builder_options(context: &Context, tree: &LazyTree) -> KdTreeBuilderOptions {
-    let tree = BuildOptions { slabs: has_slabs(context, tree), ..tree.options().clone() };
-    KdTreeBuilderOptions { tree, ..KdTreeBuilderOptions::default() }
-}
-
 /// Returns the contents with room for trees of so many nodes and entries, and for their links.
 pub(super) fn with_room_for(
     (n_nodes, n_entries): (usize, usize),
@@ -151,7 +106,10 @@ pub(super) fn with_room_for(
 pub struct Geometries<'a> {
     pub two: &'a TwoLevel,
     pub instances: &'a Instances,
-    pub stored: &'a [Triangle],
+    /// All of them. Their triangles are made where they are first asked for.
+    pub geometry: Geometry<'a>,
+    /// What the device makes the triangles of some of them of, when they change.
+    pub poses: &'a Poses,
 }
 
 impl<'a> Geometries<'a> {
@@ -159,8 +117,8 @@ impl<'a> Geometries<'a> {
         &self.two.structures()[ix]
     }
 
-    fn triangles(&self, ix: usize) -> &'a [Triangle] {
-        self.instances.ranges[ix].of(self.stored)
+    pub fn triangles(&self, ix: usize) -> &'a [Triangle] {
+        self.instances.ranges[ix].of(self.geometry.triangles())
     }
 
     fn lazy(&self) -> impl Iterator<Item = (usize, &'a LazyTree)> {
@@ -317,21 +275,20 @@ impl DeviceTrees {
     /// room.
     fn rebuild(
         &self,
-        builder: &TreeBuilder,
+        builder: &mut TreeBuilder,
         arrays: &Arrays,
         (all, ix, tree): (&Geometries, usize, &LazyTree),
         reports: &mut Vec<DeviceBuild>,
     ) -> Result<Option<usize>, GpuError> {
-        let (kernels, region) = (&builder.kernels, &self.regions[ix]);
-        kernels.upload(all.triangles(ix))?;
+        let region = &self.regions[ix];
+        let n_words = builder.take(arrays, (all, ix))?;
         let (built, sizes) = builder.build(tree.n_triangles(), tree, reports)?;
         if !region.holds(sizes) {
             return Ok(None);
         }
-        let corners = arrays.corners_of(region.first_row, tree.n_triangles());
-        builder.corners.upload_at(0, corners)?;
-        let more = arrays.copies((kernels.triangles(), tree.n_triangles()), (&builder.corners, corners.len()), region);
-        kernels.place(&built, &Target { trees: &arrays.trees(), place: region.place(), more: &more })?;
+        let triangles = (builder.kernels.triangles(), tree.n_triangles());
+        let more = arrays.copies(triangles, (&builder.corners, n_words), region);
+        builder.kernels.place(&built, &Target { trees: &arrays.trees(), place: region.place(), more: &more })?;
         Ok(Some(sizes.0))
     }
 
@@ -375,7 +332,7 @@ impl DeviceTrees {
             parents.resize(n_nodes / 2, 0);
             parents.extend(tree.parents().iter().map(|parent| parent + place.first_node));
             entries.resize(n_entries, LeafTriangle::default());
-            let entry = |triangle_ix: &u32| leaf_triangle(all.stored, place.first_row + triangle_ix);
+            let entry = |triangle_ix: &u32| leaf_triangle(all.geometry.triangles(), place.first_row + triangle_ix);
             entries.extend(tree.leaf_triangles().iter().map(entry));
             planes.resize(n_entries, Plane::default());
             planes.extend(tree.leaf_planes());
@@ -465,7 +422,7 @@ impl State {
         context: &Arc<Context>,
         tree: &LazyTree,
         n_corner_words: usize,
-    ) -> Result<Option<&TreeBuilder>, GpuError> {
+    ) -> Result<Option<&mut TreeBuilder>, GpuError> {
         let n_triangles = tree.n_triangles();
         let sizes = (n_triangles, n_triangles * n_corner_words);
         let is_enough = |it: &TreeBuilder| it.kernels.triangles().len() >= sizes.0 && it.corners.len() >= sizes.1;
@@ -476,16 +433,15 @@ impl State {
                 made => self.builder = Some(made?),
             }
         }
-        Ok(self.builder.as_ref())
+        Ok(self.builder.as_mut())
     }
 }
 
 /// The scene's arrays, and what textures need at the corners of all stored triangles.
 pub struct Arrays<'a> {
     pub arrays: &'a SceneArrays,
-    /// An array of words for each triangle; none if textures need nothing there.
-    pub corners: &'a [u32],
-    pub n_stored: usize,
+    /// Tangents and colours; none if the scene has none.
+    pub corners: Option<&'a Shared<Vec<[CornerSurface; 3]>>>,
     /// Where the corners are in `texture_words`.
     pub corners_begin: usize,
 }
@@ -503,12 +459,18 @@ impl Arrays<'_> {
     }
 
     /// The number of words of a triangle's corners.
-    fn n_corner_words(&self) -> usize {
-        self.corners.len() / self.n_stored.max(1)
+    pub fn n_corner_words(&self) -> usize {
+        self.corners.map_or(0, |_| size_of::<[CornerSurface; 3]>() / size_of::<u32>())
     }
 
-    fn corners_of(&self, first_row: usize, n_triangles: usize) -> &[u32] {
-        &self.corners[first_row * self.n_corner_words()..][..n_triangles * self.n_corner_words()]
+    /// The words of the corners of some triangles.
+    pub fn corners_of(&self, first_row: usize, n_triangles: usize) -> &[u32] {
+        self.corners.map_or(&[], |corners| cast_slice(&corners[first_row..][..n_triangles]))
+    }
+
+    /// The place of the first corner of a triangle in `texture_words`.
+    pub fn first_word(&self, row: usize) -> usize {
+        self.corners_begin + row * self.n_corner_words()
     }
 
     /// Returns the copies of a geometry's first triangles, and of the words of their corners, to their places.
@@ -524,13 +486,12 @@ impl Arrays<'_> {
             bytes,
         };
         let bytes_of = |n_triangles: usize| n_triangles * size_of::<Triangle>();
-        let first_word = self.corners_begin + region.first_row * self.n_corner_words();
         [
             copy(triangles.any(), self.arrays.triangles.any(), bytes_of(region.first_row), bytes_of(n_triangles)),
             copy(
                 corners.any(),
                 self.arrays.texture_words.any(),
-                first_word * size_of::<u32>(),
+                self.first_word(region.first_row) * size_of::<u32>(),
                 n_words * size_of::<u32>(),
             ),
         ]

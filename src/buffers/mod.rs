@@ -38,6 +38,7 @@ mod scene_arrays;
 mod surface_kinds;
 mod suspended_rays;
 mod texture_words;
+mod tree_builder;
 mod two_level;
 mod vertex_indices;
 

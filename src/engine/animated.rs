@@ -2,7 +2,9 @@
 //! not changed.
 
 use std::{
+    collections::BTreeMap,
     path::{Path, PathBuf},
+    sync::Arc,
     time::{Duration, Instant},
 };
 
@@ -12,7 +14,10 @@ use tracing::dispatcher::{Dispatch, with_default};
 
 use super::load::{LoadError, LoadRequest, Opened};
 use crate::{
-    scene::{AnimationChoice, Camera, Instance, Light, LoadOptions, Poser, Scene},
+    scene::{
+        AnimationChoice, Camera, Instance, Light, LoadOptions, Poser, Scene,
+        deformation::{ChangedMeshes, PosedMesh},
+    },
     world::{FlatScene, InstanceUpdate, World},
 };
 
@@ -31,10 +36,12 @@ pub struct AnimatedWorld {
     poser: Option<Poser>,
     /// The scene at the last moment that the poser has shown, or else at the first one.
     scene: Scene,
+    /// The poses of meshes whose arrays in the scene are of an earlier moment.
+    poses: BTreeMap<usize, Arc<PosedMesh>>,
     /// Its world.
     world: World,
-    /// The meshes of the scene, in ascending order, that differ from the world's: the last moment had no world.
-    deformed: Vec<usize>,
+    /// The meshes of the scene that differ from the world's: the last moment had no world.
+    deformed: ChangedMeshes,
     work: MomentWork,
 }
 
@@ -58,7 +65,8 @@ impl AnimatedWorld {
     pub fn new(path: &Path, request: &LoadRequest, scene: Scene, world: &World) -> Self {
         let poser = with_default(&Dispatch::none(), || Poser::new(path, &request.scene, &scene));
         let (path, request, world) = (path.to_owned(), request.clone(), world.clone());
-        Self { path, request, poser, scene, world, deformed: Vec::new(), work: MomentWork::default() }
+        let (poses, deformed, work) = Default::default();
+        Self { path, request, poser, scene, poses, world, deformed, work }
     }
 
     /// Chooses the animations that further moments show.
@@ -86,10 +94,15 @@ impl AnimatedWorld {
             return self.read_again(seconds);
         };
         let posed = Instant::now();
-        self.deformed.extend(deformed);
-        self.deformed.sort_unstable();
-        self.deformed.dedup();
-        match self.posed(&self.scene, &before) {
+        for (mesh_ix, pose) in deformed {
+            match pose.clone() {
+                Some(pose) => drop(self.poses.insert(mesh_ix, pose)),
+                None => drop(self.poses.remove(&mesh_ix)),
+            }
+            self.deformed.insert(mesh_ix, pose);
+        }
+        let posed_world = self.posed(&self.scene, &before).transpose();
+        match posed_world.unwrap_or_else(|| self.built_of_own()) {
             Ok(world) => {
                 self.world = world.clone();
                 self.work = MomentWork::of([begin, posed], (&self.scene, &before.0), self.deformed.len());
@@ -103,8 +116,9 @@ impl AnimatedWorld {
         }
     }
 
-    /// Returns the world of a scene that has been posed. `before`: the instances and lights of this one's world.
-    fn posed(&self, scene: &Scene, before: &(Vec<Instance>, Vec<Light>)) -> Result<World, LoadError> {
+    /// Returns the world of a scene that has been posed, unless it must be built. `before`: the instances and lights of
+    /// this one's world.
+    fn posed(&self, scene: &Scene, before: &(Vec<Instance>, Vec<Light>)) -> Result<Option<World>, LoadError> {
         let (instances, lights) = before;
         if self.deformed.is_empty() && scene.lights == *lights && self.world.scene().instances.is_some() {
             let changed = |(instance_ix, (now, before)): (usize, (&Instance, &Instance))| {
@@ -118,15 +132,27 @@ impl AnimatedWorld {
             // An update may be refused, such as a transform that magnifies rounding, by which a new world places
             // triangles.
             if let Ok(world) = self.world.with_instances_changed(&updates) {
-                return Ok(world);
+                return Ok(Some(world));
             }
         }
-        self.world.posed(scene, &self.deformed)?.map_or_else(|| self.built(scene), Ok)
+        Ok(self.world.posed(scene, &self.deformed)?)
+    }
+
+    /// Gives all meshes of the scene their arrays.
+    fn deform(&mut self) {
+        let poses = std::mem::take(&mut self.poses);
+        poses.into_iter().for_each(|(mesh_ix, pose)| pose.deform(&mut self.scene.meshes[mesh_ix]));
+    }
+
+    fn built_of_own(&mut self) -> Result<World, LoadError> {
+        self.deform();
+        self.built(&self.scene)
     }
 
     /// Reads the file again at a moment. What is shown at the next moment does not depend on it.
     fn read_again(&mut self, seconds: f64) -> Result<(World, Camera), LoadError> {
         let begin = Instant::now();
+        self.deform();
         let scene = LoadOptions { at: Some(seconds), ..self.request.scene.clone() };
         let request = LoadRequest { scene, ..self.request.clone() };
         let read = || Opened::read(&self.path, &request);
@@ -146,7 +172,8 @@ impl AnimatedWorld {
                 *now == before
             });
         let before = || (self.scene.instances.clone(), self.scene.lights.clone());
-        let world = if is_same { self.posed(&scene, &before())? } else { self.built(&scene)? };
+        let posed_world = if is_same { self.posed(&scene, &before())? } else { None };
+        let world = posed_world.map_or_else(|| self.built(&scene), Ok)?;
         let n_deformed = if is_same { 0 } else { scene.meshes.len() };
         self.work = MomentWork::of([begin, posed], (&scene, &self.scene.instances), n_deformed);
         Ok((world, scene.camera))

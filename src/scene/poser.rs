@@ -5,7 +5,7 @@ use std::path::Path;
 use super::{
     files::pack,
     formats::gltf,
-    model::{AnimationChoice, AnimationInfo, LoadOptions, Scene, SceneError},
+    model::{AnimationChoice, AnimationInfo, LoadOptions, Scene, SceneError, deformation::ChangedMeshes},
     scene_file::{assemble, poser::KeyPoser, sources::is_scene_file},
 };
 use crate::scene::formats::mesh_file::{MeshFormat, read_mesh};
@@ -36,12 +36,12 @@ impl Poser {
         Some(Self::Gltf(poser))
     }
 
-    /// Poses a scene of the file at a moment, seconds. Returns the indices of the meshes whose vertices have changed,
-    /// or `None` if the file must be read again for this moment.
-    pub fn pose(&mut self, seconds: f64, scene: &mut Scene) -> Result<Option<Vec<usize>>, SceneError> {
+    /// Poses a scene of the file at a moment, seconds. Returns the meshes that are deformed, or `None` if the file must
+    /// be read again for this moment.
+    pub fn pose(&mut self, seconds: f64, scene: &mut Scene) -> Result<Option<ChangedMeshes>, SceneError> {
         match self {
             Self::Gltf(poser) => poser.pose(seconds, scene),
-            Self::Keys(poser) => poser.pose(seconds, scene).map(|()| Some(Vec::new())),
+            Self::Keys(poser) => poser.pose(seconds, scene).map(|()| Some(ChangedMeshes::new())),
         }
     }
 }

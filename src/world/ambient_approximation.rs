@@ -29,22 +29,30 @@ pub(super) struct AmbientApproximation {
 }
 
 impl AmbientApproximation {
-    /// Adds up the light of a scene on the current rayon pool. `up`: the axis that points up.
-    pub fn new(scene: &FlatScene, up: Up) -> Self {
+    /// Adds up the light of a scene on the current rayon pool. `bounds`: those of its triangles. `up`: the axis that
+    /// points up.
+    pub fn new(scene: &FlatScene, bounds: impl FnOnce() -> (Vec3, Vec3), up: Up) -> Self {
         let around = scene.environment.as_ref().map(|environment| Around::new(environment, up));
         let [sky, ground] = around.as_ref().map_or([DVec3::ZERO; 2], |around| around.irradiance);
-        // In a closed room, the mean irradiance is the light over the area of the walls.
-        let (min, max) = scene.bounds();
-        let size = (max - min).as_dvec3();
-        let walls = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
-        let flux =
-            if walls > 0.0 && walls.is_finite() { flux(scene) * (REFLECTED / (PI * walls)) } else { DVec3::ZERO };
+        let flux = if is_lit_within(scene) { reflected(scene, bounds()) } else { DVec3::ZERO };
         Self {
             sky: (sky + flux * SHARES[0]).as_vec3(),
             ground: (ground + flux * SHARES[1]).as_vec3(),
             background: around.map(|around| around.horizon.as_vec3()),
         }
     }
+}
+
+/// Whether surfaces or lights with an area shine in a scene.
+pub(super) fn is_lit_within(scene: &FlatScene) -> bool {
+    !scene.area_lights.is_empty() || scene.materials.iter().any(is_emissive)
+}
+
+/// Returns the mean irradiance in a closed room, the light over the area of the walls, with what they reflect.
+fn reflected(scene: &FlatScene, (min, max): (Vec3, Vec3)) -> DVec3 {
+    let size = (max - min).as_dvec3();
+    let walls = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
+    if walls > 0.0 && walls.is_finite() { flux(scene) * (REFLECTED / (PI * walls)) } else { DVec3::ZERO }
 }
 
 /// Returns the light that all surfaces and lights with an area give off: radiance times area times steradians.
@@ -117,6 +125,10 @@ mod tests {
         world::World,
     };
 
+    fn made_of(scene: &FlatScene, up: Up) -> AmbientApproximation {
+        AmbientApproximation::new(scene, || scene.bounds(), up)
+    }
+
     fn assert_near(a: Vec3, b: Vec3, relative: f32) {
         assert!((a - b).abs().max_element() <= relative * b.abs().max_element(), "{a}, not {b}");
     }
@@ -128,7 +140,7 @@ mod tests {
         let environment = Environment::new([64, 32], vec![colour; 64 * 32], (30.0, 1.0)).unwrap().0;
         let scene = Scene { environment: Some(environment), ..Scene::empty(Path::new("scene")) };
         for up in [Up::Y, Up::Z] {
-            let made = AmbientApproximation::new(&FlatScene::new(&scene).unwrap(), up);
+            let made = made_of(&FlatScene::new(&scene).unwrap(), up);
             // Rows and columns sample the cosine.
             assert_near(made.sky, colour, 5e-3);
             assert_near(made.ground, colour, 5e-3);
@@ -143,7 +155,7 @@ mod tests {
             let sky = Sky::new([40.0, 70.0], up).unwrap();
             let scene = Scene { sky: Some(sky), ..Scene::empty(Path::new("scene")) };
             let flat = FlatScene::new(&scene).unwrap();
-            let made = AmbientApproximation::new(&flat, up);
+            let made = made_of(&flat, up);
             let scene::Light::Sun { irradiance, towards, .. } = sky.sun() else { panic!("{:?}", sky.sun()) };
             let of_sun = irradiance * towards.dot(up.vector());
             assert_near(made.ground, sky.ground_albedo * (made.sky + of_sun), 0.01);
@@ -194,13 +206,13 @@ mod tests {
         scene.lights = vec![scene::Light::Sphere { position: Vec3::ZERO, radius: 0.5, radiance: Vec3::splat(3.0) }];
         let flat = FlatScene::new(&scene).unwrap();
         let walls = 2.0 * (2.0 * 3.0 + 3.0 * 4.0 + 4.0 * 2.0);
-        let made = AmbientApproximation::new(&flat, Up::Y);
+        let made = made_of(&flat, Up::Y);
         // The sphere's area is pi, and its light pi times that times its radiance.
         let mean = 2.0 * 3.0 * PI as f32 / walls;
         assert_near((made.sky + made.ground) / 2.0, Vec3::splat(mean), 1e-3);
         assert!(made.background.is_none() && made.sky.x > made.ground.x);
         // A material that shines on both sides adds to it.
         scene.materials[0].ke = Vec3::ONE;
-        assert!(AmbientApproximation::new(&FlatScene::new(&scene).unwrap(), Up::Y).sky.x > made.sky.x);
+        assert!(made_of(&FlatScene::new(&scene).unwrap(), Up::Y).sky.x > made.sky.x);
     }
 }

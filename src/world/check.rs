@@ -5,7 +5,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{FlatScene, Instances, Mismatch, Textures, mips};
+use super::{FlatScene, Instances, Mismatch, Textures, flat::bounds_of, mips};
 use crate::{
     frame::Integrator,
     layout::{
@@ -191,12 +191,6 @@ fn texture_fault(texture: &Texture, texels: &[u32], has_second_set: bool) -> Opt
 fn indices_of(maps: &MaterialMaps) -> [u32; N_MAPS as usize] {
     let words: [u32; size_of::<MaterialMaps>() / 4] = bytemuck::cast(*maps);
     *words.first_chunk().expect("the maps come first")
-}
-
-/// Returns the least and the greatest coordinates of triangles.
-fn bounds_of(triangles: &[Triangle]) -> (Vec3, Vec3) {
-    let corners = triangles.iter().flat_map(|t| [t.v0, t.v1, t.v2]);
-    corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)))
 }
 
 fn check_len(array: &str, len: usize, (expected, of): (usize, &str)) -> Result<(), Mismatch> {

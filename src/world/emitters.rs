@@ -64,9 +64,9 @@ struct Weighed {
 }
 
 impl Emitters {
-    /// Makes the tables of a scene on the current rayon pool.
-    pub(super) fn new(scene: &FlatScene) -> Self {
-        let disk = bounding_disk(scene);
+    /// Makes the tables of a scene on the current rayon pool. `bounds`: those of its triangles.
+    pub(super) fn new(scene: &FlatScene, bounds: (Vec3, Vec3)) -> Self {
+        let disk = bounding_disk(bounds);
         let ground = scene.ground.unwrap_or(Ground { ambient: scene.ambient, up: Up::Y });
         // Directions are sampled as if the brighter half of the ambient light came from everywhere.
         let ambient = scene.ambient.max(ground.ambient);
@@ -255,8 +255,7 @@ pub(super) fn luminance(colour: Vec3) -> f64 {
 }
 
 /// Returns the area of the disk that the scene's bounding sphere covers, square world units.
-fn bounding_disk(scene: &FlatScene) -> f64 {
-    let (min, max) = scene.bounds();
+fn bounding_disk((min, max): (Vec3, Vec3)) -> f64 {
     let squared = (max - min).as_dvec3().length_squared() / 4.0;
     if squared.is_finite() && squared > 0.0 { PI * squared } else { PI }
 }

@@ -20,7 +20,7 @@ use crate::{
     },
     scene::{
         self, Alpha, Camera, Conductor, Environment, Ground, Lobes, Mesh, Microfacet, RayKinds, RenderDefaults, Scene,
-        Sky, Transform, mesh::box_corners,
+        Sky, Transform,
     },
     util::Shared,
 };
@@ -183,7 +183,7 @@ impl FlatScene {
 
     /// The number of triangles in the world.
     pub fn n_triangles(&self) -> usize {
-        self.instances.as_ref().map_or(self.triangles.len(), Instances::n_triangles)
+        self.instances.as_ref().map_or_else(|| self.triangles.len(), Instances::n_triangles)
     }
 
     /// Returns where a triangle of the world is stored.
@@ -280,17 +280,16 @@ impl FlatScene {
     /// Returns the smallest and the largest coordinates of all triangles, world units; with instances, those of boxes
     /// around them. Without triangles these are infinity and minus infinity.
     pub fn bounds(&self) -> (Vec3, Vec3) {
-        let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-        let joined = |(min, max): (Vec3, Vec3), p: Vec3| (min.min(p), max.max(p));
-        let of = |triangles: &[Triangle]| triangles.iter().flat_map(|t| [t.v0, t.v1, t.v2]).fold(none, joined);
-        let Some(instances) = &self.instances else { return of(&self.triangles) };
-        let boxes: Vec<_> = instances.ranges.par_iter().map(|range| of(range.of(&self.triangles))).collect();
-        let corners = instances.list.iter().filter(|it| it.n_triangles > 0).flat_map(|instance| {
-            let (min, max) = boxes[instance.geometry_ix as usize];
-            box_corners(min, max).map(|p| instance.point(p))
-        });
-        corners.fold(none, joined)
+        let Some(instances) = &self.instances else { return bounds_of(&self.triangles) };
+        let boxes: Vec<_> = instances.ranges.par_iter().map(|range| bounds_of(range.of(&self.triangles))).collect();
+        instances.bounds(&boxes)
     }
+}
+
+/// Returns the least and the greatest coordinates of triangles.
+pub(super) fn bounds_of(triangles: &[Triangle]) -> (Vec3, Vec3) {
+    let corners = triangles.iter().flat_map(|t| [t.v0, t.v1, t.v2]);
+    corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)))
 }
 
 /// The triangles that are stored, and the word of each that leads to its material.

@@ -19,7 +19,10 @@ use crate::{
         NO_TRIANGLE, SUSPENDED, Triangle,
         normal::{decode_octahedral, encode_octahedral},
     },
-    scene::{Mesh, RayKinds, Scene, Transform, mesh::MAX_COORDINATE},
+    scene::{
+        Mesh, RayKinds, Scene, Transform,
+        mesh::{MAX_COORDINATE, box_corners},
+    },
 };
 
 /// Whether meshes that occur several times are stored once.
@@ -290,6 +293,15 @@ impl Instances {
     /// The number of triangles of all instances.
     pub fn n_triangles(&self) -> usize {
         self.list.last().map_or(0, |last| last.first_triangle as usize + last.n_triangles as usize)
+    }
+
+    /// Returns the least and the greatest corner of a box around all instances. `boxes`: those of the geometries.
+    pub(super) fn bounds(&self, boxes: &[(Vec3, Vec3)]) -> (Vec3, Vec3) {
+        let corners = self.list.iter().filter(|it| it.n_triangles > 0).flat_map(|instance| {
+            let (min, max) = boxes[instance.geometry_ix as usize];
+            box_corners(min, max).map(|p| instance.point(p))
+        });
+        corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)))
     }
 
     /// Returns the materials of an instance's slots.

@@ -33,6 +33,8 @@ use std::sync::{Arc, OnceLock};
 use glam::Vec3;
 
 use self::ambient_approximation::AmbientApproximation;
+#[doc(hidden)]
+pub use self::posed::Poses;
 #[cfg(test)]
 pub(crate) use self::texture_arrays::tests::{arrays_of, scene_of};
 pub use self::{
@@ -72,6 +74,7 @@ struct Parts {
     scene: FlatScene,
     accel: Accel,
     accel_options: AccelOptions,
+    poses: Poses,
     /// The tables from which lights are sampled. Like the next two fields, they are made when they are first needed.
     emitters: OnceLock<Arc<Emitters>>,
     /// The wide hierarchy. There is none if the structure is a grid.
@@ -143,8 +146,8 @@ impl World {
 
     /// Makes a world of parts that fit together.
     fn of_parts(scene: FlatScene, accel: Accel, accel_options: AccelOptions) -> Self {
-        let (emitters, wide_bvh, ambient_approximations) = Default::default();
-        Self(Arc::new(Parts { scene, accel, accel_options, emitters, wide_bvh, ambient_approximations }))
+        let (poses, emitters, wide_bvh, ambient_approximations) = Default::default();
+        Self(Arc::new(Parts { scene, accel, accel_options, poses, emitters, wide_bvh, ambient_approximations }))
     }
 
     /// The flattened scene.
@@ -154,7 +157,8 @@ impl World {
 
     /// The tables from which the path tracer samples lights. They are made at the first call.
     pub fn emitters(&self) -> &Emitters {
-        let made: &Arc<Emitters> = made_once(&self.0.emitters, || Arc::new(Emitters::new(&self.0.scene)));
+        let made: &Arc<Emitters> =
+            made_once(&self.0.emitters, || Arc::new(Emitters::new(&self.0.scene, self.exact_bounds())));
         made
     }
 
@@ -169,7 +173,7 @@ impl World {
     /// The ambient light that stands for light of which only paths know. It is made at the first call.
     fn ambient_approximation(&self, up: Up) -> AmbientApproximation {
         *made_once(&self.0.ambient_approximations[usize::from(up == Up::Z)], || {
-            AmbientApproximation::new(&self.0.scene, up)
+            AmbientApproximation::new(&self.0.scene, || self.exact_bounds(), up)
         })
     }
 

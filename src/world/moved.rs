@@ -105,8 +105,8 @@ impl World {
         scene.instances = Some(instances);
         let emitters = if keeps_emitters { self.0.emitters.clone() } else { OnceLock::new() };
         let (wide_bvh, ambient_approximations) = Default::default();
-        let accel_options = self.accel_options().clone();
-        Self(Arc::new(Parts { scene, accel, accel_options, emitters, wide_bvh, ambient_approximations }))
+        let (accel_options, poses) = (self.accel_options().clone(), self.0.poses.clone());
+        Self(Arc::new(Parts { scene, accel, accel_options, poses, emitters, wide_bvh, ambient_approximations }))
     }
 
     /// Returns whether both worlds differ in their instances at most: one was made of the other by
@@ -118,7 +118,7 @@ impl World {
 }
 
 /// Puts an instance in another place. `at`: an instance of its transform. `bounds`: those of its geometry.
-fn place(instance: &mut Instance, at: Option<Instance>, [min, max]: [Vec3; 2]) -> Result<(), String> {
+pub(super) fn place(instance: &mut Instance, at: Option<Instance>, [min, max]: [Vec3; 2]) -> Result<(), String> {
     let at = at.ok_or("its transform magnifies rounding too much")?;
     let is_near = |p: Vec3| p.is_finite() && p.abs().max_element() <= MAX_COORDINATE;
     if instance.n_triangles > 0 && !box_corners(min, max).into_iter().all(|p| is_near(at.point(p))) {

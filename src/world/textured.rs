@@ -17,23 +17,23 @@ use crate::{
         MAPS_COLOUR_HAS_OPACITY, MAPS_CORNERS_HAVE_OPACITY, MAPS_SHADOW_TEST, MaterialMaps, NO_TEXTURE, Texture,
     },
     scene::{Alpha, Material, Scene},
-    util::memory,
+    util::{Shared, memory},
 };
 
 /// Everything that textures need. All of it is empty if the scene has neither textures nor colours at corners.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Textures {
     /// The linear values of the 256 bytes of sRGB, as bits, and the mip levels of the images.
-    pub texels: Vec<u32>,
+    pub texels: Shared<Vec<u32>>,
     /// The textures, to which the maps refer by index.
     pub textures: Vec<Texture>,
     /// For each material, its textures.
     pub material_maps: Vec<MaterialMaps>,
     /// Texture coordinates of the triangles' corners. Those of the second set, if a texture uses it, follow those of
     /// the first set. Empty if there is no texture.
-    pub uvs: Vec<[Vec2; 3]>,
+    pub uvs: Shared<Vec<[Vec2; 3]>>,
     /// Tangents and colours of the triangles' corners. Empty if there are neither.
-    pub corners: Vec<[CornerSurface; 3]>,
+    pub corners: Shared<Vec<[CornerSurface; 3]>>,
     /// The number of stored triangles.
     pub n_triangles: usize,
 }
@@ -69,11 +69,11 @@ impl Textures {
         memory::require("texture coordinates, tangents and colours", n_bytes)
             .map_err(|error| Mismatch::Textures(error.to_string()))?;
         Ok(Self {
-            texels,
+            texels: texels.into(),
             textures,
             material_maps,
-            uvs: uvs(placed, n_sets),
-            corners: if has_corners { corner_surfaces(placed) } else { Vec::new() },
+            uvs: uvs(placed, n_sets).into(),
+            corners: if has_corners { corner_surfaces(placed) } else { Vec::new() }.into(),
             n_triangles: n_triangles_of(placed),
         })
     }

@@ -61,7 +61,7 @@ fn deform(mesh: &mut Mesh, moment: u64) {
 }
 
 /// Returns the world whose trees devices build.
-fn lazy(scene: &Scene) -> World {
+pub(super) fn lazy(scene: &Scene) -> World {
     let flat = FlatScene::with_instances(scene).expect("a scene that fits together");
     World::with_accel(flat, &AccelOptions::LazyTree(BuildOptions::default())).expect("a world")
 }
@@ -73,6 +73,7 @@ fn next_moment(scene: &mut Scene, world: &World, moment: u64) -> World {
     deformed.iter().for_each(|mesh_ix| deform(&mut scene.meshes[*mesh_ix], moment));
     let place = vec3(2.0, -1.8, moment as f32 * 0.3).as_dvec3();
     scene.instances[5].transform = transform(DVec3::ONE, 0.2 * moment as f64, place);
+    let deformed = deformed.into_iter().map(|mesh_ix| (mesh_ix, None)).collect();
     world.posed(scene, &deformed).expect("a scene that fits together").expect("a pose")
 }
 
@@ -97,7 +98,7 @@ fn closest(caster: &mut GpuCaster, rays: &[Ray]) -> Vec<Hit> {
 }
 
 /// Checks that all queries have the same results in both.
-fn check_queries(name: &str, expected: &mut GpuCaster, found: &mut GpuCaster) {
+pub(super) fn check_queries(name: &str, expected: &mut GpuCaster, found: &mut GpuCaster) {
     let (rays, points) = (rays(1000), points(300));
     let hits = closest(expected, &rays);
     assert!(hits.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count() > 100, "{name}");
@@ -166,17 +167,17 @@ fn queries_in_a_film_are_those_in_new_worlds() {
     assert_silent(&context);
 }
 
-fn options(integrator: Integrator) -> RenderOptions {
+pub(super) fn options(integrator: Integrator) -> RenderOptions {
     let (primary, denoise) = (Primary::Trace, Denoise::Off);
     let size = RenderOptions { width: 60, height: 44, max_depth: 3, ..RenderOptions::default() };
     RenderOptions { integrator, primary, denoise, ..size }
 }
 
-fn drawn(renderer: &mut GpuRenderer) -> Picture {
+pub(super) fn drawn(renderer: &mut GpuRenderer) -> Picture {
     renderer.render().expect("a picture").0
 }
 
-fn renderer(context: &Arc<Context>, world: &World, integrator: Integrator) -> GpuRenderer {
+pub(super) fn renderer(context: &Arc<Context>, world: &World, integrator: Integrator) -> GpuRenderer {
     GpuRenderer::new(context.clone(), world, &options(integrator)).expect("a renderer")
 }
 
@@ -270,7 +271,7 @@ fn a_tree_without_room_uploads_everything() {
     let nodes = film.resources().accel.arrays.kd_nodes.clone();
     // A point becomes a ball.
     scene.meshes[LARGE].positions = positions;
-    let grown = world.posed(&scene, &[LARGE]).expect("a scene that fits together").expect("a pose");
+    let grown = world.posed(&scene, &[(LARGE, None)].into()).expect("a scene that fits together").expect("a pose");
     film.set_world(&grown).expect("a change");
     caster.set_world(&grown).expect("a change");
     assert!(film.resources().accel.arrays.kd_nodes.len() > nodes.len(), "more room");

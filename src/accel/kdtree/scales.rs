@@ -65,10 +65,15 @@ pub struct Scales {
 impl Scales {
     /// Chooses the scales for triangles with these bounds. They do not depend on the number of threads.
     pub fn new(triangles: &[Triangle], bounds: &Bounds) -> Self {
+        Self::of_each(triangles.len(), |ix| triangles[ix], bounds)
+    }
+
+    /// Does what [`Scales::new`] does, for `n` triangles that a function returns.
+    pub fn of_each(n: usize, triangle: impl Fn(usize) -> Triangle + Sync + Send, bounds: &Bounds) -> Self {
         let (largest, margin) = (bounds.largest_coordinate(), bounds.margin());
         let all = Self { largest, margin, finest: MAX_SCALE };
         let is_in_range = (LIMITS[0]..=LIMITS[1]).contains(&largest);
-        let finest = if is_in_range { all.finest_needed(triangles) } else { 0 };
+        let finest = if is_in_range { all.finest_needed(n, triangle) } else { 0 };
         Self { finest, ..all }
     }
 
@@ -79,13 +84,15 @@ impl Scales {
     }
 
     /// Returns the finest scale that `NEEDY_SHARE` of the triangles need.
-    fn finest_needed(&self, triangles: &[Triangle]) -> u32 {
+    fn finest_needed(&self, n: usize, triangle: impl Fn(usize) -> Triangle + Sync + Send) -> u32 {
         type Counts = [usize; MAX_SCALE as usize + 1];
-        let counted = triangles.par_chunks(1 << 14).map(|chunk| {
-            let mut counts: Counts = [0; _];
-            chunk.iter().for_each(|triangle| counts[self.needed_by(triangle) as usize] += 1);
-            counts
-        });
+        let counted = (0..n).into_par_iter().fold(
+            || -> Counts { [0; _] },
+            |mut counts, ix| {
+                counts[self.needed_by(&triangle(ix)) as usize] += 1;
+                counts
+            },
+        );
         let sum = |mut a: Counts, b: Counts| {
             a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
             a
@@ -94,7 +101,7 @@ impl Scales {
         let mut n_needy = 0;
         for scale in (1..=MAX_SCALE).rev() {
             n_needy += counts[scale as usize];
-            if n_needy * NEEDY_SHARE >= triangles.len() {
+            if n_needy * NEEDY_SHARE >= n {
                 return scale;
             }
         }

@@ -271,6 +271,15 @@ impl KdTreeBuilder {
         })
     }
 
+    /// Submits commands that write the first triangles. They come after all commands that were submitted before, and
+    /// before all later ones.
+    ///
+    /// # Errors
+    /// Out of memory; a Vulkan call fails.
+    pub fn fill(&self, record: impl FnOnce(&Commands)) -> Result<(), GpuError> {
+        self.submit("kdtree_fill", record)
+    }
+
     /// Builds the tree and waits for the device. `timer`: takes the times of the dispatches, which are then all in one
     /// command buffer; it must have room for [`KdTreeBuilder::n_stages`] rows.
     ///

@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::near::NearPart;
-use crate::scene::model::{Camera, Instance, Mesh, Projection, Scene};
+use crate::scene::model::{Camera, Instance, Projection, Scene, mesh::corners_of};
 
 /// Vertical field of view unless the user states one, degrees.
 pub(crate) const VERTICAL_FOV_DEGREES: f32 = 40.0;
@@ -120,7 +120,8 @@ fn usual(bounds: &BoundingBox, frame: &Frame) -> (Direction, View) {
 pub(super) fn support(scene: &Scene, near: &NearPart, from: DVec3, directions: [DVec3; 4]) -> [f64; 4] {
     const NOTHING: [f64; 4] = [f64::NEG_INFINITY; 4];
     let most = |a: [f64; 4], b: [f64; 4]| std::array::from_fn(|ix| a[ix].max(b[ix]));
-    let corners: Vec<Vec<Vec3>> = scene.meshes.par_iter().map(Mesh::corners).collect();
+    let corners: Vec<Vec<Vec3>> =
+        scene.meshes.par_iter().map(|mesh| corners_of(&mesh.faces, &mesh.positions)).collect();
     let of_instance = |Instance { mesh_ix, transform, .. }: &Instance| {
         let object = directions.map(|direction| transform.height_in_object_space(direction, from));
         let of_corner = |p: &Vec3| object.map(|(direction, constant)| direction.dot(p.as_dvec3()) + constant);

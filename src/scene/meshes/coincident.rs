@@ -235,14 +235,20 @@ impl CoincidentTriangles {
     }
 }
 
+fn part_of<'a>(mesh: &'a Mesh, positions: &'a [Vec3]) -> Part<'a> {
+    let (points, corners) = (bytemuck::cast_slice(positions), mesh.faces.as_flattened());
+    Part { points, corners, arities: &[], looks: Looks::Mesh(mesh) }
+}
+
+/// Whether triangles of a mesh are there several times and look different. `positions`: in place of the mesh's.
+pub(crate) fn has_several(mesh: &Mesh, positions: &[Vec3]) -> bool {
+    let found = Coincident::of(&[part_of(mesh, positions)]);
+    !(found.two_sided.is_empty() && found.repeated.is_empty())
+}
+
 /// Separates the triangles of a mesh that are there several times and look different.
 pub(crate) fn separate(mesh: &mut Mesh) {
-    let part = Part {
-        points: bytemuck::cast_slice(&mesh.positions),
-        corners: mesh.faces.as_flattened(),
-        arities: &[],
-        looks: Looks::Mesh(mesh),
-    };
+    let part = part_of(mesh, &mesh.positions);
     let mut found = CoincidentTriangles::new(Coincident::of(std::slice::from_ref(&part)));
     found.add((0, &part), 0, || (0..mesh.faces.len()).map(|ix| 3 * ix).collect());
     found.separate(mesh);

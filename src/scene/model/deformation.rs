@@ -1,12 +1,14 @@
 //! Meshes that morph targets and joints deform. Twin of `glsl/passes/deform_vertices.comp`, which computes the same in
 //! the same order and has the same bits.
 
+use std::{collections::BTreeMap, sync::Arc};
+
 use glam::{DMat4, DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::Mesh;
 use crate::layout::{
-    FLAT_NORMAL,
+    FLAT_NORMAL, Triangle,
     normal::{decode_exactly, encode_exactly, scale_to_one},
 };
 
@@ -59,6 +61,76 @@ pub struct Pose {
     pub weights: Vec<f32>,
     /// Transforms of the joints.
     pub joints: Vec<JointMatrix>,
+}
+
+/// A mesh in a pose. Its arrays are made where somebody needs them; devices make their own of the pose.
+#[derive(Clone, Debug)]
+pub struct PosedMesh {
+    deformation: Arc<Deformation>,
+    faces: Arc<[[u32; 3]]>,
+    pose: Pose,
+    positions: Vec<Vec3>,
+}
+
+/// The indices of meshes that are deformed. A mesh with a pose differs from its earlier state in its positions, normals
+/// and tangents only, which are those of the pose; its own arrays are still the earlier ones.
+pub type ChangedMeshes = BTreeMap<usize, Option<Arc<PosedMesh>>>;
+
+impl PosedMesh {
+    /// Computes the positions on the current rayon pool.
+    ///
+    /// # Panics
+    /// The pose lacks a joint, a vertex lacks influences, or a face names a vertex that there is not.
+    pub fn new(deformation: Arc<Deformation>, faces: Arc<[[u32; 3]]>, pose: Pose) -> Self {
+        let n = deformation.positions.len();
+        assert!(faces.as_flattened().par_iter().all(|ix| (*ix as usize) < n), "the vertices of all faces");
+        let positions = deformation.positions_at(&pose);
+        Self { deformation, faces, pose, positions }
+    }
+
+    /// What deforms the mesh.
+    pub fn deformation(&self) -> &Arc<Deformation> {
+        &self.deformation
+    }
+
+    /// The vertices of each face.
+    pub fn faces(&self) -> &Arc<[[u32; 3]]> {
+        &self.faces
+    }
+
+    /// The moment.
+    pub fn pose(&self) -> &Pose {
+        &self.pose
+    }
+
+    /// The position of each vertex, object space.
+    pub fn positions(&self) -> &[Vec3] {
+        &self.positions
+    }
+
+    /// Returns the positions of a face's corners.
+    pub fn corners(&self, face_ix: usize) -> [Vec3; 3] {
+        self.faces[face_ix].map(|ix| self.positions[ix as usize])
+    }
+
+    /// Returns all vertices.
+    pub fn vertices(&self) -> Vec<Vertex> {
+        self.deformation.vertices(&self.pose)
+    }
+
+    /// Gives a mesh that has these faces the positions, normals and tangents of the pose.
+    pub fn deform(&self, mesh: &mut Mesh) {
+        self.deformation.deform(&self.pose, mesh);
+    }
+}
+
+/// Returns the triangle of a face, and the codes of the tangents at its corners. Twin of
+/// `glsl/passes/deform_triangles.comp`.
+pub fn triangle_of(face: &[u32; 3], vertices: &[Vertex]) -> (Triangle, [u32; 3]) {
+    let [a, b, c] = face.map(|ix| vertices[ix as usize]);
+    let triangle =
+        Triangle { v0: a.position, n0: a.normal, v1: b.position, n1: b.normal, v2: c.position, n2: c.normal };
+    (triangle, [a.tangent, b.tangent, c.tangent])
 }
 
 impl Pose {
@@ -160,6 +232,22 @@ impl Deformation {
         Vertex { position: moved.position, normal: encode_exactly(moved.normal), tangent }
     }
 
+    /// Returns all vertices in a pose.
+    ///
+    /// # Panics
+    /// The pose lacks a joint, or a vertex lacks influences.
+    pub fn vertices(&self, pose: &Pose) -> Vec<Vertex> {
+        (0..self.positions.len()).into_par_iter().map(|ix| self.vertex(ix, pose)).collect()
+    }
+
+    /// Returns the positions of all vertices in a pose, as [`Deformation::vertices`] does.
+    ///
+    /// # Panics
+    /// Panics as [`Deformation::vertices`] does.
+    pub fn positions_at(&self, pose: &Pose) -> Vec<Vec3> {
+        (0..self.positions.len()).into_par_iter().map(|ix| self.position(ix, pose)).collect()
+    }
+
     /// Returns the position of a vertex in a pose: that of [`Deformation::vertex`].
     ///
     /// # Panics
@@ -195,7 +283,10 @@ impl Deformation {
             let weight = pose.weight(delta.target);
             if weight != 0.0 {
                 moved.position += weight * delta.position;
-                moved.normal += weight * delta.normal;
+                // A mesh without normals is flat in all poses.
+                if !self.normals.is_empty() {
+                    moved.normal += weight * delta.normal;
+                }
                 moved.tangent += (weight * delta.tangent).extend(0.0);
             }
         }
@@ -252,7 +343,7 @@ impl Deformation {
     /// # Panics
     /// The pose lacks a joint, or a face names a vertex that there is not.
     pub fn deform(&self, pose: &Pose, mesh: &mut Mesh) {
-        let vertices: Vec<Vertex> = (0..self.positions.len()).into_par_iter().map(|ix| self.vertex(ix, pose)).collect();
+        let vertices = self.vertices(pose);
         mesh.positions = vertices.par_iter().map(|vertex| vertex.position).collect();
         let faces = &mesh.faces;
         mesh.normals = match self.normals.is_empty() {

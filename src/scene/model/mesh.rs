@@ -112,16 +112,6 @@ impl Mesh {
         n_faces - self.faces.len()
     }
 
-    /// Returns the positions at which triangles have corners, each once.
-    ///
-    /// # Panics
-    /// An index is out of range.
-    pub(crate) fn corners(&self) -> Vec<Vec3> {
-        let mut is_corner = vec![false; self.positions.len()];
-        self.faces.as_flattened().iter().for_each(|ix| is_corner[*ix as usize] = true);
-        self.positions.iter().zip(is_corner).filter(|(_, is_corner)| *is_corner).map(|(p, _)| *p).collect()
-    }
-
     /// Returns the least and the greatest coordinates of all positions, object space.
     pub(crate) fn bounds(&self) -> (Vec3, Vec3) {
         bounds_of(self.positions.par_iter().copied())
@@ -131,13 +121,8 @@ impl Mesh {
     ///
     /// # Errors
     /// Fails as [`Mesh::placed`] does.
-    pub(crate) fn check_place(&self, transform: &Transform, (min, max): (Vec3, Vec3)) -> Checked<()> {
-        // Rounding may move a position by less than the difference.
-        let is_inside = |p: Vec3| p.is_finite() && p.abs().max_element() <= 0.999 * MAX_COORDINATE;
-        if self.positions.is_empty() || box_corners(min, max).into_iter().all(|p| is_inside(transform.point(p))) {
-            return Ok(());
-        }
-        self.placed(transform).map(drop)
+    pub(crate) fn check_place(&self, transform: &Transform, bounds: (Vec3, Vec3)) -> Checked<()> {
+        check_place(&self.positions, transform, bounds)
     }
 
     /// Returns the positions in world space.
@@ -145,13 +130,37 @@ impl Mesh {
     /// # Errors
     /// A position is not finite or lies beyond [`MAX_COORDINATE`]. The error is a message for people.
     pub fn placed(&self, transform: &Transform) -> Checked<Vec<Vec3>> {
-        let world: Vec<Vec3> = self.positions.par_iter().map(|p| transform.point(*p)).collect();
-        let is_inside = |p: &Vec3| p.is_finite() && p.abs().max_element() <= MAX_COORDINATE;
-        match world.par_iter().find_first(|p| !is_inside(p)) {
-            Some(p) => Err(format!("a vertex lies at {:?} in world space: beyond {MAX_COORDINATE:e}", p.to_array())),
-            None => Ok(world),
-        }
+        placed(&self.positions, transform)
     }
+}
+
+/// Does what [`Mesh::check_place`] does, for positions.
+pub(crate) fn check_place(positions: &[Vec3], transform: &Transform, (min, max): (Vec3, Vec3)) -> Checked<()> {
+    // Rounding may move a position by less than the difference.
+    let is_inside = |p: Vec3| p.is_finite() && p.abs().max_element() <= 0.999 * MAX_COORDINATE;
+    if positions.is_empty() || box_corners(min, max).into_iter().all(|p| is_inside(transform.point(p))) {
+        return Ok(());
+    }
+    placed(positions, transform).map(drop)
+}
+
+fn placed(positions: &[Vec3], transform: &Transform) -> Checked<Vec<Vec3>> {
+    let world: Vec<Vec3> = positions.par_iter().map(|p| transform.point(*p)).collect();
+    let is_inside = |p: &Vec3| p.is_finite() && p.abs().max_element() <= MAX_COORDINATE;
+    match world.par_iter().find_first(|p| !is_inside(p)) {
+        Some(p) => Err(format!("a vertex lies at {:?} in world space: beyond {MAX_COORDINATE:e}", p.to_array())),
+        None => Ok(world),
+    }
+}
+
+/// Returns the positions at which faces have corners, each once.
+///
+/// # Panics
+/// An index is out of range.
+pub(crate) fn corners_of(faces: &[[u32; 3]], positions: &[Vec3]) -> Vec<Vec3> {
+    let mut is_corner = vec![false; positions.len()];
+    faces.as_flattened().iter().for_each(|ix| is_corner[*ix as usize] = true);
+    positions.iter().zip(is_corner).filter(|(_, is_corner)| *is_corner).map(|(p, _)| *p).collect()
 }
 
 /// Keeps the items of a list that is empty or has one for each face.

@@ -1,13 +1,13 @@
 //! A scene: everything that a frame shows.
 
-use std::path::Path;
+use std::{collections::BTreeMap, path::Path, sync::Arc};
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{
     AnimationInfo, Camera, ChosenLight, Environment, Ground, Image, Light, Material, Mesh, Projection, RenderDefaults,
-    Sky, Transform,
+    Sky, Transform, deformation::PosedMesh, mesh::corners_of,
 };
 
 /// Name of the material of meshes and faces that name none.
@@ -163,8 +163,17 @@ impl Scene {
 
     /// Returns the bounds of some instances.
     pub(crate) fn bounds_of(&self, instances: &[Instance]) -> (Vec3, Vec3) {
+        self.posed_bounds(instances, &BTreeMap::new())
+    }
+
+    /// Returns the bounds of some instances of meshes, some of which have poses.
+    pub(crate) fn posed_bounds(&self, instances: &[Instance], poses: &BTreeMap<usize, Arc<PosedMesh>>) -> (Vec3, Vec3) {
         // Instances share the list of their mesh's corners, in which each point is once.
-        let corners: Vec<Vec<Vec3>> = self.meshes.par_iter().map(Mesh::corners).collect();
+        let corners = |(ix, mesh): (usize, &Mesh)| match poses.get(&ix) {
+            Some(posed) => corners_of(posed.faces(), posed.positions()),
+            None => corners_of(&mesh.faces, &mesh.positions),
+        };
+        let corners: Vec<Vec<Vec3>> = self.meshes.par_iter().enumerate().map(corners).collect();
         let none = || (Vec3::INFINITY, Vec3::NEG_INFINITY);
         let joined = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
         let of_instance = |Instance { mesh_ix, transform, .. }: &Instance| {

@@ -1,5 +1,7 @@
 //! Cameras of a scene's nodes.
 
+use std::cell::OnceCell;
+
 use glam::{DMat4, DVec3, Vec3};
 use gltf::json::{self, camera::Type, validation::Checked::Valid};
 
@@ -15,14 +17,16 @@ use crate::scene::model::{
     mesh::MAX_COORDINATE,
 };
 
-/// Returns the cameras of a scene's nodes with their names. Each looks at the middle of `bounds`, the scene's, or at a
-/// point as far away. `origin` is the point of the file that is the origin of world space.
+/// Returns the cameras of a scene's nodes with their names. Each looks at the middle of the scene, whose bounds are
+/// those that a function returns, or at a point as far away. `origin` is the point of the file that is the origin of
+/// world space.
 pub(super) fn cameras(
     document: &Document,
     nodes: &Nodes,
-    (bounds, origin): ((Vec3, Vec3), DVec3),
+    (bounds, origin): (impl Fn() -> (Vec3, Vec3), DVec3),
 ) -> Vec<(String, Camera)> {
     let mut cameras = Vec::new();
+    let known_bounds = OnceCell::new();
     for &ix in &nodes.shown {
         let node = &document.root.nodes[ix];
         let Some(index) = node.camera else { continue };
@@ -30,9 +34,9 @@ pub(super) fn cameras(
         let Some(json) = document.or_left_out(json) else { continue };
         let name = node.name.clone().or_else(|| json.name.clone());
         let name = name.unwrap_or_else(|| format!("camera {}", cameras.len() + 1));
-        let view = nodes
-            .world_from_node(ix)
-            .and_then(|world_from_node| View::new(DMat4::from_translation(-origin) * world_from_node, bounds));
+        let view = nodes.world_from_node(ix).and_then(|world_from_node| {
+            View::new(DMat4::from_translation(-origin) * world_from_node, *known_bounds.get_or_init(&bounds))
+        });
         let Some(view) = view else {
             document.note("cameras whose nodes flatten them or lie too far away, which are left out", name);
             continue;

@@ -105,7 +105,7 @@ pub(super) fn mesh(document: &Document, part: &Part, reading: Reading, n_read: &
         mesh.colours = corners(&faces, &found).unwrap_or_default();
     }
     mesh.faces = faces;
-    Ok(Some(Rest { mesh, deformation, is_skinned, ..Rest::default() }))
+    Ok(Some(Rest { mesh, deformation: deformation.into(), is_skinned, ..Rest::default() }))
 }
 
 /// The attributes of a primitive.

@@ -33,6 +33,7 @@ use std::{path::Path, sync::Arc};
 use glam::{DVec3, Vec3};
 use gltf::json::{Node, mesh::Primitive};
 use hashbrown::{HashMap, HashSet};
+use rayon::prelude::*;
 
 use self::{
     deform::{Skin, Weights},
@@ -41,20 +42,21 @@ use self::{
     instancing::Places,
     materials::Materials,
     nodes::Nodes,
-    rest::{ReadMesh, ReadMeshes, RestKey, posed},
+    rest::{Posed, ReadMesh, ReadMeshes, RestKey, posed},
 };
 pub(crate) use self::{document::named_files, poser::Poser};
 use super::image::MAX_PIXELS;
 use crate::{
     scene::{
         files::outside::Access,
-        meshes::coincident,
         model::{
             AnimationChoice, AnimationInfo, Camera, Instance, Light, LoadOptions, MaterialChoice, Mesh, Scene,
             SceneError, Transform, Up,
+            deformation::PosedMesh,
             error::Checked,
             extent,
             lacks::{Lacks, SAMPLES},
+            mesh::{bounds_of, check_place},
         },
     },
     util::{
@@ -78,7 +80,7 @@ pub(crate) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result
     extent::check(path, bounds)?;
     scene.lights = lights::lights(&document, &nodes, scene.origin);
     scene.animations = animation::infos(&document);
-    scene.cameras = cameras::cameras(&document, &nodes, (bounds, scene.origin));
+    scene.cameras = cameras::cameras(&document, &nodes, (|| bounds, scene.origin));
     let first = camera_that_sees(path, &scene, (bounds, options));
     let lacks_camera = first.is_none();
     scene.camera = first.unwrap_or(scene.camera);
@@ -187,6 +189,14 @@ struct Known {
     origin: DVec3,
 }
 
+/// A mesh in a pose, and what was read of it.
+#[derive(Clone)]
+struct LoadedPose {
+    posed: Arc<PosedMesh>,
+    key: RestKey,
+    read: Arc<ReadMesh>,
+}
+
 /// Loads the meshes of a scene's nodes.
 struct Loader<'a> {
     document: &'a Document,
@@ -198,6 +208,8 @@ struct Loader<'a> {
     has_materials: bool,
     materials: Materials<'a>,
     meshes: Vec<Mesh>,
+    /// What the arrays of some meshes are made of, by the indices of the meshes, which are empty here.
+    poses: HashMap<usize, LoadedPose>,
     /// `None` for meshes without triangles.
     known: HashMap<MeshKey, Option<Known>>,
     /// The meshes that have been read, if more poses follow.
@@ -214,8 +226,9 @@ impl<'a> Loader<'a> {
     ) -> Self {
         let has_materials = replaced.is_some();
         let materials = Materials::new(document, replaced.unwrap_or_default());
-        let (meshes, known, n_read) = (Vec::new(), HashMap::new(), before.n_triangles);
-        Self { document, nodes, before, n_read, has_materials, materials, meshes, known, read: None }
+        let n_read = before.n_triangles;
+        let (meshes, poses, known, read) = Default::default();
+        Self { document, nodes, before, n_read, has_materials, materials, meshes, poses, known, read }
     }
 
     fn load(mut self, path: &Path) -> Checked<Scene> {
@@ -234,15 +247,18 @@ impl<'a> Loader<'a> {
         let meter = self.document.progress.begin(Work::Reading, self.n_primitives());
         for &ix in &self.nodes.shown {
             let Some(instance) = self.instance(ix, &meter)? else { continue };
-            let mesh = &self.meshes[instance.mesh_ix];
+            let positions = match self.poses.get(&instance.mesh_ix) {
+                Some(it) => it.posed.positions(),
+                None => &self.meshes[instance.mesh_ix].positions,
+            };
             let places = self.document.or_left_out(instancing::places(self.document, ix)).flatten();
             let transforms = match &places {
                 Some(places) => self.instanced(ix, places),
                 None => vec![instance.transform.clone()],
             };
-            let bounds = mesh.bounds();
+            let bounds = bounds_of(positions.par_iter().copied());
             for transform in transforms {
-                let placed = mesh.check_place(&transform, bounds).map_err(|what| format!("nodes[{ix}]: {what}"));
+                let placed = check_place(positions, &transform, bounds).map_err(|what| format!("nodes[{ix}]: {what}"));
                 if self.document.or_left_out(placed).is_some() {
                     instances.push(Instance { transform, ..instance.clone() });
                 }
@@ -334,8 +350,13 @@ impl<'a> Loader<'a> {
             return Ok(None);
         }
         let (is_skinned, materials) = (read.rest.is_skinned, read.materials.clone());
-        let (mut mesh, origin) = posed(read, (weights, skin.as_ref()));
-        coincident::separate(&mut mesh);
+        let (mut mesh, origin) = match posed(read.clone(), (weights, skin.as_ref())) {
+            Posed::Mesh(mesh, origin) => (mesh, origin),
+            Posed::Pose(posed, origin) => {
+                self.poses.insert(self.meshes.len(), LoadedPose { posed: posed.into(), key, read });
+                (Mesh::default(), origin)
+            }
+        };
         mesh.name = document.root.meshes[mesh_ix].name.clone().unwrap_or_default();
         self.meshes.push(mesh);
         Ok(Some(Known { mesh_ix: self.meshes.len() - 1, materials, is_skinned, origin }))
@@ -355,7 +376,7 @@ impl<'a> Loader<'a> {
             Some(Some(Some(read))) => return Ok(read),
             Some(None) if !self.document.morph_targets.change_surfaces(mesh_ix) => {
                 let n_notes = self.document.n_notes();
-                let read = Arc::new(self.read_parts(mesh_ix, reading(true), meter)?);
+                let read = Arc::new(self.read_parts(mesh_ix, reading(true), meter)?.with_poses());
                 // What is left out may depend on the weights: targets of weight 0 are not asked for.
                 let serves_all = self.document.n_notes() == n_notes && read.rest.deformation.is_deformed();
                 if let Some(known) = &mut self.read {

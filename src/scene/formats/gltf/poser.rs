@@ -1,16 +1,31 @@
 //! A glTF file whose meshes are posed at one moment after the other. The file is read once, and so are the meshes that
 //! nothing deforms, and the vertices of others at rest.
 
-use std::path::Path;
+use std::{collections::BTreeMap, path::Path, sync::Arc};
 
 use glam::DVec3;
 use hashbrown::HashMap;
 
-use super::{Document, Known, LoadedBefore, Loader, MeshKey, Nodes, cameras, lights, pointers, read, rest::ReadMeshes};
+use super::{
+    Document, Known, LoadedBefore, LoadedPose, Loader, MeshKey, Nodes, cameras, lights, pointers, read,
+    rest::{ReadMesh, ReadMeshes},
+};
 use crate::scene::{
     formats::mesh_file::{MeshFormat, read_mesh},
-    model::{AnimationChoice, Instance, LoadOptions, Mesh, Scene, SceneError},
+    model::{
+        AnimationChoice, Instance, LoadOptions, Mesh, Scene, SceneError,
+        deformation::{ChangedMeshes, PosedMesh},
+    },
 };
+
+/// The meshes of a moment that may be deformed.
+struct Deformed {
+    /// The index of the first one.
+    n_known: usize,
+    meshes: Vec<Mesh>,
+    /// What some of them are made of, by their indices.
+    poses: HashMap<usize, LoadedPose>,
+}
 
 /// A glTF file that can be posed.
 pub(crate) struct Poser {
@@ -22,6 +37,10 @@ pub(crate) struct Poser {
     rigid: HashMap<MeshKey, Option<Known>>,
     /// What has been read of the others.
     read: ReadMeshes,
+    /// The meshes of the scene of which only positions, normals and tangents change, which the host computes for nobody
+    /// else: what has been read of them, and their last poses.
+    posed: BTreeMap<usize, Arc<ReadMesh>>,
+    poses: BTreeMap<usize, Arc<PosedMesh>>,
     /// The number of the file's instances.
     n_instances: usize,
     /// Whether the scene's lights are the file's, and which of the file's cameras is the scene's.
@@ -43,9 +62,13 @@ impl Poser {
         }
         let nodes = Nodes::new(&document, options).ok()?;
         let mut loader = Loader::new(&document, &nodes, LoadedBefore::default(), None);
+        loader.read = Some(ReadMeshes::default());
         let first = loader.instances().ok()?;
-        let Loader { meshes, known, .. } = loader;
-        let n_faces = |instance: &Instance| meshes[instance.mesh_ix].faces.len();
+        let Loader { meshes, poses: loaded, known, read, .. } = loader;
+        let n_faces = |instance: &Instance| match loaded.get(&instance.mesh_ix) {
+            Some(it) => it.posed.faces().len(),
+            None => meshes[instance.mesh_ix].faces.len(),
+        };
         let is_same = |(now, before): (&Instance, &Instance)| {
             let place = before.transform.moved(-scene.origin);
             (before.transform == now.transform || place == now.transform)
@@ -56,9 +79,23 @@ impl Poser {
         let has_lights = lights::lights(&document, &nodes, scene.origin) == scene.lights;
         let camera_ix = scene.cameras.iter().position(|(_, camera)| *camera == scene.camera);
         let rigid = known.into_iter().filter(|((_, skin, _, weights), _)| skin.is_none() && weights.is_empty());
-        let (rigid, read, options) = (rigid.collect(), ReadMeshes::default(), options.clone());
-        let n_instances = first.len();
-        fits.then_some(Self { document, options, meshes, rigid, read, n_instances, has_lights, camera_ix })
+        let (rigid, options, n_instances) = (rigid.collect(), options.clone(), first.len());
+        if !fits {
+            return None;
+        }
+        let mut read = read.unwrap_or_default();
+        let (mut posed, mut poses) = (BTreeMap::new(), BTreeMap::new());
+        for (now, before) in first.iter().zip(&scene.instances) {
+            let Some(it) = loaded.get(&now.mesh_ix) else { continue };
+            // The scene may have tangents that the file lacks.
+            if posed.contains_key(&before.mesh_ix) || it.makes(&scene.meshes[before.mesh_ix]) {
+                posed.insert(before.mesh_ix, it.read.clone());
+                poses.insert(before.mesh_ix, it.posed.clone());
+            } else {
+                read.insert(it.key, Some(Arc::new(ReadMesh { faces: None, ..ReadMesh::clone(&it.read) })));
+            }
+        }
+        Some(Self { document, options, meshes, rigid, read, posed, poses, n_instances, has_lights, camera_ix })
     }
 
     /// Chooses the animations that further moments show.
@@ -66,10 +103,10 @@ impl Poser {
         self.options.animation = animation;
     }
 
-    /// Poses a scene of the file at a moment, seconds. Returns the indices of the meshes whose vertices have changed,
-    /// or `None` if the moment has other meshes or instances, and the file must be read again: such as where a node
-    /// flattens its mesh, or two nodes weigh the targets of one mesh differently.
-    pub fn pose(&mut self, seconds: f64, scene: &mut Scene) -> Result<Option<Vec<usize>>, SceneError> {
+    /// Poses a scene of the file at a moment, seconds. Returns the meshes that are deformed, or `None` if the moment
+    /// has other meshes or instances, and the file must be read again: such as where a node flattens its mesh, or two
+    /// nodes weigh the targets of one mesh differently.
+    pub fn pose(&mut self, seconds: f64, scene: &mut Scene) -> Result<Option<ChangedMeshes>, SceneError> {
         let options = LoadOptions { at: Some(seconds), ..self.options.clone() };
         let failed = |what: String| SceneError::file(Path::new(&scene.name), what);
         pointers::apply(&mut self.document, &options).map_err(failed)?;
@@ -79,24 +116,25 @@ impl Poser {
         (loader.meshes, loader.known) = (std::mem::take(&mut self.meshes), self.rigid.clone());
         loader.read = Some(std::mem::take(&mut self.read));
         let instances = loader.instances();
-        let Loader { mut meshes, read, .. } = loader;
-        let deformed = meshes.split_off(n_known);
+        let Loader { mut meshes, poses, read, .. } = loader;
+        let deformed = Deformed { n_known, meshes: meshes.split_off(n_known), poses };
         (self.meshes, self.read) = (meshes, read.unwrap_or_default());
-        let Some(changed) = instances.ok().and_then(|now| self.put(&now, (n_known, deformed), scene)) else {
+        let Some(changed) = instances.ok().and_then(|now| self.put(&now, deformed, scene)) else {
             return Ok(None);
         };
         if self.has_lights {
             scene.lights = lights::lights(&self.document, &nodes, scene.origin);
         }
-        scene.cameras = cameras::cameras(&self.document, &nodes, (scene.bounds(), scene.origin));
+        let bounds = || scene.posed_bounds(&scene.instances, &self.poses);
+        scene.cameras = cameras::cameras(&self.document, &nodes, (bounds, scene.origin));
         if let Some((_, camera)) = self.camera_ix.and_then(|ix| scene.cameras.get(ix)) {
             scene.camera = *camera;
         }
         Ok(Some(changed))
     }
 
-    /// Gives a scene the places and meshes of a moment. Of `deformed`, the first mesh has the index `n_known`.
-    fn put(&self, now: &[Instance], (n_known, deformed): (usize, Vec<Mesh>), scene: &mut Scene) -> Option<Vec<usize>> {
+    /// Gives a scene the places and meshes of a moment.
+    fn put(&mut self, now: &[Instance], deformed: Deformed, scene: &mut Scene) -> Option<ChangedMeshes> {
         if now.len() != self.n_instances {
             return None;
         }
@@ -109,11 +147,14 @@ impl Poser {
         if !now.iter().enumerate().all(is_same) {
             return None;
         }
-        let of_new = |(&scene_ix, &mesh_ix): (&usize, &usize)| Some((scene_ix, mesh_ix.checked_sub(n_known)?));
-        let mut new: Vec<(usize, usize)> = mesh_of.iter().filter_map(of_new).collect();
-        new.sort_unstable();
-        if new.iter().any(|(scene_ix, ix)| !has_faces_of(&deformed[*ix], &scene.meshes[*scene_ix])) {
-            return None;
+        for (&scene_ix, mesh_ix) in mesh_of.iter().filter(|(_, mesh_ix)| **mesh_ix >= deformed.n_known) {
+            let is_known = match deformed.poses.get(mesh_ix) {
+                Some(it) => self.posed.get(&scene_ix).is_some_and(|read| Arc::ptr_eq(read, &it.read)),
+                None => has_faces_of(&deformed.meshes[mesh_ix - deformed.n_known], &scene.meshes[scene_ix]),
+            };
+            if !is_known {
+                return None;
+            }
         }
         for (instance, now) in scene.instances.iter_mut().zip(now) {
             instance.transform = match scene.origin {
@@ -121,16 +162,39 @@ impl Poser {
                 origin => now.transform.moved(-origin),
             };
         }
-        let mut changed = Vec::new();
-        for (scene_ix, ix) in new {
-            let (before, mesh) = (&mut scene.meshes[scene_ix], &deformed[ix]);
-            if before.positions != mesh.positions || before.normals != mesh.normals {
-                before.clone_from(mesh);
-                changed.push(scene_ix);
+        let mut changed = ChangedMeshes::new();
+        for (scene_ix, mesh_ix) in mesh_of {
+            let (before, Some(ix)) = (&mut scene.meshes[scene_ix], mesh_ix.checked_sub(deformed.n_known)) else {
+                continue;
+            };
+            let mesh = &deformed.meshes[ix];
+            match deformed.poses.get(&mesh_ix).map(|it| it.posed.clone()) {
+                Some(posed) if self.poses[&scene_ix].pose() != posed.pose() => {
+                    self.poses.insert(scene_ix, posed.clone());
+                    changed.insert(scene_ix, Some(posed));
+                }
+                Some(_) => {}
+                None if before.positions != mesh.positions || before.normals != mesh.normals => {
+                    before.clone_from(mesh);
+                    changed.insert(scene_ix, None);
+                }
+                None => {}
             }
         }
-        scene.add_tangents().ok()?;
+        if changed.values().any(Option::is_none) {
+            scene.add_tangents().ok()?;
+        }
         Some(changed)
+    }
+}
+
+impl LoadedPose {
+    /// Whether a mesh of a scene is this one in its pose.
+    fn makes(&self, mesh: &Mesh) -> bool {
+        let mut own = self.read.rest.mesh.clone();
+        self.posed.deform(&mut own);
+        own.name.clone_from(&mesh.name);
+        own == *mesh
     }
 }
 

@@ -6,10 +6,13 @@ use glam::DVec3;
 use hashbrown::HashMap;
 
 use super::deform::Skin;
-use crate::scene::model::{
-    Mesh,
-    deformation::{Deformation, Pose},
-    extent::MeshOrigin,
+use crate::scene::{
+    meshes::coincident,
+    model::{
+        Mesh,
+        deformation::{Deformation, Pose, PosedMesh},
+        extent::MeshOrigin,
+    },
 };
 
 /// A mesh before it is posed.
@@ -18,7 +21,7 @@ pub(super) struct Rest {
     /// The mesh without positions, normals and tangents.
     pub mesh: Mesh,
     /// Its vertices, and what moves them.
-    pub deformation: Deformation,
+    pub deformation: Arc<Deformation>,
     /// Whether a skin moves some of them.
     pub is_skinned: bool,
     /// The point of the mesh's space that is the origin of the vertices.
@@ -31,7 +34,7 @@ impl Rest {
         let first = self.deformation.positions.len() as u32;
         other.mesh.faces.as_flattened_mut().iter_mut().for_each(|ix| *ix += first);
         self.mesh.append(other.mesh);
-        self.deformation.append(other.deformation);
+        Arc::make_mut(&mut self.deformation).append(Arc::unwrap_or_clone(other.deformation));
         self.is_skinned |= other.is_skinned;
     }
 
@@ -41,7 +44,8 @@ impl Rest {
         let far = MeshOrigin::Near.second(&self.deformation.positions).filter(|_| self.is_skinned);
         if let Some(origin) = far {
             self.origin = origin;
-            self.deformation.positions.iter_mut().for_each(|p| *p = (p.as_dvec3() - origin).as_vec3());
+            let positions = &mut Arc::make_mut(&mut self.deformation).positions;
+            positions.iter_mut().for_each(|p| *p = (p.as_dvec3() - origin).as_vec3());
         }
     }
 }
@@ -55,28 +59,55 @@ pub(super) struct ReadMesh {
     pub rest: Rest,
     /// The material of each slot.
     pub materials: Vec<u32>,
+    /// The faces, if more poses follow and only the vertices of the mesh change with them.
+    pub faces: Option<Arc<[[u32; 3]]>>,
 }
 
 /// The meshes that have been read; `None` for those that must be read for each pose.
 pub(super) type ReadMeshes = HashMap<RestKey, Option<Arc<ReadMesh>>>;
 
-/// Returns a mesh in a pose, and the point of world space that is its origin.
-pub(super) fn posed(read: Arc<ReadMesh>, (weights, skin): (&[f32], Option<&Skin>)) -> (Mesh, DVec3) {
+/// A mesh in a pose, and the point of world space that is its origin.
+pub(super) enum Posed {
+    Mesh(Mesh, DVec3),
+    Pose(PosedMesh, DVec3),
+}
+
+/// Returns a mesh in a pose: its arrays, unless more poses follow.
+pub(super) fn posed(read: Arc<ReadMesh>, (weights, skin): (&[f32], Option<&Skin>)) -> Posed {
     if !read.rest.deformation.is_deformed() {
         let Rest { mut mesh, deformation, .. } = Arc::unwrap_or_clone(read).rest;
-        deformation.rest(&mut mesh);
-        return (mesh, DVec3::ZERO);
+        Arc::unwrap_or_clone(deformation).rest(&mut mesh);
+        coincident::separate(&mut mesh);
+        return Posed::Mesh(mesh, DVec3::ZERO);
     }
     let Rest { mesh, deformation, is_skinned, origin: rest_origin } = &read.rest;
-    let mut mesh = mesh.clone();
-    let mut deform = |origin: DVec3| {
+    let pose_at = |origin: DVec3| {
         let joints = skin.map(|skin| skin.joints(*rest_origin, origin)).unwrap_or_default();
-        deformation.deform(&Pose { weights: weights.to_vec(), joints }, &mut mesh);
-        MeshOrigin::Near.second(&mesh.positions).filter(|_| *is_skinned)
+        Pose { weights: weights.to_vec(), joints }
     };
-    let origin = deform(DVec3::ZERO).unwrap_or_default();
-    if origin != DVec3::ZERO {
-        deform(origin);
+    let near = pose_at(DVec3::ZERO);
+    let far = if *is_skinned { MeshOrigin::Near.second(&deformation.positions_at(&near)) } else { None };
+    let (pose, origin) = far.map_or((near, DVec3::ZERO), |origin| (pose_at(origin), origin));
+    match &read.faces {
+        Some(faces) => Posed::Pose(PosedMesh::new(deformation.clone(), faces.clone(), pose), origin),
+        None => {
+            let mut mesh = mesh.clone();
+            deformation.deform(&pose, &mut mesh);
+            // Faces that are in one place at rest are so in all poses. Others may meet for a moment.
+            if coincident::has_several(&mesh, &deformation.positions) {
+                coincident::separate(&mut mesh);
+            }
+            Posed::Mesh(mesh, origin)
+        }
     }
-    (mesh, origin)
+}
+
+impl ReadMesh {
+    /// Notes that more poses follow.
+    pub fn with_poses(mut self) -> Self {
+        let Rest { mesh, deformation, .. } = &self.rest;
+        let has_same_faces = deformation.is_deformed() && !coincident::has_several(mesh, &deformation.positions);
+        self.faces = has_same_faces.then(|| mesh.faces.clone().into());
+        self
+    }
 }
