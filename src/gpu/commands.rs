@@ -314,6 +314,9 @@ impl Commands<'_> {
     /// Makes later accesses of the kind `destination` wait for earlier ones of the kind `source`, and see what these
     /// wrote. The barrier is not limited to a buffer.
     pub fn barrier(&self, source: Access, destination: Access) {
+        if self.device.failure_injection.leaves_barrier_out() {
+            return;
+        }
         let barrier = [vk::MemoryBarrier2::default()
             .src_stage_mask(source.stages())
             .src_access_mask(source.accesses())

@@ -1,5 +1,5 @@
-//! Deliberate failures to create Vulkan objects. Tests use them to find out what state remains if the driver refuses
-//! an object in the middle of a change.
+//! Deliberate failures. Tests let creations of Vulkan objects fail, to find out what state remains if the driver
+//! refuses an object in the middle of a change, and leave barriers out, to find out whether anybody would notice.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -11,13 +11,24 @@ use super::{Context, GpuError, raw_device::RawDevice};
 pub(super) struct FailureInjection {
     /// Number of creations that still succeed. [`FailureInjection::NEVER`] if none fails.
     n_left: AtomicU32,
+    /// Number of barriers that are still recorded before one is left out, likewise.
+    n_barriers_left: AtomicU32,
 }
 
 impl FailureInjection {
     const NEVER: u32 = u32::MAX;
 
     pub(super) fn never() -> Self {
-        Self { n_left: AtomicU32::new(Self::NEVER) }
+        Self { n_left: AtomicU32::new(Self::NEVER), n_barriers_left: AtomicU32::new(Self::NEVER) }
+    }
+
+    /// Counts a barrier. Returns whether it is to be left out.
+    pub fn leaves_barrier_out(&self) -> bool {
+        if self.n_barriers_left.load(Ordering::Relaxed) == Self::NEVER {
+            return false;
+        }
+        // After 0 comes `NEVER`.
+        self.n_barriers_left.fetch_sub(1, Ordering::Relaxed) == 0
     }
 }
 
@@ -28,6 +39,18 @@ impl Context {
     #[doc(hidden)]
     pub fn fail_creations_after(&self, n_creations: Option<u32>) {
         self.device.failure_injection.n_left.store(n_creations.unwrap_or(FailureInjection::NEVER), Ordering::Relaxed);
+    }
+}
+
+impl Context {
+    /// Leaves out the barrier of [`Commands::barrier`](super::Commands::barrier) after the next `n` ones; none with
+    /// `None`. Returns how many would still have come before the barrier of the last call; `None` if that has been left
+    /// out.
+    #[doc(hidden)]
+    pub fn leave_out_barrier_after(&self, n: Option<u32>) -> Option<u32> {
+        let n = n.unwrap_or(FailureInjection::NEVER);
+        let n_left = self.device.failure_injection.n_barriers_left.swap(n, Ordering::Relaxed);
+        (n_left != FailureInjection::NEVER).then_some(n_left)
     }
 }
 

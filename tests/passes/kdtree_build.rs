@@ -215,6 +215,29 @@ fn submits_and_timers_do_not_change_the_tree() {
     assert_silent(&context);
 }
 
+/// Leaves out one barrier after the other. Synchronization validation of Debian 12 (1.3.239) sees no hazard between
+/// dispatches of one kernel, nor where kernels update words by atomics alone: that leaves out `sum` and `place`, and
+/// what comes before the first cells are chosen.
+#[test]
+fn barriers_of_levels_are_needed() {
+    const N_LEVELS: u32 = 4;
+    let context = device();
+    let tree = BuildOptions { max_depth: Some(N_LEVELS - 1), slabs: false, ..BuildOptions::default() };
+    let options = KdTreeBuilderOptions { tree, ..KdTreeBuilderOptions::default() };
+    let builder = builder(&context, &meshes::torus(30, 20), &options);
+    built(&builder);
+    assert_silent(&context);
+    // One after each kernel of a level, after the setup's: that of `bins` at the root is the first.
+    let of_levels = 7..7 + 8 * N_LEVELS - 1;
+    for n in of_levels {
+        let n_before = context.validation_messages().len();
+        context.leave_out_barrier_after(Some(n));
+        builder.build(None).expect("a tree");
+        assert_eq!(context.leave_out_barrier_after(None), None, "barrier {n}");
+        assert!(context.validation_messages().len() > n_before, "barrier {n} is not needed");
+    }
+}
+
 #[test]
 fn trees_of_limited_depth_are_valid_and_cost_more() {
     let context = device();

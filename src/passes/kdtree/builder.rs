@@ -280,8 +280,8 @@ impl KdTreeBuilder {
         self.submit("kdtree_fill", record)
     }
 
-    /// Builds the tree and waits for the device. `timer`: takes the times of the dispatches, which are then all in one
-    /// command buffer; it must have room for [`KdTreeBuilder::n_stages`] rows.
+    /// Builds the tree and waits for the device. `timer`: takes the times of the dispatches; it must have room for
+    /// [`KdTreeBuilder::n_stages`] rows.
     ///
     /// # Errors
     /// Out of memory; a Vulkan call fails.
@@ -299,11 +299,7 @@ impl KdTreeBuilder {
     pub fn build_first(&self, n_triangles: usize, timer: Option<&Timer>) -> Result<BuiltTree, GpuError> {
         assert!(n_triangles <= self.capacity(), "{n_triangles} triangles, room for {}", self.capacity());
         let n_triangles = n_triangles as u32;
-        let commands = match timer {
-            Some(_) => vec![self.record_all(n_triangles, timer)?],
-            None => self.record_parts(n_triangles)?,
-        };
-        self.context.wait_for(self.context.submit(commands)?)?;
+        self.context.wait_for(self.context.submit(self.record(n_triangles, timer)?)?)?;
         let state = self.buffers.build.download()?[0];
         Ok(BuiltTree {
             n_nodes: 2 * state.n_pairs,
@@ -398,19 +394,14 @@ impl KdTreeBuilder {
         submit(&self.context, name, record)
     }
 
-    fn record_all(&self, n_triangles: u32, timer: Option<&Timer>) -> Result<CommandBuffer, GpuError> {
-        CommandBuffer::record(&self.context, "kdtree_build", timer, |commands| {
+    /// Records a command buffer for every `levels_per_submit` levels, one for what comes before them, and one for what
+    /// comes after.
+    fn record(&self, n_triangles: u32, timer: Option<&Timer>) -> Result<Vec<CommandBuffer>, GpuError> {
+        let record = |body: &dyn Fn(&Commands)| CommandBuffer::record(&self.context, "kdtree_build", timer, body);
+        let mut parts = vec![record(&|commands| {
             commands.reset_timer();
             self.passes.setup(commands, &self.buffers, n_triangles);
-            (0..self.n_levels()).for_each(|level_ix| self.passes.level(commands, &self.buffers, level_ix));
-            self.finish(commands);
-        })
-    }
-
-    /// Records a command buffer for every `levels_per_submit` levels.
-    fn record_parts(&self, n_triangles: u32) -> Result<Vec<CommandBuffer>, GpuError> {
-        let record = |body: &dyn Fn(&Commands)| CommandBuffer::record(&self.context, "kdtree_build", None, body);
-        let mut parts = vec![record(&|commands| self.passes.setup(commands, &self.buffers, n_triangles))?];
+        })?];
         let n_each = self.options.levels_per_submit.max(1);
         for first in (0..self.n_levels()).step_by(n_each as usize) {
             parts.push(record(&|commands| {
