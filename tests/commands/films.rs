@@ -9,7 +9,7 @@ use tempfile::TempDir;
 
 use crate::support::{
     animated::moving,
-    command::{fail, names, stderr, stdout, succeed},
+    command::{fail, kdray, lose_device_at, names, stderr, stdout, succeed},
 };
 
 /// Writes `moving.gltf`.
@@ -117,6 +117,33 @@ fn films_are_the_same_by_the_devices_trees_of_deformed_meshes() {
     assert!(found.windows(2).all(|pair| pair[0] != pair[1]), "something moves in each frame");
     assert!(of_host["device_build"].is_null() && of_device["device_build"]["stages"].is_array(), "{of_device}");
     assert_eq!(of_device["last_moment"]["n_deformed"], json!(1));
+}
+
+/// The device is lost at every other submit, among them those of builds in the middle of the film.
+#[test]
+fn a_device_that_is_lost_in_a_film_ends_it_with_a_message() {
+    let (directory, layer) = (TempDir::new().unwrap(), TempDir::new().unwrap());
+    let path = directory.path();
+    fs::write(path.join("wave.gltf"), with_wave().to_string()).unwrap();
+    let more = ["--instances", "keep", "--build", "gpu", "--traversal", "mask", "--frames", "0-1", "--fps", "2"];
+    let arguments = [&["render", "wave.gltf", "-o", "f#.png"], &SMALL[..], &more].concat();
+    let mut at_builds = Vec::new();
+    for submit in (1..).step_by(2) {
+        let mut command = kdray(path, &arguments);
+        lose_device_at(&mut command, submit, layer.path());
+        let output = command.output().unwrap();
+        let text = stderr(&output);
+        if output.status.success() {
+            assert_eq!(text, "");
+            break;
+        }
+        assert_eq!(output.status.code(), Some(4), "{submit}: {text}");
+        assert!(text.starts_with("error: ") && text.lines().count() == 1 && text.contains("lost"), "{submit}: {text}");
+        if text.contains("`kdtree_") {
+            at_builds.push(fs::read_dir(path).unwrap().count() - 1);
+        }
+    }
+    assert!(at_builds.first() < at_builds.last(), "frames before builds that failed: {at_builds:?}");
 }
 
 #[test]

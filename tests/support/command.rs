@@ -36,6 +36,22 @@ pub fn kdray(directory: &Path, arguments: &[&str]) -> Command {
     command
 }
 
+/// Lets a command lose its device at a queue submit. Builds the Vulkan layer that simulates this in a directory.
+pub fn lose_device_at(command: &mut Command, submit: u32, directory: &Path) {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/support/lose_device.c");
+    let library = directory.join("lose_device.so");
+    if !library.exists() {
+        let compiled = Command::new("cc").args(["-shared", "-fPIC", "-o"]).arg(&library).arg(source).status();
+        assert!(compiled.expect("cc, which Rust links with").success());
+        let manifest = r#"{"file_format_version": "1.1.0", "layer": {"name": "VK_LAYER_lose_device", "type": "GLOBAL",
+            "library_path": "./lose_device.so", "api_version": "1.3.0",
+            "implementation_version": "1", "description": ""}}"#;
+        fs::write(directory.join("lose_device.json"), manifest).unwrap();
+    }
+    command.env("VK_LAYER_PATH", directory).env("VK_INSTANCE_LAYERS", "VK_LAYER_lose_device");
+    command.env("LOSE_DEVICE_AT", submit.to_string());
+}
+
 pub fn cornell() -> String {
     shipped("cornell.toml")
 }

@@ -1,17 +1,13 @@
 //! Errors that occur while the viewer's window is open, and do not close it.
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-    process::{Command, Stdio},
-};
+use std::{fs, process::Stdio};
 
 use tempfile::TempDir;
 
 use super::{
     SIZE, ended, rendered,
     support::{
-        command::{Messages, cornell, kdray, stderr, stdout},
+        command::{Messages, cornell, kdray, lose_device_at, stderr, stdout},
         display::Display,
     },
     viewer,
@@ -36,28 +32,15 @@ fn a_picture_that_cannot_be_written_is_no_end() {
     assert!(text.contains("\nwarning: cannot write `cornell-001.png`: "), "{text}");
 }
 
-/// Builds the Vulkan layer that simulates a lost device. Returns the directory of its manifest.
-fn losing_layer(directory: &Path) -> PathBuf {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/support/lose_device.c");
-    let library = directory.join("lose_device.so");
-    let compiled = Command::new("cc").args(["-shared", "-fPIC", "-o"]).arg(&library).arg(source).status();
-    assert!(compiled.expect("cc, which Rust links with").success());
-    let manifest = r#"{"file_format_version": "1.1.0", "layer": {"name": "VK_LAYER_lose_device", "type": "GLOBAL",
-        "library_path": "./lose_device.so", "api_version": "1.3.0",
-        "implementation_version": "1", "description": ""}}"#;
-    fs::write(directory.join("lose_device.json"), manifest).unwrap();
-    directory.to_owned()
-}
-
 #[test]
 fn a_lost_device_is_opened_anew() {
     let (directory, display) = (TempDir::new().unwrap(), Display::start(320, 240));
     let picture = rendered(directory.path(), &cornell(), &[]);
     let scene = cornell();
     let mut command = kdray(directory.path(), &["view", &scene, "--size", SIZE, "--spp", "64", "--no-overlay"]);
-    command.env("VK_LAYER_PATH", losing_layer(directory.path())).env("VK_INSTANCE_LAYERS", "VK_LAYER_lose_device");
     // The device is lost while samples are drawn: each sample takes at least five submits.
-    command.env("LOSE_DEVICE_AT", "100").env("DISPLAY", &display.name).env_remove("WAYLAND_DISPLAY");
+    lose_device_at(&mut command, 100, directory.path());
+    command.env("DISPLAY", &display.name).env_remove("WAYLAND_DISPLAY");
     let viewer = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let mean = rendered(directory.path(), &scene, &["--spp", "64"]);
     assert!(mean != picture);
