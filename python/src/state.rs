@@ -1,8 +1,8 @@
 //! The geometries of a scene, and the world that is made of them when rays need it.
 
-use std::sync::Arc;
+use std::{path::Path, sync::Arc};
 
-use glam::{DMat4, DVec3, Vec3};
+use glam::{DMat4, Vec3};
 use kdray::{
     accel::{Accel, kdtree::Traversal},
     engine::{
@@ -10,7 +10,7 @@ use kdray::{
         choices::{Request, Workload},
     },
     gpu::GpuError,
-    scene::{Camera, Instance, Material, Mesh, Projection, RenderDefaults, Scene, Transform},
+    scene::{Instance, Material, Mesh, Scene, Transform},
     util::progress::Progress,
     world::{InstanceUpdate, Mismatch, World, instances::Instancing},
 };
@@ -315,7 +315,8 @@ impl State {
             instances.push(Instance { mesh_ix: meshes.len(), transform, materials: vec![0], ..Instance::default() });
             meshes.push(Mesh::of_triangles(geometry.vertices.clone(), geometry.faces.clone()));
         }
-        (scene_of(meshes, instances), places)
+        let materials = vec![Material::default()];
+        (Scene { meshes, instances, materials, ..Scene::empty(Path::new("scene")) }, places)
     }
 }
 
@@ -356,35 +357,5 @@ fn check_finite(name: &str, vertices: &[Vec3]) -> PyResult<()> {
     match vertices.par_iter().position_first(not_finite) {
         Some(ix) => Err(PyValueError::new_err(format!("{name}: vertex {ix} is {}, not finite", vertices[ix]))),
         None => Ok(()),
-    }
-}
-
-/// Returns a scene of which nobody makes a picture.
-fn scene_of(meshes: Vec<Mesh>, instances: Vec<Instance>) -> Scene {
-    Scene {
-        name: "scene".to_owned(),
-        origin: DVec3::ZERO,
-        meshes,
-        instances,
-        materials: vec![Material::default()],
-        images: Vec::new(),
-        lights: Vec::new(),
-        chosen_light: None,
-        environment: None,
-        sky: None,
-        studio: None,
-        camera: Camera {
-            eye: Vec3::ZERO,
-            target: Vec3::NEG_Z,
-            up: Vec3::Y,
-            projection: Projection::Perspective { vertical_fov_degrees: 40.0 },
-        },
-        chosen_camera: false,
-        cameras: Vec::new(),
-        animations: Vec::new(),
-        ambient: Vec3::ZERO,
-        ground: None,
-        background: Vec3::ZERO,
-        defaults: RenderDefaults::default(),
     }
 }
