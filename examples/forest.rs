@@ -5,7 +5,12 @@
 //! cargo run --release --example forest -- forest.png
 //! ```
 
-use std::{env, error::Error, f32::consts::TAU, path::PathBuf};
+use std::{
+    env,
+    error::Error,
+    f32::consts::TAU,
+    path::{Path, PathBuf},
+};
 
 use glam::{DQuat, DVec3, Quat, Vec3, vec3};
 use kdray::{
@@ -13,7 +18,7 @@ use kdray::{
     frame::{Goal, Integrator},
     gpu::ContextOptions,
     output,
-    scene::{Camera, Instance, Material, Mesh, PictureChoices, Projection, RenderDefaults, Scene, Sky, Transform, Up},
+    scene::{Camera, Instance, Material, Mesh, PictureChoices, Projection, Scene, Sky, Transform, Up},
 };
 
 const N_TREES: u64 = 100;
@@ -197,29 +202,16 @@ fn forest() -> Scene {
     meshes.push(ground(half));
     let eye = vec3(-0.4 * half, height(-0.4 * half, half) + 24.0, 1.02 * half);
     Scene {
-        name: "forest".to_owned(),
-        origin: DVec3::ZERO,
         meshes,
         instances,
         materials,
-        images: Vec::new(),
-        lights: Vec::new(),
-        chosen_light: None,
-        environment: None,
         sky: Some(Sky::new([32.0, 250.0], Up::Y).expect("a sun above the horizon")),
-        studio: None,
         camera: Camera {
             eye,
             target: vec3(0.1 * half, height(0.0, 0.3 * half) + 2.0, 0.2 * half),
             up: Vec3::Y,
             projection: Projection::Perspective { vertical_fov_degrees: 40.0 },
         },
-        chosen_camera: false,
-        cameras: Vec::new(),
-        animations: Vec::new(),
-        ambient: Vec3::ZERO,
-        ground: None,
-        background: Vec3::ZERO,
-        defaults: RenderDefaults::default(),
+        ..Scene::empty(Path::new("forest"))
     }
 }

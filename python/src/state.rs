@@ -1,8 +1,8 @@
 //! The geometries of a scene, and the world that is made of them when rays need it.
 
-use std::sync::Arc;
+use std::{path::Path, sync::Arc};
 
-use glam::{DMat4, DVec3, Vec3};
+use glam::{DMat4, Vec3};
 use kdray::{
     accel::{Accel, kdtree::Traversal},
     engine::{
@@ -10,7 +10,7 @@ use kdray::{
         choices::{Request, Workload},
     },
     gpu::GpuError,
-    scene::{Camera, Instance, Material, Mesh, Projection, RenderDefaults, Scene, Transform},
+    scene::{Instance, Material, Mesh, Scene, Transform},
     util::progress::Progress,
     world::{InstanceUpdate, Mismatch, World, instances::Instancing},
 };
@@ -87,13 +87,15 @@ pub struct State {
     places_at: u64,
     /// The world of the last query.
     ready: Option<Ready>,
+    /// Whether each geometry of the last world has a structure of its own, and how the world is searched.
+    last: Option<(bool, Traversal)>,
 }
 
 impl State {
     pub fn new(engine: Engine) -> Self {
         let (now, shapes_at, places_at) = Default::default();
         let cpu = Engine::on_cpu();
-        Self { engine, cpu, geometries: Vec::new(), now, shapes_at, places_at, ready: None }
+        Self { engine, cpu, geometries: Vec::new(), now, shapes_at, places_at, ready: None, last: None }
     }
 
     /// Returns the number of identifiers that were given out.
@@ -200,7 +202,7 @@ impl State {
         if !self.geometries.iter().flatten().any(|geometry| !geometry.faces.is_empty()) {
             return Err(PyRuntimeError::new_err("the scene has no triangles: add_triangles adds some"));
         }
-        // A world that moves is another one if that fails; one that is replaced stays until then.
+        // Where the world cannot be moved, another one is built.
         if let Some(ready) = self
             .ready
             .take_if(|ready| ready.keeps && ready.shapes_at == self.shapes_at && ready.places_at < self.places_at)
@@ -208,7 +210,9 @@ impl State {
             self.ready = self.moved(ready).ok();
         }
         if !self.is_built() {
-            self.ready = Some(self.build(n, progress)?);
+            let ready = self.build(n, progress)?;
+            self.last = Some((ready.keeps, ready.traversal));
+            self.ready = Some(ready);
         }
         Ok(())
     }
@@ -239,7 +243,7 @@ impl State {
     /// that all rays meet, and that no query has seen change are flattened: one structure is quicker than many.
     fn keeps(&self) -> bool {
         let n_geometries = self.geometries.iter().flatten().filter(|geometry| !geometry.faces.is_empty()).count();
-        self.places_at > 0 || (self.ready.is_some() && n_geometries > 1)
+        self.places_at > 0 || (self.last.is_some() && n_geometries > 1)
     }
 
     /// Gives the instances of a world the transforms and masks that their geometries have now.
@@ -262,20 +266,23 @@ impl State {
         Ok(ready)
     }
 
-    /// Builds a world, of which it takes what it can from the world before.
-    fn build(&self, n_rays: usize, progress: &Progress) -> PyResult<Ready> {
-        let (keeps, before) = (self.keeps(), self.ready.as_ref());
+    /// Builds a world. The world before is freed first, unless its structures are taken over.
+    fn build(&mut self, n_rays: usize, progress: &Progress) -> PyResult<Ready> {
+        let keeps = self.keeps();
+        self.ready = self.ready.take().filter(|before| keeps && before.keeps).map(Ready::without_casters);
         // If shapes have changed, they may do so again before many rays are cast.
-        let n_rays = if before.is_some() && self.places_at == 0 { n_rays as u64 } else { EXPECTED_RAYS };
+        let n_rays = if self.last.is_some() && self.places_at == 0 { n_rays as u64 } else { EXPECTED_RAYS };
         let (scene, places) = self.scene();
-        let same: Vec<_> = places.iter().map(|place| before?.same(place, self)).collect();
-        let world = match before {
-            Some(before) if keeps && before.keeps => before.world.rebuilt(&scene, &same, progress).map_err(wrong)?,
-            _ => self.load(scene, n_rays, keeps, progress)?,
+        let world = match &self.ready {
+            Some(before) => {
+                let same: Vec<_> = places.iter().map(|place| before.same(place, self)).collect();
+                before.world.rebuilt(scene, &same, progress).map_err(wrong)?
+            }
+            None => self.load(scene, n_rays, keeps, progress)?,
         };
         let world = if keeps { self.masked(&world, &places).map_err(wrong)? } else { world };
-        let traversal = match before {
-            Some(before) if before.keeps == keeps => before.traversal,
+        let traversal = match self.last {
+            Some((kept, traversal)) if kept == keeps => traversal,
             _ => {
                 let methods = self.engine_of(keeps).methods(&world, &Workload::of_rays(n_rays));
                 methods.map_err(failed)?.traversal.value
@@ -315,11 +322,16 @@ impl State {
             instances.push(Instance { mesh_ix: meshes.len(), transform, materials: vec![0], ..Instance::default() });
             meshes.push(Mesh::of_triangles(geometry.vertices.clone(), geometry.faces.clone()));
         }
-        (scene_of(meshes, instances), places)
+        let materials = vec![Material::default()];
+        (Scene { meshes, instances, materials, ..Scene::empty(Path::new("scene")) }, places)
     }
 }
 
 impl Ready {
+    fn without_casters(self) -> Self {
+        Self { on_device: None, on_cpu: None, ..self }
+    }
+
     /// Returns the index of the mesh that a geometry has in this world, if it has not changed since.
     fn same(&self, place: &Place, state: &State) -> Option<usize> {
         let geometry = state.geometry(place.geometry_id)?;
@@ -356,35 +368,5 @@ fn check_finite(name: &str, vertices: &[Vec3]) -> PyResult<()> {
     match vertices.par_iter().position_first(not_finite) {
         Some(ix) => Err(PyValueError::new_err(format!("{name}: vertex {ix} is {}, not finite", vertices[ix]))),
         None => Ok(()),
-    }
-}
-
-/// Returns a scene of which nobody makes a picture.
-fn scene_of(meshes: Vec<Mesh>, instances: Vec<Instance>) -> Scene {
-    Scene {
-        name: "scene".to_owned(),
-        origin: DVec3::ZERO,
-        meshes,
-        instances,
-        materials: vec![Material::default()],
-        images: Vec::new(),
-        lights: Vec::new(),
-        chosen_light: None,
-        environment: None,
-        sky: None,
-        studio: None,
-        camera: Camera {
-            eye: Vec3::ZERO,
-            target: Vec3::NEG_Z,
-            up: Vec3::Y,
-            projection: Projection::Perspective { vertical_fov_degrees: 40.0 },
-        },
-        chosen_camera: false,
-        cameras: Vec::new(),
-        animations: Vec::new(),
-        ambient: Vec3::ZERO,
-        ground: None,
-        background: Vec3::ZERO,
-        defaults: RenderDefaults::default(),
     }
 }

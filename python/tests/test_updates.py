@@ -1,6 +1,10 @@
 """Scenes that change: hits are those of a new scene."""
 
+import os
 import resource
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -155,6 +159,36 @@ def test_memory_stays_constant(random):
 
     before = updates(500)
     assert updates(2500) - before < 4096, "KiB"
+
+
+@pytest.mark.parametrize("n_geometries", [1, 2])
+def test_the_world_before_is_freed_first(n_geometries):
+    """Updates need no more memory than the first build, in a process that keeps nothing of what is freed."""
+    code = f"""
+from pathlib import Path
+import numpy as np
+from conftest import ball
+import kdray
+
+def peak():
+    return int(Path("/proc/self/status").read_text().split("VmHWM:")[1].split()[0])
+
+vertices, triangles = ball(220)
+peaks, scene = [peak()], kdray.RaycastingScene(device="cpu")
+for _ in range({n_geometries}):
+    scene.add_triangles(vertices, triangles)
+for size in [1, 2, 3]:
+    scene.update_vertices(0, vertices * np.float32(size))
+    assert np.isfinite(scene.cast_rays([[5, 0.1, 0.1, -1, 0, 0]])["t_hit"]).all()
+    peaks.append(peak())
+print(*np.diff(peaks))
+"""
+    environment = os.environ | {"MALLOC_MMAP_THRESHOLD_": "65536"}
+    here = Path(__file__).parent
+    done = subprocess.run([sys.executable, "-c", code], cwd=here, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    first, *others = map(int, done.stdout.split())
+    assert sum(others) < 0.15 * first, "KiB"
 
 
 def test_transforms_that_cannot_keep_a_space_of_their_own(device, random):

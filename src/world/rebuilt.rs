@@ -21,11 +21,12 @@ impl World {
     /// Returns the world of another scene, whose meshes are stored once, with the options of this world. `same`: for
     /// each mesh of the scene, the index of the mesh that it equals in this world's scene, if there is one. Their
     /// triangles and structures are taken over. All others are built, on the current rayon pool, and the hierarchy.
+    /// The scene is freed before the builds.
     ///
     /// # Errors
     /// This world is flattened, or the scene has no triangles. A mesh has another number of faces than the one that it
     /// is said to equal. Otherwise fails as [`FlatScene::with_instances`] does.
-    pub fn rebuilt(&self, scene: &Scene, same: &[Option<usize>], progress: &Progress) -> Result<Self, Mismatch> {
+    pub fn rebuilt(&self, scene: Scene, same: &[Option<usize>], progress: &Progress) -> Result<Self, Mismatch> {
         let flattened = || Mismatch::Scene("the world is flattened, so it has no structures of meshes".to_owned());
         let geometries = self.geometries().ok_or_else(flattened)?;
         let reused = |mesh_ix: usize| geometries.get(&(*same.get(mesh_ix)?)?).copied();
@@ -35,10 +36,11 @@ impl World {
                 return Err(Mismatch::Scene(format!("mesh {mesh_ix} does not equal the mesh before")));
             }
         }
-        let (flat, reused) = FlatScene::with_reused(scene, reused)?;
+        let (flat, reused) = FlatScene::with_reused(&scene, reused)?;
         check(&flat)?;
         let instances = flat.instances.as_ref().ok_or_else(flattened)?;
         let given: Vec<_> = reused.iter().map(|it| it.map(|it| Arc::clone(it.structure))).collect();
+        drop(scene);
         let stored = (&flat.triangles[..], &instances.ranges[..]);
         let two = TwoLevel::build_missing(given, stored, &instances.list, (self.accel_options(), progress));
         let accel = Accel::TwoLevel(Box::new(two));
@@ -103,7 +105,7 @@ mod tests {
         let before = new(&[1.0, 2.0, 3.0]);
         let after = [3.0, 5.0, 1.0, 4.0];
         let same = [Some(2), None, Some(0)];
-        let world = before.rebuilt(&scene(&after), &same, &Progress::default()).unwrap();
+        let world = before.rebuilt(scene(&after), &same, &Progress::default()).unwrap();
         assert!(world.scene() == new(&after).scene() && world.accel() == new(&after).accel());
         let is_shared =
             |(of_before, of_after)| Arc::ptr_eq(&structures(&before)[of_before], &structures(&world)[of_after]);
@@ -116,9 +118,9 @@ mod tests {
             World::of_flat(FlatScene::with_instances(&scene(&[1.0])).unwrap(), &BuildOptions::default()).unwrap();
         let mut other = scene(&[1.0]);
         other.meshes[0].push_flat([0, 1, 2], 0);
-        let error = world.rebuilt(&other, &[Some(0)], &Progress::default()).unwrap_err();
+        let error = world.rebuilt(other.clone(), &[Some(0)], &Progress::default()).unwrap_err();
         assert!(error.to_string().contains("mesh 0 does not equal the mesh before"), "{error}");
         let flat = World::new(&other, &BuildOptions::default()).unwrap();
-        assert!(flat.rebuilt(&other, &[], &Progress::default()).unwrap_err().to_string().contains("flattened"));
+        assert!(flat.rebuilt(other, &[], &Progress::default()).unwrap_err().to_string().contains("flattened"));
     }
 }

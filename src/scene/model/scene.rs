@@ -194,8 +194,9 @@ impl Scene {
         Ok(())
     }
 
-    /// A scene without meshes, materials and lights. Its camera is a placeholder.
-    pub(crate) fn empty(path: &Path) -> Self {
+    /// Returns a scene without meshes, materials and lights, to fill by a program. Its name is that of a file
+    /// ([`Scene::name_of`]). Its camera is a placeholder, at the origin: it looks along -z.
+    pub fn empty(path: &Path) -> Self {
         Self {
             name: Self::name_of(path),
             origin: DVec3::ZERO,
