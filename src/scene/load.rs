@@ -5,7 +5,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::{
-    files::{foreign, outside::Access, pack, store},
+    files::{foreign, pack, source_file::Access, store},
     formats::{
         gltf,
         image_files::Images,

@@ -2,7 +2,7 @@
 //! them.
 
 pub(crate) mod foreign;
-pub(crate) mod outside;
 pub(crate) mod pack;
-pub(crate) mod read;
+pub(crate) mod source_file;
 pub(crate) mod store;
+pub(crate) mod text;

@@ -6,8 +6,8 @@ use super::image::{Encoded, Examined, MAX_PIXELS, decode_all, normals_of_heights
 use crate::{
     scene::{
         files::{
-            read::read_bytes,
             store::{self, require_for_bytes},
+            text::read_bytes,
         },
         meshes::needs::require_for_images,
         model::{Channel, Image, MaterialChoice, Pixels, error::Checked, preset::is_replaced},

@@ -16,9 +16,9 @@ use crate::{
     scene::{
         files::{
             foreign,
-            outside::Access,
-            read::{lossy_text, read_bytes},
+            source_file::Access,
             store::{require_for_bytes, require_for_text},
+            text::{lossy_text, read_bytes},
         },
         meshes::{coincident, smooth::Shading},
         model::{Material, Mesh, SceneError, extent::MeshOrigin},

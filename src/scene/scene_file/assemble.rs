@@ -25,8 +25,8 @@ use crate::{
     frame::{Denoise, Integrator, RenderOptions, SampleRange},
     scene::{
         files::{
-            outside::Access,
-            read::{read_bytes, read_utf8},
+            source_file::Access,
+            text::{read_bytes, read_utf8},
         },
         formats::{
             image::{Encoded, decode_colours},

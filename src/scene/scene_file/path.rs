@@ -11,7 +11,7 @@ use super::{
     description::CameraSpec,
 };
 use crate::scene::{
-    files::{outside::Access, read::read_utf8},
+    files::{source_file::Access, text::read_utf8},
     model::{
         Camera, Projection, SceneError,
         camera::{FOV_DEGREES, HEIGHTS},

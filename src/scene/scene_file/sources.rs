@@ -6,9 +6,9 @@ use toml::{Table, Value};
 
 use crate::scene::{
     files::{
-        outside::Access,
         pack::pack_of,
-        read::{lossy_text, read_bytes, read_utf8},
+        source_file::Access,
+        text::{lossy_text, read_bytes, read_utf8},
     },
     formats::{gltf, material_spec::MAP_KEYS, mesh_file::MeshFormat, obj::named_files, ply::named_images},
     model::LoadOptions,

@@ -7,7 +7,7 @@ use npyz::{NpyFile, Order};
 
 use crate::{
     scene::{
-        files::{read::read_bytes, store},
+        files::{store, text::read_bytes},
         model::{Transform, error::Checked},
     },
     util::{memory::require, npy, text::short_line},

@@ -23,9 +23,9 @@ use super::{
 use crate::{
     scene::{
         files::{
-            outside::{Access, NamedFile},
-            read::read_bytes,
+            source_file::{Access, NamedFile},
             store::{self, require_for_bytes},
+            text::read_bytes,
         },
         model::error::Checked,
     },

@@ -299,7 +299,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::scene::files::outside::Access;
+    use crate::scene::files::source_file::Access;
 
     /// The strip's indices take no bytes in the file, and none of its faces has an area.
     #[test]

@@ -47,7 +47,7 @@ pub(crate) use self::{document::named_files, poser::Poser};
 use super::image::MAX_PIXELS;
 use crate::{
     scene::{
-        files::outside::Access,
+        files::source_file::Access,
         meshes::coincident,
         model::{
             AnimationChoice, AnimationInfo, Camera, Instance, Light, LoadOptions, MaterialChoice, Mesh, Scene,

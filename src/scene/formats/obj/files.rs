@@ -9,9 +9,9 @@ use super::{
 };
 use crate::scene::{
     files::{
-        outside::{Access, NamedFile, Reach},
-        read::read_lossy,
+        source_file::{Access, NamedFile, Reach},
         store,
+        text::read_lossy,
     },
     model::error::Checked,
 };

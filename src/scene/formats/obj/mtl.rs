@@ -17,9 +17,9 @@ use super::{
 use crate::{
     scene::{
         files::{
-            outside::{Access, NamedFile, Reach},
-            read::read_lossy,
+            source_file::{Access, NamedFile, Reach},
             store,
+            text::read_lossy,
         },
         formats::{image_files::Images, material_spec::MaterialSpec},
         model::{Alpha, Channel, Clearcoat, Material, Microfacet, SceneError, Sheen, error::Checked},

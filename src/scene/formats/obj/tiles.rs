@@ -13,7 +13,7 @@ use std::{
 use super::files::find_file;
 use crate::scene::{
     files::{
-        outside::{NamedFile, Reach},
+        source_file::{NamedFile, Reach},
         store,
     },
     model::Mesh,

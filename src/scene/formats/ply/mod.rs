@@ -28,7 +28,7 @@ use super::{
 };
 use crate::{
     scene::{
-        files::outside::Access,
+        files::source_file::Access,
         meshes::{
             needs::{Attributes, MeshSize, require_for_mesh, require_for_rows},
             polygon::Triangulator,

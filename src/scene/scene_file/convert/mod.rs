@@ -11,7 +11,7 @@ use toml::{Table, Value};
 use self::relative::Places;
 use super::sources::is_scene_file;
 use crate::scene::{
-    files::{outside::Access, pack::pack_of, read::read_utf8},
+    files::{pack::pack_of, source_file::Access, text::read_utf8},
     formats::material_spec::MAP_KEYS,
     model::{LoadOptions, Look, Scene, SceneError},
 };

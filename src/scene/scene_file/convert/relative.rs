@@ -7,7 +7,7 @@ use std::{
 };
 
 use crate::scene::{
-    files::{outside::Access, store::canonical},
+    files::{source_file::Access, store::canonical},
     model::SceneError,
 };
 

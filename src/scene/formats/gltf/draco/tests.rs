@@ -5,7 +5,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use super::*;
-use crate::scene::files::outside::Access;
+use crate::scene::files::source_file::Access;
 
 /// A box of 2 x 4 x 6: EdgeBreaker at the lowest speed, only positions.
 const CUBE: &str = "\
