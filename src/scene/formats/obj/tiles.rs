@@ -11,13 +11,7 @@ use std::{
 };
 
 use super::files::find_file;
-use crate::scene::{
-    files::{
-        source_file::{NamedFile, Reach},
-        store,
-    },
-    model::Mesh,
-};
+use crate::scene::{files::SourceFile, model::Mesh};
 
 /// Number of the first tile.
 const FIRST: u32 = 1001;
@@ -43,11 +37,11 @@ fn around_number(name: &str) -> Option<(&str, &str)> {
 }
 
 /// Returns the tiles of a map whose images are there, with their files. A map of one image has none.
-pub fn files_of_tiles(reach: Reach, folder: &Path, name: &str) -> Vec<(u32, NamedFile)> {
+pub fn files_of_tiles(obj: &SourceFile, folder: &Path, name: &str) -> Vec<(u32, SourceFile)> {
     let Some((before, after)) = around_number(name) else { return Vec::new() };
     let file = |tile: u32| {
-        let file = find_file(reach, folder, &format!("{before}{tile}{after}")).ok()?;
-        store::is_file(&file.path).then_some((tile, file))
+        let file = find_file(obj, folder, &format!("{before}{tile}{after}")).ok()?;
+        file.is_file().then_some((tile, file))
     };
     let found: Vec<_> = ALL.filter_map(file).collect();
     let is_one_image = !name.to_ascii_uppercase().contains(TOKEN) && found.len() < 2;

@@ -1,6 +1,6 @@
 //! The header of a PLY file, which names the elements and what each of their rows has.
 
-use crate::scene::{files::text::lossy_text, model::error::Checked};
+use crate::scene::{files::lossy_text, model::error::Checked};
 
 /// How the numbers of rows are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
