@@ -141,24 +141,21 @@ impl Shape {
             }
             MeshFormat::Ply | MeshFormat::Stl => {}
         }
-        let parse = |bytes: Vec<u8>, origin: DVec3| {
+        let parse = |origin: DVec3| {
             let how = (shading, origin);
             let kind = match format {
                 MeshFormat::Ply => ply_mesh(&bytes, how, n_loaded, progress).map(ShapeKind::Ply),
-                _ => parse_stl(bytes, how, (n_loaded, progress)).map(|(mesh, what)| ShapeKind::Stl(mesh, what)),
+                _ => parse_stl(&bytes, how, (n_loaded, progress)).map(|(mesh, what)| ShapeKind::Stl(mesh, what)),
             };
             Ok((origin, kind.map_err(|what| file.error(what))?))
         };
-        let first = parse(bytes, origin.first())?;
+        let first = parse(origin.first())?;
         let nearer = match &first.1 {
             ShapeKind::Ply(ply) => origin.second(&ply.mesh().positions),
             ShapeKind::Stl(mesh, _) => origin.second(&mesh.positions),
             ShapeKind::Obj(_) => None,
         };
-        let (origin, kind) = match nearer {
-            Some(nearer) => parse(MeshFile::read(&file)?.bytes, nearer)?,
-            None => first,
-        };
+        let (origin, kind) = nearer.map_or(Ok(first), parse)?;
         Ok(Self { file, kind, origin })
     }
 
