@@ -5,7 +5,7 @@ use std::path::Path;
 use super::{
     maps::{MapKind, MapOptions},
     statement::{split_keyword, statements, without_comment},
-    tiles::files_of_tiles,
+    tiles::files_of_map,
 };
 use crate::scene::{files::SourceFile, model::error::Checked};
 
@@ -31,12 +31,8 @@ fn named_images(obj: &SourceFile, mtl: &SourceFile) -> Vec<SourceFile> {
     let folder = mtl.folder();
     let files = |statement: &str| match split_keyword(statement) {
         (keyword, rest) if matches!(MapKind::of(keyword), MapKind::Shown(_)) => {
-            let Ok(MapOptions { name, .. }) = MapOptions::new(rest) else { return Vec::new() };
-            let tiles = files_of_tiles(obj, folder, &name);
-            match tiles.is_empty() {
-                true => find_file(obj, folder, &name).into_iter().collect(),
-                false => tiles.into_iter().map(|(_, file)| file).collect(),
-            }
+            let files = MapOptions::new(rest).and_then(|options| files_of_map(obj, folder, &options.name));
+            files.unwrap_or_default().into_iter().map(|(_, file)| file).collect()
         }
         _ => Vec::new(),
     };

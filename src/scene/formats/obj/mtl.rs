@@ -9,10 +9,10 @@ use std::{
 };
 
 use super::{
-    files::{find_file, library_files, own_library},
+    files::{library_files, own_library},
     maps::{MapKind, MapOptions, Term, set_map},
     statement::{split_keyword, statements, words},
-    tiles::{TOKEN, Tiles, files_of_tiles},
+    tiles::{TOKEN, Tiles, files_of_map},
 };
 use crate::{
     scene::{
@@ -285,41 +285,28 @@ fn read_more(obj: &SourceFile, path: &Path, text: &str, images: &mut Images) -> 
             MapKind::Shown(term) => term,
         };
         let options = MapOptions::new(rest);
-        if let Ok(options) = &options {
-            let tiles = files_of_tiles(obj, folder, &options.name);
-            if !tiles.is_empty() {
-                if options.is_moved() {
-                    warn(line, rest, format!("`-s` and `-o` of `{keyword}` are left out: its image is in tiles"));
-                }
-                if let Some((_, file)) = tiles.iter().find(|(_, file)| file.is_other_case) {
-                    warn(line, &options.name, format!("`{}`: {} is taken", options.name, shown(&file.path)));
-                }
-                let add = |(tile, file): (u32, SourceFile)| Map {
-                    line,
-                    term,
-                    options: options.clone(),
-                    file: images.add(file),
-                    tile: Some(tile),
-                };
-                material.maps.extend(tiles.into_iter().map(add));
+        let found = options.and_then(|options| Ok((files_of_map(obj, folder, &options.name)?, options)));
+        let (files, options) = match found {
+            Ok(found) => found,
+            Err(what) => {
+                warn(line, rest, format!("`{keyword}` is not shown: {what}"));
                 continue;
             }
-            if options.name.to_ascii_uppercase().contains(TOKEN) {
-                let what = "stands for the number of a tile, from 1001 on, and there is no such image";
-                warn(line, rest, format!("`{keyword}` is not shown: `{TOKEN}` {what}"));
-                continue;
-            }
+        };
+        let has_tiles = files.iter().any(|(tile, _)| tile.is_some());
+        if !has_tiles && options.name.to_ascii_uppercase().contains(TOKEN) {
+            let what = "stands for the number of a tile, from 1001 on, and there is no such image";
+            warn(line, rest, format!("`{keyword}` is not shown: `{TOKEN}` {what}"));
+            continue;
         }
-        let found = options.and_then(|options| Ok((find_file(obj, folder, &options.name)?, options)));
-        match found {
-            Err(what) => warn(line, rest, format!("`{keyword}` is not shown: {what}")),
-            Ok((file, options)) => {
-                if file.is_other_case {
-                    warn(line, &options.name, format!("`{}`: {} is taken", options.name, shown(&file.path)));
-                }
-                material.maps.push(Map { line, term, options, file: images.add(file), tile: None });
-            }
+        if has_tiles && options.is_moved() {
+            warn(line, rest, format!("`-s` and `-o` of `{keyword}` are left out: its image is in tiles"));
         }
+        if let Some((_, file)) = files.iter().find(|(_, file)| file.is_other_case) {
+            warn(line, &options.name, format!("`{}`: {} is taken", options.name, shown(&file.path)));
+        }
+        let map = |(tile, file)| Map { line, term, options: options.clone(), file: images.add(file), tile };
+        material.maps.extend(files.into_iter().map(map));
     }
     materials
 }

@@ -11,7 +11,10 @@ use std::{
 };
 
 use super::files::find_file;
-use crate::scene::{files::SourceFile, model::Mesh};
+use crate::scene::{
+    files::SourceFile,
+    model::{Mesh, error::Checked},
+};
 
 /// Number of the first tile.
 const FIRST: u32 = 1001;
@@ -36,8 +39,18 @@ fn around_number(name: &str) -> Option<(&str, &str)> {
     (before.ends_with(['.', '_']) && after.starts_with('.')).then_some((before, after))
 }
 
+/// Returns the files of a map: those of its tiles whose images are there, with the numbers of the tiles, or else the
+/// file of its name.
+pub fn files_of_map(obj: &SourceFile, folder: &Path, name: &str) -> Checked<Vec<(Option<u32>, SourceFile)>> {
+    let tiles = files_of_tiles(obj, folder, name);
+    match tiles.is_empty() {
+        true => Ok(vec![(None, find_file(obj, folder, name)?)]),
+        false => Ok(tiles.into_iter().map(|(tile, file)| (Some(tile), file)).collect()),
+    }
+}
+
 /// Returns the tiles of a map whose images are there, with their files. A map of one image has none.
-pub fn files_of_tiles(obj: &SourceFile, folder: &Path, name: &str) -> Vec<(u32, SourceFile)> {
+fn files_of_tiles(obj: &SourceFile, folder: &Path, name: &str) -> Vec<(u32, SourceFile)> {
     let Some((before, after)) = around_number(name) else { return Vec::new() };
     let file = |tile: u32| {
         let file = find_file(obj, folder, &format!("{before}{tile}{after}")).ok()?;
