@@ -7,4 +7,8 @@ mod source_file;
 mod store;
 mod text;
 
-pub(crate) use self::{source_file::SourceFile, store::canonical, text::lossy_text};
+pub(crate) use self::{
+    source_file::SourceFile,
+    store::canonical,
+    text::{lossy_text, without_bom},
+};

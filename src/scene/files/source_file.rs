@@ -72,9 +72,10 @@ impl SourceFile {
         self.bytes().map(text::lossy_text)
     }
 
-    /// Refuses a file whose name is that of no scene, unless `is_scene` accepts its first bytes.
+    /// Refuses a file whose name is that of no scene, unless `is_scene` accepts its first bytes, without a byte order
+    /// mark.
     pub fn check_content(&self, is_scene: impl Fn(&[u8]) -> bool) -> Result<(), SceneError> {
-        let head = store::head(&self.path, HEAD_BYTES).unwrap_or_else(|| b" ".to_vec());
+        let head = store::head(&self.path, HEAD_BYTES).map_or_else(|| b" ".to_vec(), text::without_bom);
         if is_scene(&head) { Ok(()) } else { Err(self.error(foreign::of_other_name(&self.path, &head))) }
     }
 

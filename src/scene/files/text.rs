@@ -51,7 +51,7 @@ pub fn utf8(bytes: Vec<u8>) -> Result<String, usize> {
 }
 
 /// Takes the byte order mark of UTF-8 from the beginning of bytes.
-fn without_bom(mut bytes: Vec<u8>) -> Vec<u8> {
+pub(crate) fn without_bom(mut bytes: Vec<u8>) -> Vec<u8> {
     if bytes.starts_with(b"\xef\xbb\xbf") {
         bytes.drain(..3);
     }

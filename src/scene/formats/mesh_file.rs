@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     scene::{
-        files::{SourceFile, lossy_text},
+        files::{SourceFile, lossy_text, without_bom},
         meshes::{coincident, smooth::Shading},
         model::{Material, Mesh, SceneError, extent::MeshOrigin},
     },
@@ -60,14 +60,13 @@ impl MeshFormat {
 /// Returns whether a file's first bytes are those of a GLB or a PLY file, whatever its name is: avatars in `.vrm`
 /// files, for example, are GLB.
 pub(crate) fn is_certain(head: &[u8]) -> bool {
-    let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head);
-    head.starts_with(b"glTF") || [b"ply\n", b"ply\r"].iter().any(|first| text.starts_with(*first))
+    [&b"glTF"[..], b"ply\n", b"ply\r"].iter().any(|first| head.starts_with(first))
 }
 
 /// Returns whether a file is glTF: a GLB file, or a JSON object with the key `asset`.
 fn is_gltf(bytes: &[u8]) -> bool {
     const KEY: &[u8] = b"\"asset\"";
-    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+    let text = bytes.trim_ascii_start();
     bytes.starts_with(b"glTF") || text.starts_with(b"{") && text.windows(KEY.len()).any(|part| part == KEY)
 }
 
@@ -75,6 +74,7 @@ fn is_gltf(bytes: &[u8]) -> bool {
 pub(crate) struct MeshFile {
     pub source: SourceFile,
     pub format: MeshFormat,
+    /// Without a byte order mark.
     pub bytes: Vec<u8>,
 }
 
@@ -83,6 +83,8 @@ impl MeshFile {
     pub fn read(source: &SourceFile) -> Result<Self, SceneError> {
         let is_text = !matches!(MeshFormat::of_name(&source.path), Some(MeshFormat::Ply | MeshFormat::Gltf));
         let bytes = source.scene_bytes(is_text)?;
+        // The comment of a binary STL file may begin with anything.
+        let bytes = if is_binary_stl(&bytes) { bytes } else { without_bom(bytes) };
         Ok(Self { source: source.clone(), format: MeshFormat::of(&source.path, &bytes), bytes })
     }
 }
