@@ -11,7 +11,7 @@ use super::{
     glb::split,
     lenient, meshopt,
     pointers::Pointer,
-    uri::{Uri, is_data},
+    uri::{Uri, data},
 };
 use crate::{
     scene::{files::SourceFile, formats::mesh_file::MeshFile, model::error::Checked},
@@ -210,7 +210,7 @@ impl Document {
     /// Returns what a buffer's URI stands for. A file that several buffers name is read once.
     fn fetch(&self, uri: &str) -> Checked<Arc<Vec<u8>>> {
         let name = match Uri::new(uri)? {
-            Uri::Data(bytes) => return Ok(Arc::new(bytes)),
+            Uri::Data => return data(uri).map(Arc::new),
             Uri::File(name) => name,
         };
         let file = self.named(&name)?;
@@ -249,9 +249,8 @@ impl Document {
         let image = item(&self.root.images, "images", index.value(), from)?;
         let failed = |what: String| format!("images[{index}]: {what}");
         match (&image.uri, image.buffer_view) {
-            (Some(uri), _) if is_data(uri) => Ok(ImageSource::Uri(index.value())),
             (Some(uri), _) => match Uri::new(uri).map_err(failed)? {
-                Uri::Data(_) => unreachable!("data is another source"),
+                Uri::Data => Ok(ImageSource::Uri(index.value())),
                 Uri::File(name) => self.named(&name).map(ImageSource::File).map_err(failed),
             },
             (None, Some(view)) => Ok(ImageSource::View(view.value())),
@@ -263,11 +262,10 @@ impl Document {
     pub fn image(&self, ix: usize, source: &ImageSource) -> Checked<Option<Cow<'_, [u8]>>> {
         let place = format!("images[{ix}]");
         match source {
-            ImageSource::Uri(ix) => match Uri::new(self.root.images[*ix].uri.as_deref().unwrap_or_default()) {
-                Ok(Uri::Data(bytes)) => Ok(Some(bytes.into())),
-                Ok(Uri::File(_)) => unreachable!("files are another source"),
-                Err(what) => Err(format!("{place}: {what}")),
-            },
+            ImageSource::Uri(ix) => {
+                let bytes = data(self.root.images[*ix].uri.as_deref().unwrap_or_default());
+                bytes.map(|bytes| Some(bytes.into())).map_err(|what| format!("{place}: {what}"))
+            }
             ImageSource::View(view) => Ok(Some(self.view(Index::new(*view as u32), &place)?.bytes.into())),
             ImageSource::File(file) => {
                 let bytes = file.bytes().map_err(|error| match file.exists() {
