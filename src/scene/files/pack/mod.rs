@@ -109,7 +109,8 @@ impl OpenScene {
 
     /// Returns an error if a file of the pack could not be read at any time since it was opened.
     pub fn check(&self) -> Result<(), SceneError> {
-        self.pack.as_ref().map_or(Ok(()), |pack| pack.check())
+        let failure = |pack: &Arc<Pack>| Some(SceneError::file(&pack.archive.path, pack.failure.get()?));
+        self.pack.as_ref().and_then(failure).map_or(Ok(()), Err)
     }
 }
 
@@ -183,10 +184,5 @@ impl Pack {
     /// Notes that a file of the pack could not be read.
     fn note_failure(&self, file: &PackedFile, error: &io::Error) {
         let _ = self.failure.set(format!("{}: {error}", file.name));
-    }
-
-    /// Returns an error if a file could not be read at any time since the pack was opened.
-    pub fn check(&self) -> Result<(), SceneError> {
-        self.failure.get().map_or(Ok(()), |what| Err(SceneError::file(&self.archive.path, what)))
     }
 }
