@@ -149,6 +149,32 @@ fn forbidden_uses_are_found() {
     assert_eq!(of("gpu/x.rs", "#[cfg(test)]\nmod tests {\n    use crate::engine;\n}"), [""; 0]);
 }
 
+/// What opens files or asks for them, beside the module `fs`.
+const OPENS_FILES: [&str; 8] =
+    ["fs::", "File::open(", "OpenOptions", "image::open(", "canonicalize(", "metadata(", "read_dir(", "try_exists("];
+
+/// Returns what of some code opens files.
+fn opened_by(code: &str) -> Vec<&'static str> {
+    let module = used(code, "std::").contains("fs").then_some("fs");
+    module.into_iter().chain(OPENS_FILES.into_iter().filter(|what| n_calls(code, what) > 0)).collect()
+}
+
+/// Readers take bytes, and a `SourceFile` for what a file names: it alone says what may be read, and how much.
+#[test]
+fn files_of_scenes_are_opened_in_one_room() {
+    let (inside, others): (Vec<_>, Vec<_>) =
+        sources(Path::new("src/scene")).into_iter().partition(|path| path.starts_with("src/scene/files"));
+    let opened = |path: &PathBuf| opened_by(&code_of(&fs::read_to_string(path).unwrap()));
+    let found: Vec<_> = others.iter().map(|path| (path, opened(path))).filter(|(_, what)| !what.is_empty()).collect();
+    assert!(others.len() > 50 && found.is_empty(), "{found:#?}");
+    assert!(inside.iter().any(|path| !opened(path).is_empty()), "{inside:?}");
+    assert_eq!(opened_by("use std::{\n    fs,\n    path::Path,\n};"), ["fs"]);
+    assert_eq!(opened_by("let a = std::fs::read(path)?;"), ["fs", "fs::"]);
+    assert_eq!(opened_by("let a = io::File::open(path)?; let b = OtherFile::open(path)?;"), ["File::open("]);
+    assert_eq!(opened_by("let a = path.canonicalize()?; let b = file.canonical();"), ["canonicalize("]);
+    assert_eq!(opened_by("let a = offs::x(); file.bytes()?"), [""; 0]);
+}
+
 /// `#![deny(unsafe_code)]` holds where nothing allows it.
 #[test]
 fn unsafe_code_is_in_the_vulkan_layer() {

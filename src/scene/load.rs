@@ -5,11 +5,11 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::{
-    files::{foreign, outside::Access, pack, store},
+    files::{SourceFile, pack::OpenScene},
     formats::{
         gltf,
         image_files::Images,
-        mesh_file::{self, Loaded, Loading, MeshFormat},
+        mesh_file::{self, Loaded, Loading, MeshFile, MeshFormat},
     },
     guess::{standard, up_axis},
     meshes::smooth::Shading,
@@ -49,13 +49,9 @@ impl Scene {
     /// Those of [`Scene::load`]; the file does not have the scene or the camera that `options` names, or its camera
     /// with the changes of `options` shows nothing.
     pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
-        // A pack stays open until all of its files are read.
-        let pack = pack::opened(path)?;
-        let scene = match pack::scene_of(path, options)? {
-            Some(packed) => Self::load_file(&packed.path, &packed.options),
-            None => Self::load_file(path, options),
-        };
-        pack.map_or(Ok(()), |pack| pack.check())?;
+        let opened = OpenScene::new(path, options)?;
+        let scene = Self::load_file(&opened.file, &opened.options);
+        opened.check()?;
         scene
     }
 
@@ -66,56 +62,51 @@ impl Scene {
     /// Those of [`Scene::load`].
     pub fn of_text(name: &str, text: &str) -> Result<Scene, SceneError> {
         let (path, options) = (Path::new(name), LoadOptions::default());
-        let Assembled { mut scene, lacks, .. } = assemble::parse_toml(path, text, &options)?;
-        standard::fill_in(path, &mut scene, lacks, &options).map_err(|what| SceneError::file(path, what))?;
+        let file = SourceFile::new(path, &options);
+        let Assembled { mut scene, lacks, .. } = assemble::parse_toml(&file, text, &options)?;
+        standard::fill_in(path, &mut scene, lacks, &options).map_err(|what| file.error(what))?;
         Ok(scene)
     }
 
     /// Loads a scene from a file that is no pack.
-    fn load_file(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
+    fn load_file(file: &SourceFile, options: &LoadOptions) -> Result<Scene, SceneError> {
+        let (path, failed) = (&*file.path, |what: String| file.error(what));
         let (mut scene, lacks) = if is_scene_file(path) {
-            check_only_scene(path, options)?;
-            let Assembled { scene, lacks, .. } = assemble::load_toml(path, options)?;
+            check_only_scene(file, options)?;
+            let Assembled { scene, lacks, .. } = assemble::load_toml(file, options)?;
             (scene, lacks)
-        } else if MeshFormat::of_name(path).is_some() {
-            load_mesh_file(path, options)?
         } else {
-            let head = store::head(path, HEAD_BYTES).unwrap_or_else(|_| b" ".to_vec());
-            if !mesh_file::is_certain(&head) {
-                return Err(SceneError::file(path, foreign::of_other_name(path, &head)));
+            if MeshFormat::of_name(path).is_none() {
+                file.check_content(mesh_file::is_certain)?;
             }
-            load_mesh_file(path, options)?
+            load_mesh_file(MeshFile::read(file)?, options)?
         };
-        preset::replace(&mut scene, &options.look.materials).map_err(|what| SceneError::file(path, what))?;
+        preset::replace(&mut scene, &options.look.materials).map_err(failed)?;
         if options.look.shows_back_faces {
             scene.show_back_faces();
         }
-        scene.add_tangents().map_err(|what| SceneError::file(path, what))?;
+        scene.add_tangents().map_err(failed)?;
         if let Some(name) = &options.camera {
-            scene.choose_camera(name).map_err(|what| SceneError::file(path, what))?;
+            scene.choose_camera(name).map_err(failed)?;
         }
-        standard::fill_in(path, &mut scene, lacks, options).map_err(|what| SceneError::file(path, what))?;
+        standard::fill_in(path, &mut scene, lacks, options).map_err(failed)?;
         Ok(scene)
     }
 }
 
-/// Number of bytes at the beginning of a file that tell what it is.
-const HEAD_BYTES: usize = 1024;
-
 /// Loads a mesh file as a scene: the mesh with its own materials. Only a glTF file may have lights and cameras.
-fn load_mesh_file(path: &Path, options: &LoadOptions) -> Result<(Scene, Lacks), SceneError> {
-    let bytes = mesh_file::read_mesh(path)?;
-    if MeshFormat::of(path, &bytes) == MeshFormat::Gltf {
-        return gltf::load(path, bytes, options);
+fn load_mesh_file(file: MeshFile, options: &LoadOptions) -> Result<(Scene, Lacks), SceneError> {
+    if file.format == MeshFormat::Gltf {
+        return gltf::load(file, options);
     }
-    check_only_scene(path, options)?;
+    check_only_scene(&file.source, options)?;
+    let (path, format) = (&*file.source.path.clone(), file.format);
     let mut scene = Scene::empty(path);
     let mut images = Images::new(options.look.materials.clone(), &options.progress);
-    let access = Access::of(options);
     let origin = if options.recentre { MeshOrigin::Near } else { MeshOrigin::At(DVec3::ZERO) };
-    let mut loading = Loading { shading: Shading::default(), origin, n_loaded: 0, access, images: &mut images };
-    let (format, head) = (MeshFormat::of(path, &bytes), bytes[..bytes.len().min(up_axis::HEAD_BYTES)].to_vec());
-    let Loaded { mesh, materials, origin, .. } = mesh_file::parse_mesh(path, bytes, &mut loading)?;
+    let mut loading = Loading { shading: Shading::default(), origin, n_loaded: 0, images: &mut images };
+    let head = file.bytes[..file.bytes.len().min(up_axis::HEAD_BYTES)].to_vec();
+    let Loaded { mesh, materials, origin, .. } = mesh_file::parse_mesh(file, &mut loading)?;
     if origin != DVec3::ZERO {
         scene.origin = origin;
         extent::note(path, origin);
@@ -129,9 +120,9 @@ fn load_mesh_file(path: &Path, options: &LoadOptions) -> Result<(Scene, Lacks), 
 }
 
 /// Refuses the choice of a scene for a file that has only one.
-fn check_only_scene(path: &Path, options: &LoadOptions) -> Result<(), SceneError> {
+fn check_only_scene(file: &SourceFile, options: &LoadOptions) -> Result<(), SceneError> {
     match &options.scene {
-        Some(name) => Err(SceneError::file(path, format!("there is no scene `{name}`: only glTF files name scenes"))),
+        Some(name) => Err(file.error(format!("there is no scene `{name}`: only glTF files name scenes"))),
         None => Ok(()),
     }
 }

@@ -3,12 +3,14 @@
 use std::path::Path;
 
 use super::{
-    files::pack,
-    formats::gltf,
+    files::pack::OpenScene,
+    formats::{
+        gltf,
+        mesh_file::{MeshFile, MeshFormat},
+    },
     model::{AnimationChoice, AnimationInfo, LoadOptions, Scene, SceneError, deformation::ChangedMeshes},
     scene_file::{assemble, poser::KeyPoser, sources::is_scene_file},
 };
-use crate::scene::formats::mesh_file::{MeshFormat, read_mesh};
 
 /// A file that can be posed.
 pub(crate) enum Poser {
@@ -20,11 +22,13 @@ impl Poser {
     /// Reads a file, or that of a pack, whose scene at the moment of the options is known. Returns `None` if it must be
     /// read again at each moment.
     pub fn new(path: &Path, options: &LoadOptions, scene: &Scene) -> Option<Self> {
-        let packed = pack::scene_of(path, options).ok()?;
-        let (path, options) = packed.as_ref().map_or((path, options), |packed| (&packed.path, &packed.options));
-        match is_scene_file(path) {
-            true => KeyPoser::new(path, options, scene).map(Self::Keys),
-            false => gltf::Poser::new(path, options, scene).map(|poser| Self::Gltf(Box::new(poser))),
+        let OpenScene { file, options, .. } = &OpenScene::new(path, options).ok()?;
+        match is_scene_file(&file.path) {
+            true => KeyPoser::new(file, options, scene).map(Self::Keys),
+            false => {
+                let mesh = MeshFile::read(file).ok()?;
+                gltf::Poser::new(mesh, options, scene).map(|poser| Self::Gltf(Box::new(poser)))
+            }
         }
     }
 
@@ -51,19 +55,17 @@ impl Poser {
 /// # Errors
 /// The file cannot be read or understood, or has no animation of the name that the options choose.
 pub fn animations_of(path: &Path, options: &LoadOptions) -> Result<Vec<AnimationInfo>, SceneError> {
-    let packed = pack::scene_of(path, options)?;
-    let (path, options) = packed.as_ref().map_or((path, options), |packed| (&packed.path, &packed.options));
-    let mut all = if is_scene_file(path) {
-        assemble::animations(path, options)?
+    let OpenScene { file, options, .. } = &OpenScene::new(path, options)?;
+    let mut all = if is_scene_file(&file.path) {
+        assemble::animations(file, options)?
     } else {
-        let bytes = read_mesh(path)?;
-        match MeshFormat::of(path, &bytes) {
-            MeshFormat::Gltf => gltf::animations(path, bytes, options)?,
+        match MeshFile::read(file)? {
+            mesh if mesh.format == MeshFormat::Gltf => gltf::animations(mesh, options)?,
             _ => Vec::new(),
         }
     };
     let names: Vec<&str> = all.iter().map(|info| info.name.as_str()).collect();
-    let chosen = options.animation.among(&names).map_err(|what| SceneError::file(path, what))?;
+    let chosen = options.animation.among(&names).map_err(|what| file.error(what))?;
     let mut ix = 0..;
     all.retain(|_| ix.next().is_some_and(|ix| chosen.contains(&ix)));
     Ok(all)

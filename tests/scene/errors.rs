@@ -193,6 +193,36 @@ fn files_that_are_no_scenes_are_refused() {
     assert!(missing.starts_with("no such\\u{7}.toml: cannot be read"), "{missing}");
 }
 
+/// Files of 1 TiB, all zeros, are refused before they are read, whoever names them.
+#[test]
+fn files_that_do_not_fit_in_memory_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    for name in ["big.toml", "big.obj", "big.ply", "big.png", "big.npy", "big.bin"] {
+        fs::File::create(path(name)).unwrap().set_len(1 << 40).unwrap();
+    }
+    let mesh = |keys: &str| format!("[[mesh]]\ngenerator = 'disc'\nradius = 1\nsegments = 3\n{keys}");
+    fs::write(path("map.toml"), format!("materials.m = {{ map_Kd = 'big.png' }}\n{}", mesh("material = 'm'"))).unwrap();
+    fs::write(path("sky.toml"), format!("environment = {{ file = 'big.png' }}\n{}", mesh(""))).unwrap();
+    fs::write(path("many.toml"), mesh("instances = 'big.npy'")).unwrap();
+    let gltf = r#"{ "asset": { "version": "2.0" }, "buffers": [{ "uri": "big.bin", "byteLength": 4 }] }"#;
+    fs::write(path("m.gltf"), gltf).unwrap();
+    for (name, big) in [
+        ("big.toml", "big.toml"),
+        ("big.obj", "big.obj"),
+        ("big.ply", "big.ply"),
+        ("map.toml", "big.png"),
+        ("sky.toml", "big.png"),
+        ("many.toml", "big.npy"),
+        ("m.gltf", "big.bin"),
+    ] {
+        let error = Scene::load(&path(name)).unwrap_err().to_string();
+        let is_text = name == "big.obj";
+        let what = format!("{big}: reading it needs some {}.0 GiB of memory", if is_text { 2048 } else { 1024 });
+        assert!(error.contains(&what), "{name}: {error}");
+    }
+}
+
 /// Valid scenes. The first file of each row is the one that is mutated.
 const SEEDS: [&[(&str, &str)]; 4] = [
     &[(

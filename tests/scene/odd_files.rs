@@ -387,6 +387,25 @@ fn texts_of_other_computers_are_read() {
     }
 }
 
+/// A byte order mark, as editors of Windows write it, is left out, but where the bytes of a file are no text.
+#[test]
+fn byte_order_marks_are_left_out() {
+    let obj = format!("mtllib m.mtl\nusemtl a\n{TRIANGLE}f 1 2 3\n");
+    let facet =
+        "solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n";
+    let toml = "[[mesh]]\nfile = 'm.obj'\n";
+    let ply = coloured_faces(None);
+    let files = [("a.toml", toml), ("m.obj", &obj), ("m.stl", facet), ("m.ply", &ply), ("other", &ply)];
+    for (name, text) in files {
+        let marked = |text: &str| [b"\xef\xbb\xbf", text.as_bytes()].concat();
+        let (text, obj, mtl) = (marked(text), marked(&obj), marked("newmtl a\nKd 0.25\n"));
+        let (scene, warnings) = loaded(&[(name, &text), ("m.obj", &obj), ("m.mtl", &mtl)]);
+        assert!(!scene.meshes[0].faces.is_empty() && warnings.is_empty(), "{name}: {warnings:?}");
+    }
+    let binary = stl(b"\xef\xbb\xbf is no mark here", &[0, 0]);
+    assert_eq!(loaded(&[("m.stl", &binary)]).0.meshes[0].faces.len(), 2);
+}
+
 /// The path of the computer on which the file was written ends as one here does.
 #[test]
 fn images_are_found_by_the_ends_of_their_paths() {

@@ -39,7 +39,7 @@ const FOREIGN: [(&[u8], &str); 26] = [
 ];
 
 /// Returns what a file is instead of a scene, if its first bytes tell.
-pub(crate) fn what_it_is(bytes: &[u8]) -> Option<&'static str> {
+pub fn what_it_is(bytes: &[u8]) -> Option<&'static str> {
     if bytes.is_empty() {
         return Some("is empty");
     }
@@ -88,7 +88,7 @@ fn of_name(path: &Path) -> Option<&'static str> {
 }
 
 /// Returns why a file whose name has another ending than those of scenes is no scene.
-pub(crate) fn of_other_name(path: &Path, bytes: &[u8]) -> String {
+pub fn of_other_name(path: &Path, bytes: &[u8]) -> String {
     match of_name(path).or_else(|| what_it_is(bytes)) {
         Some(what) => what.to_owned(),
         None if path.is_dir() => "is a folder: name a file in it".to_owned(),

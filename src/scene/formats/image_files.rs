@@ -5,10 +5,7 @@ use std::{collections::HashMap, path::PathBuf};
 use super::image::{Encoded, Examined, MAX_PIXELS, decode_all, normals_of_heights};
 use crate::{
     scene::{
-        files::{
-            read::read_bytes,
-            store::{self, require_for_bytes},
-        },
+        files::SourceFile,
         meshes::needs::require_for_images,
         model::{Channel, Image, MaterialChoice, Pixels, error::Checked, preset::is_replaced},
     },
@@ -45,7 +42,7 @@ pub(crate) struct Images {
 
 #[derive(Debug)]
 struct File {
-    path: PathBuf,
+    source: SourceFile,
     /// `None` until the file is decoded. An error is a message that names the file.
     image: Option<Checked<Examined>>,
 }
@@ -81,36 +78,33 @@ impl Images {
     }
 
     /// Returns the index of a file.
-    pub fn add(&mut self, path: PathBuf) -> usize {
+    pub fn add(&mut self, source: SourceFile) -> usize {
         // One file can have several names. A file that does not exist has those that are stated.
-        let canonical = store::canonical(&path).unwrap_or_else(|_| path.clone());
-        *self.by_path.entry(canonical).or_insert_with(|| {
-            self.files.push(File { path, image: None });
+        *self.by_path.entry(source.canonical()).or_insert_with(|| {
+            self.files.push(File { source, image: None });
             self.files.len() - 1
         })
     }
 
     /// Reads and decodes the files that have not been decoded.
     pub fn decode(&mut self) {
-        let read = |path: &PathBuf| {
-            require_for_bytes(path).map_err(|what| format!("{}: {what}", path.display()))?;
-            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            let bytes = read_bytes(path).map_err(|error| error.to_string())?;
-            Ok(Encoded { name, bytes: bytes.into() })
+        let read = |file: &SourceFile| {
+            let name = file.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            file.bytes().map(|bytes| Encoded { name, bytes: bytes.into() })
         };
         let (mut encoded, mut waiting) = (Vec::new(), Vec::new());
         for file in self.files.iter_mut().filter(|file| file.image.is_none()) {
-            match read(&file.path) {
+            match read(&file.source) {
                 Ok(read) => {
                     encoded.push(read);
                     waiting.push(file);
                 }
-                Err(what) => file.image = Some(Err(what)),
+                Err(error) => file.image = Some(Err(error.to_string())),
             }
         }
         for (file, decoded) in waiting.into_iter().zip(decode_all(encoded, self.n_pixels, &self.progress)) {
             self.n_pixels += decoded.as_ref().map_or(0, |image| image.pixels.len() as u64);
-            let decoded = decoded.map(Examined::new).map_err(|what| format!("{}: {what}", file.path.display()));
+            let decoded = decoded.map(Examined::new).map_err(|what| format!("{}: {what}", file.source.path.display()));
             file.image = Some(decoded);
         }
     }
@@ -221,13 +215,17 @@ fn inverted(image: &Image) -> Image {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::*;
+    use crate::scene::LoadOptions;
 
     fn images() -> Images {
         let pixels = Pixels::Bytes(vec![[9, 8, 7, 6]; 20]);
         let image = Image { name: "a.png".to_owned(), width: 5, height: 4, pixels, is_linear: false };
         let mut images = Images::default();
-        images.files.push(File { path: PathBuf::from("a.png"), image: Some(Ok(Examined::new(image))) });
+        let source = SourceFile::new(Path::new("a.png"), &LoadOptions::default());
+        images.files.push(File { source, image: Some(Ok(Examined::new(image))) });
         images
     }
 

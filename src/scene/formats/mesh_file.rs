@@ -14,12 +14,7 @@ use super::{
 };
 use crate::{
     scene::{
-        files::{
-            foreign,
-            outside::Access,
-            read::{lossy_text, read_bytes},
-            store::{require_for_bytes, require_for_text},
-        },
+        files::{SourceFile, lossy_text, without_bom},
         meshes::{coincident, smooth::Shading},
         model::{Material, Mesh, SceneError, extent::MeshOrigin},
     },
@@ -49,7 +44,7 @@ impl MeshFormat {
 
     /// Returns the format of a file: by its first bytes or its size, else by its name's ending, else OBJ, which is
     /// text without a magic number.
-    pub fn of(path: &Path, bytes: &[u8]) -> Self {
+    fn of(path: &Path, bytes: &[u8]) -> Self {
         if is_gltf(bytes) {
             Self::Gltf
         } else if is_certain(bytes) {
@@ -65,28 +60,32 @@ impl MeshFormat {
 /// Returns whether a file's first bytes are those of a GLB or a PLY file, whatever its name is: avatars in `.vrm`
 /// files, for example, are GLB.
 pub(crate) fn is_certain(head: &[u8]) -> bool {
-    let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head);
-    head.starts_with(b"glTF") || [b"ply\n", b"ply\r"].iter().any(|first| text.starts_with(*first))
+    [&b"glTF"[..], b"ply\n", b"ply\r"].iter().any(|first| head.starts_with(first))
 }
 
 /// Returns whether a file is glTF: a GLB file, or a JSON object with the key `asset`.
 fn is_gltf(bytes: &[u8]) -> bool {
     const KEY: &[u8] = b"\"asset\"";
-    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+    let text = bytes.trim_ascii_start();
     bytes.starts_with(b"glTF") || text.starts_with(b"{") && text.windows(KEY.len()).any(|part| part == KEY)
 }
 
-/// Reads a mesh file, unless it is too large for the memory.
-pub(crate) fn read_mesh(path: &Path) -> Result<Vec<u8>, SceneError> {
-    let required = match MeshFormat::of_name(path) {
-        Some(MeshFormat::Ply | MeshFormat::Gltf) => require_for_bytes(path),
-        _ => require_for_text(path),
-    };
-    required.map_err(|what| SceneError::file(path, what))?;
-    let bytes = read_bytes(path)?;
-    match foreign::what_it_is(&bytes) {
-        Some(what) => Err(SceneError::file(path, what)),
-        None => Ok(bytes),
+/// The content of a mesh file.
+pub(crate) struct MeshFile {
+    pub source: SourceFile,
+    pub format: MeshFormat,
+    /// Without a byte order mark.
+    pub bytes: Vec<u8>,
+}
+
+impl MeshFile {
+    /// Takes the content of a file, which is read here.
+    pub fn read(source: &SourceFile) -> Result<Self, SceneError> {
+        let is_text = !matches!(MeshFormat::of_name(&source.path), Some(MeshFormat::Ply | MeshFormat::Gltf));
+        let bytes = source.scene_bytes(is_text)?;
+        // The comment of a binary STL file may begin with anything.
+        let bytes = if is_binary_stl(&bytes) { bytes } else { without_bom(bytes) };
+        Ok(Self { source: source.clone(), format: MeshFormat::of(&source.path, &bytes), bytes })
     }
 }
 
@@ -98,8 +97,6 @@ pub(crate) struct Loading<'a> {
     pub origin: MeshOrigin,
     /// Number of triangles that the scene has already.
     pub n_loaded: usize,
-    /// Which files the mesh file may name.
-    pub access: Access,
     /// The images of the scene, to which those of the mesh file are added.
     pub images: &'a mut Images,
 }
@@ -118,6 +115,7 @@ pub(crate) struct Loaded {
 
 /// The content of a file that is not glTF, as far as it needs no other files. Several can be read at the same time.
 pub(crate) struct Shape {
+    file: SourceFile,
     kind: ShapeKind,
     /// The point of the file that is the origin of a PLY or STL file's mesh.
     origin: DVec3,
@@ -133,55 +131,50 @@ enum ShapeKind {
 impl Shape {
     /// Reads a file's content. `n_loaded`: the number of triangles that the scene has already.
     pub fn parse(
-        path: &Path,
-        bytes: Vec<u8>,
+        MeshFile { source: file, format, bytes }: MeshFile,
         (shading, origin): (Shading, MeshOrigin),
         (n_loaded, progress): (usize, &Progress),
     ) -> Result<Self, SceneError> {
-        let format = MeshFormat::of(path, &bytes);
         match format {
-            MeshFormat::Gltf => return Err(SceneError::file(path, "is glTF, which is a whole scene")),
+            MeshFormat::Gltf => return Err(file.error("is glTF, which is a whole scene")),
             MeshFormat::Obj => {
-                let file = read_obj(path, lossy_text(bytes), origin, progress)?;
-                return Ok(Self { kind: ShapeKind::Obj(file), origin: origin.first() });
+                let content = read_obj(&file.path, lossy_text(bytes), origin, progress)?;
+                return Ok(Self { file, kind: ShapeKind::Obj(content), origin: origin.first() });
             }
             MeshFormat::Ply | MeshFormat::Stl => {}
         }
-        let parse = |bytes: Vec<u8>, origin: DVec3| {
-            let made = match format {
-                MeshFormat::Ply => ply_mesh(&bytes, (shading, origin), n_loaded, progress).map(ShapeKind::Ply),
-                _ => {
-                    let made = parse_stl(bytes, (shading, origin), (n_loaded, progress));
-                    made.map(|(mesh, warning)| ShapeKind::Stl(mesh, warning))
-                }
+        let parse = |origin: DVec3| {
+            let how = (shading, origin);
+            let kind = match format {
+                MeshFormat::Ply => ply_mesh(&bytes, how, n_loaded, progress).map(ShapeKind::Ply),
+                _ => parse_stl(&bytes, how, (n_loaded, progress)).map(|(mesh, what)| ShapeKind::Stl(mesh, what)),
             };
-            made.map(|kind| Self { kind, origin }).map_err(|what| SceneError::file(path, what))
+            Ok((origin, kind.map_err(|what| file.error(what))?))
         };
-        let made = parse(bytes, origin.first())?;
-        let mesh = match &made.kind {
-            ShapeKind::Ply(ply) => ply.mesh(),
-            ShapeKind::Stl(mesh, _) => mesh,
-            ShapeKind::Obj(_) => return Ok(made),
+        let first = parse(origin.first())?;
+        let nearer = match &first.1 {
+            ShapeKind::Ply(ply) => origin.second(&ply.mesh().positions),
+            ShapeKind::Stl(mesh, _) => origin.second(&mesh.positions),
+            ShapeKind::Obj(_) => None,
         };
-        match origin.second(&mesh.positions) {
-            Some(nearer) => parse(read_mesh(path)?, nearer),
-            None => Ok(made),
-        }
+        let (origin, kind) = nearer.map_or(Ok(first), parse)?;
+        Ok(Self { file, kind, origin })
     }
 
     /// Reads the materials, and makes the mesh if that has not been done.
-    pub fn loaded(self, path: &Path, loading: &mut Loading) -> Result<Loaded, SceneError> {
-        let Self { kind, origin } = self;
+    pub fn loaded(self, loading: &mut Loading) -> Result<Loaded, SceneError> {
+        let Self { file, kind, origin } = self;
+        let path = &*file.path;
         let n_points = match &kind {
-            ShapeKind::Obj(file) => file.n_points(),
+            ShapeKind::Obj(content) => content.n_points(),
             ShapeKind::Ply(ply) => ply.mesh().positions.len(),
             ShapeKind::Stl(mesh, _) => mesh.positions.len(),
         };
         // An OBJ file's polygons are separated before they are cut into triangles.
         let is_obj = matches!(kind, ShapeKind::Obj(_));
         let mut loaded = match kind {
-            ShapeKind::Obj(file) => obj_mesh(path, file, loading)?,
-            ShapeKind::Ply(ply) => Loaded { origin, ..ply.with_materials(path, loading.access, loading.images) },
+            ShapeKind::Obj(content) => obj_mesh(&file, content, loading)?,
+            ShapeKind::Ply(ply) => Loaded { origin, ..ply.with_materials(&file, loading.images) },
             ShapeKind::Stl(mesh, warning) => {
                 warning.iter().for_each(|warning| tracing::warn!("{}: {warning}", path.display()));
                 Loaded { mesh, origin, materials: Vec::new(), uses_crease: loading.shading.smooth }
@@ -193,18 +186,18 @@ impl Shape {
         }
         match (loaded.mesh.faces.is_empty(), n_points) {
             (false, _) => Ok(loaded),
-            (true, 0) => Err(SceneError::file(path, "has no triangles")),
-            (true, n) => Err(SceneError::file(
-                path,
-                format!("has {n} points but no triangles: clouds of points, lines and curves are not shown"),
-            )),
+            (true, 0) => Err(file.error("has no triangles")),
+            (true, n) => {
+                let what = "points but no triangles: clouds of points, lines and curves are not shown";
+                Err(file.error(format!("has {n} {what}")))
+            }
         }
     }
 }
 
 /// Makes a mesh from the content of a file that is not glTF, and reads the materials that it names.
-pub(crate) fn parse_mesh(path: &Path, bytes: Vec<u8>, loading: &mut Loading) -> Result<Loaded, SceneError> {
+pub(crate) fn parse_mesh(file: MeshFile, loading: &mut Loading) -> Result<Loaded, SceneError> {
     let progress = loading.images.progress().clone();
     let place = (loading.shading, loading.origin);
-    Shape::parse(path, bytes, place, (loading.n_loaded, &progress))?.loaded(path, loading)
+    Shape::parse(file, place, (loading.n_loaded, &progress))?.loaded(loading)
 }

@@ -65,16 +65,16 @@ fn has_binary_facets(bytes: &[u8]) -> bool {
 /// Makes a mesh of a file's content. Its faces have slot 0. Also returns what is to be warned of. `n_loaded`: the
 /// number of triangles that the scene has already. `progress` is told of the facets that have been read.
 pub(crate) fn parse_stl(
-    bytes: Vec<u8>,
+    bytes: &[u8],
     (shading, origin): (Shading, DVec3),
     (n_loaded, progress): (usize, &Progress),
 ) -> Checked<(Mesh, Option<String>)> {
-    let is_binary = is_binary_stl(&bytes) || !is_stl_text(&bytes) || has_binary_facets(&bytes);
+    let is_binary = is_binary_stl(bytes) || !is_stl_text(bytes) || has_binary_facets(bytes);
     let (facets, colours) = match is_binary {
-        true => binary(&bytes, origin, (n_loaded, progress))?,
-        false => (text::facets(&bytes, origin, (n_loaded, progress))?, Vec::new()),
+        true => binary(bytes, origin, (n_loaded, progress))?,
+        false => (text::facets(bytes, origin, (n_loaded, progress))?, Vec::new()),
     };
-    let n_facets = n_facets(&bytes).filter(|_| is_binary);
+    let n_facets = n_facets(bytes).filter(|_| is_binary);
     let n_behind = n_facets.map_or(0, |n| bytes.len() - HEAD_BYTES - n * FACET_BYTES);
     let warning = (n_behind > 0).then(|| {
         let n = n_facets.unwrap_or_default();

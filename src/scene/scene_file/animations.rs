@@ -11,7 +11,7 @@ use super::{
 use crate::scene::{
     formats::{
         gltf,
-        mesh_file::{MeshFormat, read_mesh},
+        mesh_file::{MeshFile, MeshFormat},
     },
     model::{
         AnimationChoice, AnimationInfo, LoadOptions, Scene, SceneError, Transform, error::Checked,
@@ -97,7 +97,7 @@ impl Animations {
             named.extend(of_file);
         }
         let names: Vec<&str> = named.iter().map(|(.., name)| name.as_str()).collect();
-        let found = options.animation.among(&names).map_err(|what| SceneError::file(file.path, what))?;
+        let found = options.animation.among(&names).map_err(|what| file.source.error(what))?;
         let (reading, ix, _) = named.swap_remove(found[0]);
         animations.of_keys = animations.of_keys.filter(|_| reading.is_none());
         (animations.only, animations.choice) = (reading, AnimationChoice::Named(ix.to_string()));
@@ -130,9 +130,9 @@ pub(crate) fn infos_of_files(
     let mut infos = Vec::new();
     for reading in readings.filter(|it| seen.insert(it.clone())) {
         // A file that cannot be read is refused later, with the place of its table.
-        let bytes = read_mesh(&reading.path).unwrap_or_default();
-        if MeshFormat::of(&reading.path, &bytes) == MeshFormat::Gltf {
-            infos.push((reading.clone(), gltf::animations(&reading.path, bytes, options).unwrap_or_default()));
+        let Ok(mesh) = MeshFile::read(&reading.file) else { continue };
+        if mesh.format == MeshFormat::Gltf {
+            infos.push((reading, gltf::animations(mesh, options).unwrap_or_default()));
         }
     }
     Ok(infos)

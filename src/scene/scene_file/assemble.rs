@@ -24,10 +24,7 @@ use super::{
 use crate::{
     frame::{Denoise, Integrator, RenderOptions, SampleRange},
     scene::{
-        files::{
-            outside::Access,
-            read::{read_bytes, read_utf8},
-        },
+        files::SourceFile,
         formats::{
             image::{Encoded, decode_colours},
             image_files::Images,
@@ -69,22 +66,20 @@ pub(crate) struct Assembled {
 }
 
 /// Loads a scene file and the meshes that it names. Their names are relative to the scene file's folder.
-pub(crate) fn load_toml(path: &Path, options: &LoadOptions) -> Result<Assembled, SceneError> {
-    parse_toml(path, &read_utf8(path)?, options)
+pub(crate) fn load_toml(source: &SourceFile, options: &LoadOptions) -> Result<Assembled, SceneError> {
+    parse_toml(source, &source.text()?, options)
 }
 
-/// Makes a scene of the text of the scene file `path`.
-pub(crate) fn parse_toml(path: &Path, text: &str, options: &LoadOptions) -> Result<Assembled, SceneError> {
-    let file = File { path, text, access: Access::of(options) };
+/// Makes a scene of the text of a scene file.
+pub(crate) fn parse_toml(source: &SourceFile, text: &str, options: &LoadOptions) -> Result<Assembled, SceneError> {
+    let file = File { source, text };
     assemble(&file, file.parse()?, options)
 }
 
 /// A file and its text. Errors name the file and the line.
 pub(crate) struct File<'a> {
-    pub path: &'a Path,
+    pub source: &'a SourceFile,
     pub text: &'a str,
-    /// Which files it may name.
-    pub access: Access,
 }
 
 impl File<'_> {
@@ -92,13 +87,13 @@ impl File<'_> {
     pub fn parse<T: DeserializeOwned>(&self) -> Result<T, SceneError> {
         toml::from_str(self.text).map_err(|e| match e.span() {
             Some(span) => self.at(&span, e.message()),
-            None => SceneError::file(self.path, e.message()),
+            None => self.source.error(e.message()),
         })
     }
 
     pub fn at(&self, span: &Range<usize>, what: impl AsRef<str>) -> SceneError {
         let before = &self.text.as_bytes()[..span.start.min(self.text.len())];
-        SceneError::line(self.path, 1 + before.iter().filter(|byte| **byte == b'\n').count(), what)
+        SceneError::line(&self.source.path, 1 + before.iter().filter(|byte| **byte == b'\n').count(), what)
     }
 
     /// Returns the checked value. An error names the object and its line.
@@ -126,7 +121,8 @@ fn assemble(file: &File, description: Description, options: &LoadOptions) -> Res
         integrator: render.is_none_or(|render| render.integrator.is_none()),
         exposure: render.is_none_or(|render| render.exposure.is_none() && render.metered.is_none()),
     };
-    let mut scene = Scene::empty(file.path);
+    let path = &file.source.path;
+    let mut scene = Scene::empty(path);
     let replace = description.replace.as_ref().map(|spec| file.check("replace", spec, |words| choices(words)));
     let replace = replace.transpose()?.unwrap_or_default();
     let mut images = Images::new([&replace[..], &options.look.materials].concat(), &options.progress);
@@ -136,7 +132,7 @@ fn assemble(file: &File, description: Description, options: &LoadOptions) -> Res
     let cameras = Cameras::new(file, description.camera.as_ref(), &description.cameras)?;
     let own = own_animation(&tables, (&lights, &cameras));
     let moment = Animations::new(file, (&tables, own), options)?;
-    scene.lights = lights_at(file.path, &lights, (moment.of_keys, DVec3::ZERO))?;
+    scene.lights = lights_at(path, &lights, (moment.of_keys, DVec3::ZERO))?;
     warn_of_black(file, &scene.lights);
     if let Some(spec) = &description.ambient {
         (scene.ambient, scene.ground) = file.check("ambient", spec, ambient)?;
@@ -185,20 +181,20 @@ fn assemble(file: &File, description: Description, options: &LoadOptions) -> Res
         }
     }
     if scene.n_triangles() == 0 {
-        return Err(SceneError::file(file.path, "has no triangles"));
+        return Err(file.source.error("has no triangles"));
     }
     if options.recentre {
-        extent::recentre(file.path, &mut scene);
-        scene.lights = lights_at(file.path, &lights, (moment, scene.origin))?;
+        extent::recentre(path, &mut scene);
+        scene.lights = lights_at(path, &lights, (moment, scene.origin))?;
     }
-    extent::check(file.path, scene.bounds())?;
-    cameras.pose(file.path, moment, &mut scene)?;
+    extent::check(path, scene.bounds())?;
+    cameras.pose(path, moment, &mut scene)?;
     Ok(Assembled { scene, lacks, moving, lights, cameras, plays_files })
 }
 
 /// Returns what is known of the animations of a scene file: its keys, and those of the glTF files that it names.
-pub(crate) fn animations(path: &Path, options: &LoadOptions) -> Result<Vec<AnimationInfo>, SceneError> {
-    let file = File { path, text: &read_utf8(path)?, access: Access::of(options) };
+pub(crate) fn animations(source: &SourceFile, options: &LoadOptions) -> Result<Vec<AnimationInfo>, SceneError> {
+    let file = File { source, text: &source.text()? };
     let Description { mesh, light, camera, cameras, .. } = file.parse()?;
     let (tables, lights) = (mesh_tables(&file, mesh)?, lights(&file, light)?);
     let cameras = Cameras::new(&file, camera.as_ref(), &cameras)?;
@@ -235,11 +231,10 @@ fn add_materials(
     let mut of_materials: Vec<Vec<usize>> = Vec::new();
     for (name, spec) in specs {
         of_materials.push(file.check(&format!("material `{name}`"), spec, |spec| {
-            let path = |(key, map): (&str, &MapSpec)| {
-                file.access.beside(file.path).exact(map.file()).map_err(|what| format!("{key}: {what}"))
-            };
+            let named =
+                |(key, map): (&str, &MapSpec)| file.source.exact(map.file()).map_err(|what| format!("{key}: {what}"));
             let maps = spec.maps().filter(|_| !images.is_replaced(name)).collect::<Vec<_>>();
-            maps.into_iter().map(|map| Ok(images.add(path(map)?))).collect()
+            maps.into_iter().map(|map| Ok(images.add(named(map)?))).collect()
         })?);
     }
     images.decode();
@@ -364,7 +359,7 @@ fn warn_of_black(file: &File, lights: &[Light]) {
     let black = (1..).zip(lights).filter(|(_, light)| light.is_black());
     let numbers: Vec<String> = black.map(|(number, _)| number.to_string()).collect();
     if !numbers.is_empty() && numbers.len() < lights.len() {
-        let path = file.path.display();
+        let path = file.source.path.display();
         tracing::warn!("{path}: no light comes from light {}, whose power or area is 0", numbers.join(", "));
     }
 }
@@ -376,15 +371,14 @@ fn extent_of(name: &str, length: f32) -> Checked<f32> {
 
 /// Reads the image of what is seen beyond the scene.
 fn environment(file: &File, spec: &EnvironmentSpec) -> Checked<Environment> {
-    let path = file.access.beside(file.path).exact(&spec.file)?;
-    let bytes = read_bytes(&path).map_err(|error| error.to_string())?;
+    let bytes = file.source.exact(&spec.file)?.bytes().map_err(|error| error.to_string())?;
     let (size, colours) = decode_colours(&Encoded { name: spec.file.clone(), bytes: bytes.into() })?;
     memory::require("the environment", colours.len() as u64 * ENVIRONMENT_BYTES).map_err(|error| error.to_string())?;
     let rotation = within("rotation", spec.rotation.unwrap_or(0.0), -3600.0, 3600.0)?;
     let strength = within("strength", spec.strength.unwrap_or(1.0), 0.0, 1e6)?;
     let (environment, mended) = Environment::new(size, colours, (rotation, strength))?;
     if let Some(message) = mended.message() {
-        tracing::warn!("{}: environment `{}` {message}", file.path.display(), spec.file);
+        tracing::warn!("{}: environment `{}` {message}", file.source.path.display(), spec.file);
     }
     Ok(environment)
 }

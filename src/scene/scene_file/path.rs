@@ -11,9 +11,9 @@ use super::{
     description::CameraSpec,
 };
 use crate::scene::{
-    files::{outside::Access, read::read_utf8},
+    files::SourceFile,
     model::{
-        Camera, Projection, SceneError,
+        Camera, LoadOptions, Projection, SceneError,
         camera::{FOV_DEGREES, HEIGHTS},
         error::Checked,
         keys::Place,
@@ -79,8 +79,8 @@ impl CameraPath {
     /// The file cannot be read or understood, has no keyframes or has them out of order, or a keyframe's camera sees
     /// nothing.
     pub fn load(path: &Path) -> Result<Self, SceneError> {
-        let text = read_utf8(path)?;
-        let file = File { path, text: &text, access: Access::default() };
+        let source = SourceFile::new(path, &LoadOptions::default());
+        let file = File { source: &source, text: &source.text()? };
         let spec: PathSpec = file.parse()?;
         let fps = match &spec.fps {
             Some(fps) => file.check("fps", fps, |&fps| rate(fps))?,
@@ -98,7 +98,7 @@ impl CameraPath {
             keyframes.push(file.check(&format!("keyframe {}", ix + 1), spec, check)?);
         }
         if keyframes.is_empty() {
-            return Err(SceneError::file(path, "has no [[keyframe]]"));
+            return Err(source.error("has no [[keyframe]]"));
         }
         Ok(Self { fps, origin: DVec3::ZERO, is_orthographic: first_is, keyframes })
     }

@@ -4,7 +4,6 @@
 use std::{
     collections::{HashMap, HashSet},
     ops::Range,
-    path::PathBuf,
 };
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
@@ -19,11 +18,11 @@ use super::{
 };
 use crate::{
     scene::{
-        files::store,
+        files::SourceFile,
         formats::{
             gltf,
             image_files::Images,
-            mesh_file::{Loaded, Loading, MeshFormat, Shape, parse_mesh, read_mesh},
+            mesh_file::{Loaded, Loading, MeshFile, MeshFormat, Shape, parse_mesh},
         },
         meshes::{
             generate::{Generator, TriangleBudget},
@@ -52,7 +51,7 @@ pub(crate) struct MeshTable {
 /// What decides which meshes a mesh file gives.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Reading {
-    pub path: PathBuf,
+    pub file: SourceFile,
     /// Name of the scene of a glTF file.
     scene: Option<String>,
     is_smooth: bool,
@@ -85,7 +84,7 @@ enum Content {
     /// A glTF file.
     Model(Box<Result<gltf::Model, SceneError>>),
     /// Bytes, since their format is not the one that the file's name tells.
-    Bytes(Vec<u8>),
+    Bytes(MeshFile),
 }
 
 /// How glTF files are loaded.
@@ -93,7 +92,6 @@ enum Content {
 struct Models<'a> {
     /// Which materials are replaced.
     replaced: &'a [MaterialChoice],
-    allow_outside: bool,
     /// The readings whose materials some table shows.
     with_materials: &'a HashSet<Reading>,
     animations: &'a Animations,
@@ -104,14 +102,14 @@ impl Models<'_> {
     fn load(
         &self,
         reading: &Reading,
-        bytes: Vec<u8>,
+        mesh: MeshFile,
         (before, progress): (gltf::LoadedBefore, &Progress),
     ) -> Result<gltf::Model, SceneError> {
         let look = Look { materials: self.replaced.to_vec(), ..Look::default() };
-        let (scene, allow_outside, progress) = (reading.scene.clone(), self.allow_outside, progress.clone());
+        let (scene, progress) = (reading.scene.clone(), progress.clone());
         let (at, animation) = (self.animations.at, self.animations.of_file(reading));
-        let options = LoadOptions { scene, allow_outside, at, animation, look, progress, ..LoadOptions::default() };
-        gltf::load_meshes(&reading.path, bytes, &options, self.with_materials.contains(reading), before)
+        let options = LoadOptions { scene, at, animation, look, progress, ..LoadOptions::default() };
+        gltf::load_meshes(mesh, &options, self.with_materials.contains(reading), before)
     }
 }
 
@@ -172,23 +170,23 @@ impl<'a> Placer<'a> {
         let readings = tables.iter().filter_map(|table| Reading::of(self.file, &table.spec, self.recentre).ok()?);
         let mut seen = HashSet::new();
         let readings: Vec<Reading> = readings.filter(|it| seen.insert(it.clone())).collect();
-        let n_bytes: u64 = readings.iter().map(|it| it.n_bytes(self.file)).sum();
+        let n_bytes: u64 = readings.iter().map(Reading::n_bytes).sum();
         if readings.len() < 2 || require("reading files", n_bytes.saturating_mul(READING_BYTES)).is_err() {
             return;
         }
         let meter = self.images.progress().begin(Work::Reading, n_bytes);
-        let (file, models) = (self.file, self.models());
+        let models = self.models();
         let content = |reading: Reading| {
-            let n_bytes = reading.n_bytes(file);
-            let read = read_mesh(&reading.path).map(|bytes| match MeshFormat::of(&reading.path, &bytes) {
+            let n_bytes = reading.n_bytes();
+            let read = MeshFile::read(&reading.file).map(|mesh| match mesh.format {
                 MeshFormat::Gltf => {
-                    let model = models.load(&reading, bytes, (gltf::LoadedBefore::default(), &Progress::default()));
+                    let model = models.load(&reading, mesh, (gltf::LoadedBefore::default(), &Progress::default()));
                     Content::Model(Box::new(model))
                 }
-                _ if reading.scene.is_some() => Content::Bytes(bytes),
+                _ if reading.scene.is_some() => Content::Bytes(mesh),
                 _ => {
                     let how = (reading.shading(), reading.origin());
-                    Content::Shape(Box::new(Shape::parse(&reading.path, bytes, how, (0, &Progress::default()))))
+                    Content::Shape(Box::new(Shape::parse(mesh, how, (0, &Progress::default()))))
                 }
             });
             meter.add(n_bytes);
@@ -200,12 +198,7 @@ impl<'a> Placer<'a> {
 
     /// Returns how glTF files are loaded.
     fn models(&self) -> Models<'_> {
-        Models {
-            replaced: self.images.replaced(),
-            allow_outside: self.file.access.is_anywhere(),
-            with_materials: &self.with_materials,
-            animations: &self.animations,
-        }
+        Models { replaced: self.images.replaced(), with_materials: &self.with_materials, animations: &self.animations }
     }
 
     /// Adds the meshes of a table.
@@ -246,8 +239,7 @@ impl<'a> Placer<'a> {
     /// Returns the places of a table's array, if it has one.
     fn array(&self, common: &CommonSpec) -> Checked<Option<Vec<Transform>>> {
         let Some(name) = &common.instances else { return Ok(None) };
-        let path = self.file.access.beside(self.file.path).exact(name)?;
-        transforms::read(&path).map(Some)
+        transforms::read(&self.file.source.exact(name)?).map(Some)
     }
 
     /// Adds a generator's mesh.
@@ -282,24 +274,25 @@ impl<'a> Placer<'a> {
     fn read_file(&mut self, reading: &Reading, table: &MeshTable) -> Result<Read, SceneError> {
         let failed = |what: String| self.file.at(&table.span, format!("mesh {}: {what}", table.number));
         // The scene file may misspell the name, so the error names the line in the scene file.
-        let path = &reading.path;
-        let content = self.shapes.remove(reading).unwrap_or_else(|| read_mesh(path).map(Content::Bytes));
-        let content = content.map_err(|error| failed(error.to_string()))?;
+        let read = || MeshFile::read(&reading.file).map_err(|error| failed(error.to_string()));
+        let content = match self.shapes.remove(reading) {
+            Some(content) => content.map_err(|error| failed(error.to_string()))?,
+            None => Content::Bytes(read()?),
+        };
         let n_loaded = self.scene.n_stored();
         let first_mesh = self.scene.meshes.len();
         let uv_scale = table.spec.common.uv_scale;
         let before = gltf::LoadedBefore { n_triangles: n_loaded as u64, n_pixels: self.images.n_pixels() };
         let progress = self.images.progress().clone();
         let content = match content {
-            Content::Bytes(bytes) if MeshFormat::of(path, &bytes) == MeshFormat::Gltf => {
-                Content::Model(Box::new(self.models().load(reading, bytes, (before, &progress))))
+            Content::Bytes(mesh) if mesh.format == MeshFormat::Gltf => {
+                Content::Model(Box::new(self.models().load(reading, mesh, (before, &progress))))
             }
             // Images that were decoded together are limited one by one. If there are too many pixels, those of this
             // file are left out, with its warnings.
             Content::Model(model) if model.as_ref().as_ref().is_ok_and(|model| before.exceeds(&model.scene)) => {
                 drop(model);
-                let bytes = read_mesh(path).map_err(|error| failed(error.to_string()))?;
-                Content::Model(Box::new(self.models().load(reading, bytes, (before, &progress))))
+                Content::Model(Box::new(self.models().load(reading, read()?, (before, &progress))))
             }
             content => content,
         };
@@ -331,10 +324,10 @@ impl<'a> Placer<'a> {
             return Err(failed(format!("there is no scene `{name}`: only glTF files name scenes")));
         }
         let (shading, origin) = (reading.shading(), reading.origin());
-        let mut loading = Loading { shading, origin, n_loaded, access: self.file.access, images: &mut self.images };
+        let mut loading = Loading { shading, origin, n_loaded, images: &mut self.images };
         let loaded = match content {
-            Content::Shape(shape) => (*shape)?.loaded(path, &mut loading),
-            Content::Bytes(bytes) => parse_mesh(path, bytes, &mut loading),
+            Content::Shape(shape) => (*shape)?.loaded(&mut loading),
+            Content::Bytes(mesh) => parse_mesh(mesh, &mut loading),
             Content::Model(_) => unreachable!("models are placed above"),
         };
         let Loaded { mut mesh, origin: own_origin, materials, uses_crease } = loaded?;
@@ -410,7 +403,7 @@ impl Reading {
     pub fn of(file: &File, spec: &MeshSpec, recentre: bool) -> Checked<Option<Self>> {
         let Source::File { path, crease, scene, origin } = &spec.source else { return Ok(None) };
         Ok(Some(Self {
-            path: file.access.beside(file.path).exact(path)?,
+            file: file.source.exact(path)?,
             scene: scene.clone(),
             is_smooth: spec.common.smooth.unwrap_or(true),
             crease: crease.unwrap_or(DEFAULT_CREASE).to_bits(),
@@ -435,13 +428,11 @@ impl Reading {
     }
 
     /// Returns the size of the file and of the files beside a glTF file that it names.
-    fn n_bytes(&self, file: &File) -> u64 {
-        let is_json = self.path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gltf"));
-        let beside = match is_json {
-            true => gltf::named_files(&self.path, &read_mesh(&self.path).unwrap_or_default(), file.access),
-            false => Vec::new(),
-        };
-        beside.iter().map(|path| store::n_bytes(path)).fold(store::n_bytes(&self.path), u64::saturating_add)
+    fn n_bytes(&self) -> u64 {
+        let is_json = self.file.path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gltf"));
+        let mesh = if is_json { MeshFile::read(&self.file).ok() } else { None };
+        let beside = mesh.map(|mesh| gltf::named_files(&mesh)).unwrap_or_default();
+        beside.iter().map(SourceFile::n_bytes).fold(self.file.n_bytes(), u64::saturating_add)
     }
 }
 

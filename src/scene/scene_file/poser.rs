@@ -1,7 +1,7 @@
 //! A scene file whose meshes, lights and cameras are posed by their keys at one moment after the other. The file is
 //! read once.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::{
     animations::Moving,
@@ -9,7 +9,10 @@ use super::{
     cameras::Cameras,
     keys::KeyedTable,
 };
-use crate::scene::model::{Instance, LoadOptions, Scene, SceneError};
+use crate::scene::{
+    files::SourceFile,
+    model::{Instance, LoadOptions, Scene, SceneError},
+};
 
 /// A scene file that can be posed.
 pub(crate) struct KeyPoser {
@@ -26,14 +29,14 @@ pub(crate) struct KeyPoser {
 impl KeyPoser {
     /// Reads a file, whose scene at the moment of the options is known. Returns `None` if animations of glTF files are
     /// shown, or if the scene's instances are not the file's.
-    pub fn new(path: &Path, options: &LoadOptions, scene: &Scene) -> Option<Self> {
-        let Assembled { scene: own, moving, lights, cameras, plays_files, .. } = load_toml(path, options).ok()?;
+    pub fn new(file: &SourceFile, options: &LoadOptions, scene: &Scene) -> Option<Self> {
+        let Assembled { scene: own, moving, lights, cameras, plays_files, .. } = load_toml(file, options).ok()?;
         let is_same = |(a, b): (&Instance, &Instance)| a.mesh_ix == b.mesh_ix && a.transform == b.transform;
         let fits = own.origin == scene.origin
             && own.instances.len() <= scene.instances.len()
             && own.instances.iter().zip(&scene.instances).all(is_same);
         let has_lights = own.lights == scene.lights && !lights.is_empty();
-        let (path, camera) = (path.to_owned(), options.camera.clone());
+        let (path, camera) = (file.path.clone(), options.camera.clone());
         (fits && !plays_files).then_some(Self { path, moving, lights, has_lights, cameras, camera })
     }
 

@@ -5,12 +5,14 @@ use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 use crate::scene::{
-    files::{
-        outside::Access,
-        pack::pack_of,
-        read::{lossy_text, read_bytes, read_utf8},
+    files::{SourceFile, lossy_text, pack::pack_of},
+    formats::{
+        gltf,
+        material_spec::MAP_KEYS,
+        mesh_file::{MeshFile, MeshFormat},
+        obj::named_files,
+        ply::named_images,
     },
-    formats::{gltf, material_spec::MAP_KEYS, mesh_file::MeshFormat, obj::named_files, ply::named_images},
     model::LoadOptions,
 };
 
@@ -27,26 +29,27 @@ pub fn source_files_with(path: &Path, options: &LoadOptions) -> Vec<PathBuf> {
     if let Some(pack) = pack_of(path) {
         return vec![pack.to_owned()];
     }
-    let access = Access::of(options);
-    let (meshes, others) = if is_scene_file(path) { named(path, access) } else { (vec![path.to_owned()], Vec::new()) };
-    let libraries: Vec<_> = meshes.iter().flat_map(|mesh| libraries(mesh, access)).collect();
-    let mut files = [vec![path.to_owned()], meshes, others, libraries].concat();
+    let scene = SourceFile::new(path, options);
+    let (meshes, others) = if is_scene_file(path) { named(&scene) } else { (vec![scene.clone()], Vec::new()) };
+    let libraries: Vec<_> = meshes.iter().flat_map(libraries).collect();
+    let files = [vec![scene], meshes, others, libraries].into_iter().flatten();
+    let mut files: Vec<PathBuf> = files.map(|file| file.path).collect();
     files.sort();
     files.dedup();
     files
 }
 
 /// Returns the meshes that a scene file names, and the other files: images and arrays.
-fn named(scene: &Path, access: Access) -> (Vec<PathBuf>, Vec<PathBuf>) {
-    let table: Table = read_utf8(scene).ok().and_then(|text| text.parse().ok()).unwrap_or_default();
-    let path = |name: &str| access.beside(scene).exact(name).ok();
+fn named(scene: &SourceFile) -> (Vec<SourceFile>, Vec<SourceFile>) {
+    let table: Table = scene.text().ok().and_then(|text| text.parse().ok()).unwrap_or_default();
+    let file = |name: &str| scene.exact(name).ok();
     let tables = || table.get("mesh").and_then(Value::as_array).into_iter().flatten();
-    let named = |key: &'static str| tables().filter_map(move |mesh| mesh.get(key)?.as_str()).filter_map(path);
+    let named = |key: &'static str| tables().filter_map(move |mesh| mesh.get(key)?.as_str()).filter_map(file);
     let (meshes, arrays) = (named("file").collect(), named("instances"));
     let materials = table.get("materials").and_then(Value::as_table).into_iter().flat_map(Table::values);
     let maps = materials.flat_map(|material| MAP_KEYS.iter().filter_map(|key| material.get(key)));
-    let name = |map: &Value| path(map.as_str().or_else(|| map.get("file")?.as_str())?);
-    let environment = table.get("environment").and_then(|it| path(it.get("file")?.as_str()?));
+    let name = |map: &Value| file(map.as_str().or_else(|| map.get("file")?.as_str())?);
+    let environment = table.get("environment").and_then(|it| file(it.get("file")?.as_str()?));
     (meshes, maps.filter_map(name).chain(environment).chain(arrays).collect())
 }
 
@@ -56,17 +59,17 @@ pub(crate) fn is_scene_file(path: &Path) -> bool {
 }
 
 /// Returns the files that a mesh file names.
-fn libraries(mesh: &Path, access: Access) -> Vec<PathBuf> {
+fn libraries(file: &SourceFile) -> Vec<SourceFile> {
     // Content that names no files need not be read.
-    if MeshFormat::of_name(mesh) == Some(MeshFormat::Stl) {
+    if MeshFormat::of_name(&file.path) == Some(MeshFormat::Stl) {
         return Vec::new();
     }
-    let bytes = read_bytes(mesh).unwrap_or_default();
-    match MeshFormat::of(mesh, &bytes) {
-        MeshFormat::Gltf => gltf::named_files(mesh, &bytes, access),
-        MeshFormat::Ply => named_images(mesh, &bytes, access),
+    let Ok(mesh) = MeshFile::read(file) else { return Vec::new() };
+    match mesh.format {
+        MeshFormat::Gltf => gltf::named_files(&mesh),
+        MeshFormat::Ply => named_images(file, &mesh.bytes),
         MeshFormat::Stl => Vec::new(),
-        MeshFormat::Obj => named_files(mesh, &lossy_text(bytes), access),
+        MeshFormat::Obj => named_files(file, &lossy_text(mesh.bytes)),
     }
 }
 

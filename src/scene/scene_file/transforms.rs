@@ -1,13 +1,11 @@
 //! Arrays of transforms, by which a `[[mesh]]` table places its mesh many times.
 
-use std::path::Path;
-
 use glam::DMat4;
 use npyz::{NpyFile, Order};
 
 use crate::{
     scene::{
-        files::{read::read_bytes, store},
+        files::SourceFile,
         model::{Transform, error::Checked},
     },
     util::{memory::require, npy, text::short_line},
@@ -18,10 +16,9 @@ const RULE: &str = "instances are N x 3 x 4 numbers, the rows of matrices that t
 
 /// Reads a `.npy` file of transforms: N x 3 x 4, or N x 4 x 4 with the last row 0 0 0 1, float32 or float64. Errors
 /// name the file and the index of the transform.
-pub(crate) fn read(path: &Path) -> Checked<Vec<Transform>> {
-    store::require_for_bytes(path)?;
-    let bytes = read_bytes(path).map_err(|error| error.to_string())?;
-    parse(&bytes).map_err(|what| format!("{}: {}", path.display(), short_line(&what)))
+pub(crate) fn read(file: &SourceFile) -> Checked<Vec<Transform>> {
+    let bytes = file.bytes().map_err(|error| error.to_string())?;
+    parse(&bytes).map_err(|what| format!("{}: {}", file.path.display(), short_line(&what)))
 }
 
 fn parse(mut bytes: &[u8]) -> Checked<Vec<Transform>> {

@@ -36,6 +36,7 @@ pub(crate) use self::{
     manifest::{MANIFEST, Manifest, PackedFile},
     names::{name_of, normalized, pack_of},
 };
+use super::SourceFile;
 use crate::scene::model::{LoadOptions, SceneError, error::Checked};
 
 /// Size of the largest manifest, bytes: it describes half a million files.
@@ -79,34 +80,52 @@ pub(crate) fn of_absolute(from: &Path, name: &Path) -> Option<PathBuf> {
     Some(pack.join(below.unwrap_or_else(|| MANIFEST.to_owned())))
 }
 
-/// The scene of a pack.
-pub(crate) struct PackedScene {
-    pack: Arc<Pack>,
-    /// The path of the scene's file in the pack.
-    pub path: PathBuf,
-    /// The options with which it is loaded.
+/// The file of a scene, and how it is loaded.
+pub(crate) struct OpenScene {
+    /// The user's file or, if that is a pack, the scene's file in it.
+    pub file: SourceFile,
     pub options: LoadOptions,
+    /// The pack that the file is in. It stays open as long as files are read.
+    pack: Option<Arc<Pack>>,
+}
+
+impl OpenScene {
+    /// Opens the pack that a path leads into, if it does. Where the user's options name no scene of the file and no
+    /// camera, those apply that were named when the pack was made.
+    pub fn new(path: &Path, options: &LoadOptions) -> Result<Self, SceneError> {
+        let (file, options) = (SourceFile::new(path, options), options.clone());
+        let Some(pack) = of_name(path)? else { return Ok(Self { file, options, pack: opened(path)? }) };
+        let Manifest { scene, scene_name, camera, .. } = &pack.manifest;
+        let (scene_name, camera) = (scene_name.clone(), camera.clone());
+        // No name in a pack leads out of it.
+        let options = LoadOptions {
+            scene: options.scene.or(scene_name),
+            camera: options.camera.or(camera),
+            allow_outside: true,
+            ..options
+        };
+        Ok(Self { file: SourceFile::new(&path.join(scene), &options), options, pack: Some(pack) })
+    }
+
+    /// Returns an error if a file of the pack could not be read at any time since it was opened.
+    pub fn check(&self) -> Result<(), SceneError> {
+        let failure = |pack: &Arc<Pack>| Some(SceneError::file(&pack.archive.path, pack.failure.get()?));
+        self.pack.as_ref().and_then(failure).map_or(Ok(()), Err)
+    }
+}
+
+fn open(path: &Path) -> Result<Arc<Pack>, SceneError> {
+    Pack::open(path).map_err(|what| SceneError::file(path, what))
 }
 
 /// Opens the pack that a path leads into, if it does.
-pub(crate) fn opened(path: &Path) -> Result<Option<Arc<Pack>>, SceneError> {
-    let opened = pack_of(path).map(|path| Pack::open(path).map_err(|what| SceneError::file(path, what)));
-    opened.transpose()
+fn opened(path: &Path) -> Result<Option<Arc<Pack>>, SceneError> {
+    pack_of(path).map(open).transpose()
 }
 
-/// Opens a pack and returns its scene. Where the user's options name no scene of the file and no camera, those apply
-/// that were named when the pack was made. `None` if the path is not that of a pack.
-pub(crate) fn scene_of(path: &Path, options: &LoadOptions) -> Result<Option<PackedScene>, SceneError> {
-    if !is_pack_name(path) || path.is_dir() {
-        return Ok(None);
-    }
-    let pack = Pack::open(path).map_err(|what| SceneError::file(path, what))?;
-    let mut options = options.clone();
-    options.scene = options.scene.or_else(|| pack.manifest.scene_name.clone());
-    options.camera = options.camera.or_else(|| pack.manifest.camera.clone());
-    // No name in a pack leads out of it.
-    options.allow_outside = true;
-    Ok(Some(PackedScene { path: path.join(&pack.manifest.scene), pack, options }))
+/// Opens the pack of a path that has the name of one.
+fn of_name(path: &Path) -> Result<Option<Arc<Pack>>, SceneError> {
+    (is_pack_name(path) && !path.is_dir()).then(|| open(path)).transpose()
 }
 
 /// Returns the file of the camera path that a pack has, as a path into the pack. `None` if it has none, or if `path` is
@@ -115,8 +134,8 @@ pub(crate) fn scene_of(path: &Path, options: &LoadOptions) -> Result<Option<Pack
 /// # Errors
 /// The file is no pack, or it is damaged.
 pub fn packed_path(path: &Path) -> Result<Option<PathBuf>, SceneError> {
-    let Some(PackedScene { pack, .. }) = scene_of(path, &LoadOptions::default())? else { return Ok(None) };
-    Ok(pack.manifest.path.as_ref().map(|name| path.join(name)))
+    let name = of_name(path)?.and_then(|pack| pack.manifest.path.clone());
+    Ok(name.map(|name| path.join(name)))
 }
 
 /// Returns the hash of the pack that a path leads into: the one that `kdray pack` prints. `None` if the path leads into
@@ -165,10 +184,5 @@ impl Pack {
     /// Notes that a file of the pack could not be read.
     fn note_failure(&self, file: &PackedFile, error: &io::Error) {
         let _ = self.failure.set(format!("{}: {error}", file.name));
-    }
-
-    /// Returns an error if a file could not be read at any time since the pack was opened.
-    pub fn check(&self) -> Result<(), SceneError> {
-        self.failure.get().map_or(Ok(()), |what| Err(SceneError::file(&self.archive.path, what)))
     }
 }

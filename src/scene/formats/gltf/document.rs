@@ -1,13 +1,6 @@
 //! A glTF file with its buffers: `.gltf`, JSON beside files of data, and `.glb`, one file with both.
 
-use std::{
-    borrow::Cow,
-    cell::RefCell,
-    fmt::Display,
-    ops::Range,
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::{borrow::Cow, cell::RefCell, fmt::Display, ops::Range, path::PathBuf, sync::Arc};
 
 use gltf::json::{self, Index, Root, image};
 use hashbrown::{HashMap, HashSet};
@@ -18,17 +11,10 @@ use super::{
     glb::split,
     lenient, meshopt,
     pointers::Pointer,
-    uri::{Uri, is_data},
+    uri::{Uri, data},
 };
 use crate::{
-    scene::{
-        files::{
-            outside::{Access, NamedFile},
-            read::read_bytes,
-            store::{self, require_for_bytes},
-        },
-        model::error::Checked,
-    },
+    scene::{files::SourceFile, formats::mesh_file::MeshFile, model::error::Checked},
     util::{memory::require, progress::Progress, text::short_line},
 };
 
@@ -77,8 +63,7 @@ pub(super) struct Document {
     pub morph_targets: MorphTargets,
     /// The channels of animations that drive what is no part of a node.
     pub pointers: Vec<Pointer>,
-    path: PathBuf,
-    access: Access,
+    pub source: SourceFile,
     buffers: Vec<Buffer>,
     /// Contents of the files that buffers name.
     files: RefCell<HashMap<PathBuf, Arc<Vec<u8>>>>,
@@ -117,7 +102,7 @@ struct Buffer {
 pub(super) enum ImageSource {
     /// They are in the URI of the image at this index.
     Uri(usize),
-    File(PathBuf),
+    File(SourceFile),
     View(usize),
 }
 
@@ -131,27 +116,14 @@ pub(super) struct View<'a> {
 
 impl Document {
     /// Reads a glTF file from its content, and its buffers.
-    pub fn read(path: &Path, bytes: Vec<u8>, access: Access) -> Checked<Self> {
+    pub fn read(source: SourceFile, bytes: Vec<u8>) -> Checked<Self> {
         let (json, chunk) = split(&bytes)?;
         let lenient::Parsed { root, morph_targets, pointers, left_out } = lenient::parse(&bytes[json])?;
-        let path = path.to_owned();
         let (buffers, files, replaced) = (Vec::new(), RefCell::default(), RefCell::default());
         let (decoded, notes, progress) = (HashMap::new(), RefCell::default(), Progress::default());
         let draco = draco::Decoded::default();
-        let mut document = Self {
-            root,
-            morph_targets,
-            pointers,
-            path,
-            access,
-            buffers,
-            files,
-            replaced,
-            decoded,
-            draco,
-            notes,
-            progress,
-        };
+        let mut document =
+            Self { root, morph_targets, pointers, source, buffers, files, replaced, decoded, draco, notes, progress };
         left_out.into_iter().for_each(|what| document.note(LEFT_OUT, what));
         document.check_extensions()?;
         let chunk = chunk.map(|part| Buffer { content: Arc::new(bytes), part });
@@ -238,27 +210,27 @@ impl Document {
     /// Returns what a buffer's URI stands for. A file that several buffers name is read once.
     fn fetch(&self, uri: &str) -> Checked<Arc<Vec<u8>>> {
         let name = match Uri::new(uri)? {
-            Uri::Data(bytes) => return Ok(Arc::new(bytes)),
+            Uri::Data => return data(uri).map(Arc::new),
             Uri::File(name) => name,
         };
-        let path = self.named(&name)?;
-        if let Some(content) = self.files.borrow().get(&path) {
+        let file = self.named(&name)?;
+        if let Some(content) = self.files.borrow().get(&file.path) {
             return Ok(content.clone());
         }
-        require_for_bytes(&path)?;
-        let content = Arc::new(read_bytes(&path).map_err(|error| error.to_string())?);
-        self.files.borrow_mut().insert(path, content.clone());
+        let content = Arc::new(file.bytes().map_err(|error| error.to_string())?);
+        self.files.borrow_mut().insert(file.path, content.clone());
         Ok(content)
     }
 
-    /// Returns the path of a file that the document names. Notes a name whose case is that of no file.
-    fn named(&self, name: &str) -> Checked<PathBuf> {
-        let NamedFile { path, is_other_case } = self.access.beside(&self.path).exact_or_alike(name)?;
-        if is_other_case {
-            let taken = format!("`{name}` ({} is taken)", path.display());
+    /// Returns a file that the document names. Notes a name whose case is that of no file.
+    fn named(&self, name: &str) -> Checked<SourceFile> {
+        let mut file = self.source.exact_or_alike(name)?;
+        // All names of a file count as one.
+        if std::mem::take(&mut file.is_other_case) {
+            let taken = format!("`{name}` ({} is taken)", file.path.display());
             self.note("names of files that differ from those on disk in the case of letters", taken);
         }
-        Ok(path)
+        Ok(file)
     }
 
     /// Returns the indices of the elements that the sparse accessor at an index replaces. `read` reads them at the
@@ -277,9 +249,8 @@ impl Document {
         let image = item(&self.root.images, "images", index.value(), from)?;
         let failed = |what: String| format!("images[{index}]: {what}");
         match (&image.uri, image.buffer_view) {
-            (Some(uri), _) if is_data(uri) => Ok(ImageSource::Uri(index.value())),
             (Some(uri), _) => match Uri::new(uri).map_err(failed)? {
-                Uri::Data(_) => unreachable!("data is another source"),
+                Uri::Data => Ok(ImageSource::Uri(index.value())),
                 Uri::File(name) => self.named(&name).map(ImageSource::File).map_err(failed),
             },
             (None, Some(view)) => Ok(ImageSource::View(view.value())),
@@ -291,25 +262,20 @@ impl Document {
     pub fn image(&self, ix: usize, source: &ImageSource) -> Checked<Option<Cow<'_, [u8]>>> {
         let place = format!("images[{ix}]");
         match source {
-            ImageSource::Uri(ix) => match Uri::new(self.root.images[*ix].uri.as_deref().unwrap_or_default()) {
-                Ok(Uri::Data(bytes)) => Ok(Some(bytes.into())),
-                Ok(Uri::File(_)) => unreachable!("files are another source"),
-                Err(what) => Err(format!("{place}: {what}")),
-            },
+            ImageSource::Uri(ix) => {
+                let bytes = data(self.root.images[*ix].uri.as_deref().unwrap_or_default());
+                bytes.map(|bytes| Some(bytes.into())).map_err(|what| format!("{place}: {what}"))
+            }
             ImageSource::View(view) => Ok(Some(self.view(Index::new(*view as u32), &place)?.bytes.into())),
-            ImageSource::File(path) => {
-                require_for_bytes(path).map_err(|what| format!("{place}: {what}"))?;
-                match read_bytes(path) {
-                    Ok(bytes) => Ok(Some(bytes.into())),
-                    Err(_) if !store::exists(path) => {
-                        self.note("image files that do not exist, without which materials are shown", path.display());
-                        Ok(None)
+            ImageSource::File(file) => {
+                let bytes = file.bytes().map_err(|error| match file.exists() {
+                    false => {
+                        let path = file.path.display();
+                        self.note("image files that do not exist, without which materials are shown", path);
                     }
-                    Err(error) => {
-                        self.note("images that cannot be read, without which materials are shown", error);
-                        Ok(None)
-                    }
-                }
+                    true => self.note("images that cannot be read, without which materials are shown", error),
+                });
+                Ok(bytes.ok().map(Cow::from))
             }
         }
     }
@@ -371,10 +337,10 @@ impl Document {
     }
 
     /// Returns a warning for each kind of thing that is not shown.
-    pub fn warnings(&self, path: &Path) -> Vec<String> {
+    pub fn warnings(&self) -> Vec<String> {
         let warning = |Notes { kind, listed, n }: Notes| {
             let more = if n > listed.len() { format!(" and {} more", n - listed.len()) } else { String::new() };
-            format!("{}: {kind}: {}{more}", path.display(), listed.join(", "))
+            format!("{}: {kind}: {}{more}", self.source.path.display(), listed.join(", "))
         };
         self.notes.take().into_iter().map(warning).collect()
     }
@@ -400,14 +366,14 @@ pub(super) fn part(bytes: &[u8], offset: u64, n_bytes: u64) -> Checked<&[u8]> {
     }
 }
 
-/// Returns the names of the files that a glTF file names: its buffers and images. What cannot be read names nothing.
-pub(crate) fn named_files(path: &Path, bytes: &[u8], access: Access) -> Vec<PathBuf> {
+/// Returns the files that a glTF file names: its buffers and images. What cannot be read names nothing.
+pub(crate) fn named_files(MeshFile { source, bytes, .. }: &MeshFile) -> Vec<SourceFile> {
     let json = split(bytes).map(|(json, _)| &bytes[json]).unwrap_or_default();
     let root: json::Value = json::deserialize::from_slice(json).unwrap_or_default();
     let items = ["buffers", "images"].into_iter().filter_map(|list| root.get(list)?.as_array()).flatten();
     let uris = items.filter_map(|item| item.get("uri")?.as_str());
     uris.filter_map(|uri| match Uri::new(uri) {
-        Ok(Uri::File(name)) => access.beside(path).exact_or_alike(&name).ok().map(|file| file.path),
+        Ok(Uri::File(name)) => source.exact_or_alike(&name).ok(),
         _ => None,
     })
     .collect()
@@ -415,9 +381,10 @@ pub(crate) fn named_files(path: &Path, bytes: &[u8], access: Access) -> Vec<Path
 
 #[cfg(test)]
 mod tests {
-    use std::fs;
+    use std::{fs, path::Path};
 
     use super::*;
+    use crate::scene::LoadOptions;
 
     #[test]
     fn a_file_of_several_buffers_is_read_once() {
@@ -426,7 +393,8 @@ mod tests {
         let buffers = r#"[{ "uri": "a%20b.bin", "byteLength": 4 }, { "uri": "./a b.bin", "byteLength": 12 }]"#;
         let json = format!(r#"{{ "asset": {{ "version": "2.0" }}, "buffers": {buffers} }}"#);
         let path = folder.path().join("m.gltf");
-        let document = Document::read(&path, json.into_bytes(), Access::default()).unwrap();
+        let source = SourceFile::new(&path, &LoadOptions::default());
+        let document = Document::read(source, json.into_bytes()).unwrap();
         let [a, b] = &document.buffers[..] else { panic!("two buffers") };
         assert!(Arc::ptr_eq(&a.content, &b.content));
         assert_eq!((a.bytes(), b.bytes()), (&[7; 4][..], &[7; 12][..]));
@@ -435,7 +403,8 @@ mod tests {
     #[test]
     fn the_indices_of_a_sparse_accessor_are_read_once() {
         let json = br#"{ "asset": { "version": "2.0" } }"#;
-        let document = Document::read(Path::new("m.gltf"), json.to_vec(), Access::default()).unwrap();
+        let source = SourceFile::new(Path::new("m.gltf"), &LoadOptions::default());
+        let document = Document::read(source, json.to_vec()).unwrap();
         let first = document.replaced(3, || Ok([1, 5].into())).unwrap();
         let again = document.replaced(3, || Err("it is known".to_owned())).unwrap();
         assert!(Arc::ptr_eq(&first, &again));

@@ -299,7 +299,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::scene::files::outside::Access;
+    use crate::scene::{LoadOptions, files::SourceFile};
 
     /// The strip's indices take no bytes in the file, and none of its faces has an area.
     #[test]
@@ -308,7 +308,8 @@ mod tests {
             { "componentType": 5126, "count": 3, "type": "VEC3" },
             { "componentType": 5125, "count": 1000, "type": "SCALAR" }
         ], "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 }, "indices": 1, "mode": 5 }] }] }"#;
-        let document = Document::read(Path::new("x.gltf"), json.to_vec(), Access::default()).unwrap();
+        let source = SourceFile::new(Path::new("x.gltf"), &LoadOptions::default());
+        let document = Document::read(source, json.to_vec()).unwrap();
         let primitive = &document.root.meshes[0].primitives[0];
         let part = Part { primitive, targets: &[], path: String::new(), slot: 0, whole: Default::default() };
         let mut n_read = 5;

@@ -9,8 +9,7 @@ use crate::scene::model::error::Checked;
 /// length that the header states, are skipped.
 pub(super) fn split(bytes: &[u8]) -> Checked<(Range<usize>, Option<Range<usize>>)> {
     if !bytes.starts_with(b"glTF") {
-        let start = if bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
-        return Ok((start..bytes.len(), None));
+        return Ok((0..bytes.len(), None));
     }
     let word = |at: usize| Some(u32::from_le_bytes(bytes.get(at..)?.first_chunk().copied()?) as usize);
     match word(4) {

@@ -45,19 +45,16 @@ use self::{
     rest::{Posed, ReadMesh, ReadMeshes, RestKey, posed},
 };
 pub(crate) use self::{document::named_files, poser::Poser};
-use super::image::MAX_PIXELS;
+use super::{image::MAX_PIXELS, mesh_file::MeshFile};
 use crate::{
-    scene::{
-        files::outside::Access,
-        model::{
-            AnimationChoice, AnimationInfo, Camera, Instance, Light, LoadOptions, MaterialChoice, Mesh, Scene,
-            SceneError, Transform, Up,
-            deformation::PosedMesh,
-            error::Checked,
-            extent,
-            lacks::{Lacks, SAMPLES},
-            mesh::{bounds_of, check_place},
-        },
+    scene::model::{
+        AnimationChoice, AnimationInfo, Camera, Instance, Light, LoadOptions, MaterialChoice, Mesh, Scene, SceneError,
+        Transform, Up,
+        deformation::PosedMesh,
+        error::Checked,
+        extent,
+        lacks::{Lacks, SAMPLES},
+        mesh::{bounds_of, check_place},
     },
     util::{
         progress::{Meter, Work},
@@ -66,9 +63,9 @@ use crate::{
 };
 
 /// Loads a glTF file as a scene with its lights and cameras.
-pub(crate) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<(Scene, Lacks), SceneError> {
-    let failed = |what: String| SceneError::file(path, what);
-    let document = read(path, bytes, options)?;
+pub(crate) fn load(file: MeshFile, options: &LoadOptions) -> Result<(Scene, Lacks), SceneError> {
+    let document = read(file, options)?;
+    let (path, failed) = (&*document.source.path, |what: String| document.source.error(what));
     let nodes = Nodes::new(&document, options).map_err(failed)?;
     let replaced = &options.look.materials[..];
     let mut scene =
@@ -88,7 +85,7 @@ pub(crate) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result
     let lacks_light = scene.lights.iter().all(Light::is_black);
     scene.defaults.is_metered = !lacks_light;
     scene.defaults.samples = SAMPLES;
-    document.warnings(path).iter().for_each(|warning| tracing::warn!("{warning}"));
+    document.warnings().iter().for_each(|warning| tracing::warn!("{warning}"));
     let lacks = Lacks {
         camera: lacks_camera,
         up: Up::Y,
@@ -143,31 +140,30 @@ pub(crate) struct Model {
 /// `has_materials` is false, the materials and images are left out, and the instances' materials have no meaning.
 /// `options` name the scene.
 pub(crate) fn load_meshes(
-    path: &Path,
-    bytes: Vec<u8>,
+    file: MeshFile,
     options: &LoadOptions,
     has_materials: bool,
     before: LoadedBefore,
 ) -> Result<Model, SceneError> {
-    let failed = |what: String| SceneError::file(path, what);
-    let document = read(path, bytes, options)?;
+    let document = read(file, options)?;
+    let (path, failed) = (&*document.source.path, |what: String| document.source.error(what));
     let nodes = Nodes::new(&document, options).map_err(failed)?;
     let replaced = has_materials.then_some(&options.look.materials[..]);
     let mut scene = Loader::new(&document, &nodes, before, replaced).load(path).map_err(failed)?;
     scene.animations = animation::infos(&document);
-    Ok(Model { scene, warnings: document.warnings(path) })
+    Ok(Model { scene, warnings: document.warnings() })
 }
 
 /// Returns what is known of all animations of a file, without its meshes.
-pub(crate) fn animations(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<Vec<AnimationInfo>, SceneError> {
+pub(crate) fn animations(file: MeshFile, options: &LoadOptions) -> Result<Vec<AnimationInfo>, SceneError> {
     let options = LoadOptions { at: None, animation: AnimationChoice::All, ..options.clone() };
-    Ok(animation::infos(&read(path, bytes, &options)?))
+    Ok(animation::infos(&read(file, &options)?))
 }
 
-fn read(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<Document, SceneError> {
-    let mut document = Document::read(path, bytes, Access::of(options)).map_err(|what| SceneError::file(path, what))?;
+fn read(MeshFile { source, bytes, .. }: MeshFile, options: &LoadOptions) -> Result<Document, SceneError> {
+    let mut document = Document::read(source.clone(), bytes).map_err(|what| source.error(what))?;
     document.progress = options.progress.clone();
-    pointers::apply(&mut document, options).map_err(|what| SceneError::file(path, what))?;
+    pointers::apply(&mut document, options).map_err(|what| source.error(what))?;
     Ok(document)
 }
 

@@ -11,7 +11,7 @@ use super::{
     rest::{ReadMesh, ReadMeshes},
 };
 use crate::scene::{
-    formats::mesh_file::{MeshFormat, read_mesh},
+    formats::mesh_file::{MeshFile, MeshFormat},
     model::{
         AnimationChoice, Instance, LoadOptions, Mesh, Scene, SceneError,
         deformation::{ChangedMeshes, PosedMesh},
@@ -49,14 +49,13 @@ pub(crate) struct Poser {
 }
 
 impl Poser {
-    /// Reads a file, whose scene at the moment of the options is known. Returns `None` if it is no glTF file, if its
+    /// Takes a file, whose scene at the moment of the options is known. Returns `None` if it is no glTF file, if its
     /// animations change materials, or if the scene's instances are not the file's.
-    pub fn new(path: &Path, options: &LoadOptions, scene: &Scene) -> Option<Self> {
-        let bytes = read_mesh(path).ok()?;
-        if MeshFormat::of(path, &bytes) != MeshFormat::Gltf {
+    pub fn new(file: MeshFile, options: &LoadOptions, scene: &Scene) -> Option<Self> {
+        if file.format != MeshFormat::Gltf {
             return None;
         }
-        let document = read(path, bytes, options).ok()?;
+        let document = read(file, options).ok()?;
         if pointers::change_materials(&document) {
             return None;
         }

@@ -19,26 +19,22 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
 
 /// What a URI stands for.
 pub(super) enum Uri {
-    /// The data that the URI itself holds.
-    Data(Vec<u8>),
+    /// The data that the URI itself holds, which [`data`] decodes.
+    Data,
     /// The name of a file, decoded.
     File(String),
 }
 
 impl Uri {
-    /// Decodes a URI.
+    /// Decodes the name in a URI.
     pub fn new(uri: &str) -> Checked<Self> {
-        match is_data(uri) {
-            true => data(&uri[5..]).map(Self::Data),
-            false => match percent_decode_str(uri).decode_utf8() {
-                Ok(name) => match scheme(&name) {
-                    Some(scheme) => {
-                        Err(format!("`{name}` is not a relative path: files with `{scheme}:` are not read"))
-                    }
-                    None => Ok(Self::File(name.into_owned())),
-                },
-                Err(_) => Err(format!("the name `{uri}` is not UTF-8")),
-            },
+        if is_data(uri) {
+            return Ok(Self::Data);
+        }
+        let name = percent_decode_str(uri).decode_utf8().map_err(|_| format!("the name `{uri}` is not UTF-8"))?;
+        match scheme(&name) {
+            Some(scheme) => Err(format!("`{name}` is not a relative path: files with `{scheme}:` are not read")),
+            None => Ok(Self::File(name.into_owned())),
         }
     }
 }
@@ -56,8 +52,8 @@ fn scheme(name: &str) -> Option<&str> {
     is_scheme.then_some(scheme)
 }
 
-/// Returns the data of a data URI without its scheme.
-fn data(uri: &str) -> Checked<Vec<u8>> {
+/// Returns the data that a URI holds.
+pub(super) fn data(uri: &str) -> Checked<Vec<u8>> {
     let (kind, data) = uri.split_once(',').ok_or("a data URI lacks its comma")?;
     let data: Vec<u8> = percent_decode(data.as_bytes()).collect();
     if kind.to_ascii_lowercase().ends_with(";base64") {

@@ -1,50 +1,38 @@
 //! Files that OBJ and MTL files name.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::{
     maps::{MapKind, MapOptions},
     statement::{split_keyword, statements, without_comment},
-    tiles::files_of_tiles,
+    tiles::files_of_map,
 };
-use crate::scene::{
-    files::{
-        outside::{Access, NamedFile, Reach},
-        read::read_lossy,
-        store,
-    },
-    model::error::Checked,
-};
+use crate::scene::{files::SourceFile, model::error::Checked};
 
 /// Returns the files that the `mtllib` statements of an OBJ file's text name, and the images that these name. Names
 /// that are refused are left out.
-pub fn named_files(obj: &Path, text: &str, access: Access) -> Vec<PathBuf> {
-    let reach = access.beside(obj);
+pub fn named_files(obj: &SourceFile, text: &str) -> Vec<SourceFile> {
     let mut files = Vec::new();
     for (_, statement) in statements(text) {
         if let ("mtllib", rest) = split_keyword(&statement) {
-            files.extend(library_files(reach, rest).into_iter().flatten().map(|file| file.path));
+            files.extend(library_files(obj, rest).into_iter().flatten());
         }
     }
-    if !files.iter().any(|path| store::is_file(path)) {
-        files.extend(own_library(reach, obj));
+    if !files.iter().any(SourceFile::is_file) {
+        files.extend(own_library(obj));
     }
-    let images: Vec<PathBuf> = files.iter().flat_map(|mtl| named_images(reach, mtl)).collect();
+    let images: Vec<SourceFile> = files.iter().flat_map(|mtl| named_images(obj, mtl)).collect();
     files.into_iter().chain(images).collect()
 }
 
 /// Returns the images that an MTL file names.
-fn named_images(reach: Reach, mtl: &Path) -> Vec<PathBuf> {
-    let text = read_lossy(mtl).unwrap_or_default();
-    let folder = mtl.parent().unwrap_or(Path::new(""));
+fn named_images(obj: &SourceFile, mtl: &SourceFile) -> Vec<SourceFile> {
+    let text = mtl.lossy_text().unwrap_or_default();
+    let folder = mtl.folder();
     let files = |statement: &str| match split_keyword(statement) {
         (keyword, rest) if matches!(MapKind::of(keyword), MapKind::Shown(_)) => {
-            let Ok(MapOptions { name, .. }) = MapOptions::new(rest) else { return Vec::new() };
-            let tiles = files_of_tiles(reach, folder, &name);
-            match tiles.is_empty() {
-                true => find_file(reach, folder, &name).into_iter().map(|file| file.path).collect(),
-                false => tiles.into_iter().map(|(_, file)| file.path).collect(),
-            }
+            let files = MapOptions::new(rest).and_then(|options| files_of_map(obj, folder, &options.name));
+            files.unwrap_or_default().into_iter().map(|(_, file)| file).collect()
         }
         _ => Vec::new(),
     };
@@ -53,10 +41,10 @@ fn named_images(reach: Reach, mtl: &Path) -> Vec<PathBuf> {
 
 /// Returns the files that a `mtllib` line names. The rest of the line is one name with spaces, if [`find_file`] finds
 /// such a file; otherwise it is a list of names.
-pub fn library_files(reach: Reach, rest: &str) -> Vec<Checked<NamedFile>> {
-    let find = |name: &str| find_file(reach, reach.root, name.trim_matches('"'));
+pub fn library_files(obj: &SourceFile, rest: &str) -> Vec<Checked<SourceFile>> {
+    let find = |name: &str| find_file(obj, obj.folder(), name.trim_matches('"'));
     let whole = find(rest);
-    let has_spaces = |file: &NamedFile| file.path.file_name().is_some_and(|name| name.to_string_lossy().contains(' '));
+    let has_spaces = |file: &SourceFile| file.path.file_name().is_some_and(|name| name.to_string_lossy().contains(' '));
     if exists(&whole) && whole.as_ref().is_ok_and(has_spaces) {
         return vec![whole];
     }
@@ -64,28 +52,28 @@ pub fn library_files(reach: Reach, rest: &str) -> Vec<Checked<NamedFile>> {
 }
 
 /// Returns the MTL file of the OBJ file's own name, which counts where no library is found that the OBJ file names.
-pub fn own_library(reach: Reach, obj: &Path) -> Option<PathBuf> {
-    let name = obj.with_extension("mtl").file_name()?.to_str()?.to_owned();
-    reach.find(reach.root, &name).ok().map(|file| file.path).filter(|path| store::is_file(path))
+pub fn own_library(obj: &SourceFile) -> Option<SourceFile> {
+    let name = obj.path.with_extension("mtl").file_name()?.to_str()?.to_owned();
+    obj.find(obj.folder(), &name).ok().filter(SourceFile::is_file)
 }
 
 /// Returns the file that a name in an OBJ or MTL file stands for. Writers often state absolute names of their own
 /// machine: where a name leaves the folder of the OBJ file, the file is taken whose name in `folder` has the most last
 /// parts in common with it. A comment may follow the name.
-pub fn find_file(reach: Reach, folder: &Path, name: &str) -> Checked<NamedFile> {
-    let whole = reach.find(folder, name);
+pub fn find_file(obj: &SourceFile, folder: &Path, name: &str) -> Checked<SourceFile> {
+    let whole = obj.find(folder, name);
     if exists(&whole) {
         return whole;
     }
     let name = without_comment(name).trim_end_matches('"');
-    let named = reach.find(folder, name);
-    if exists(&named) || reach.within().find(folder, name).is_ok() {
+    let (named, confined) = (obj.find(folder, name), obj.confined());
+    if exists(&named) || confined.find(folder, name).is_ok() {
         return named;
     }
     let ends = name.match_indices(['/', '\\']).map(|(at, _)| &name[at + 1..]).filter(|end| !end.is_empty());
-    ends.map(|end| reach.within().find(folder, end)).find(exists).unwrap_or(named)
+    ends.map(|end| confined.find(folder, end)).find(exists).unwrap_or(named)
 }
 
-fn exists(file: &Checked<NamedFile>) -> bool {
-    file.as_ref().is_ok_and(|file| store::is_file(&file.path))
+fn exists(file: &Checked<SourceFile>) -> bool {
+    file.as_ref().is_ok_and(SourceFile::is_file)
 }

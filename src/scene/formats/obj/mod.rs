@@ -18,6 +18,7 @@ use self::{polypaint::with_polypaint, statement::comments};
 use super::mesh_file::{Loaded, Loading};
 use crate::{
     scene::{
+        files::SourceFile,
         meshes::needs::require_for_mesh,
         model::{Material, SceneError, extent::MeshOrigin},
     },
@@ -41,11 +42,12 @@ pub(crate) fn read_obj(
 }
 
 /// Makes a mesh from an OBJ file's content, and reads its materials.
-pub(crate) fn obj_mesh(path: &Path, file: ObjFile, loading: &mut Loading) -> Result<Loaded, SceneError> {
-    let &mut Loading { shading, n_loaded, access, ref mut images, .. } = loading;
-    require_for_mesh(n_loaded as u64, &file.size).map_err(|what| SceneError::file(path, what))?;
+pub(crate) fn obj_mesh(obj: &SourceFile, file: ObjFile, loading: &mut Loading) -> Result<Loaded, SceneError> {
+    let &mut Loading { shading, n_loaded, ref mut images, .. } = loading;
+    let path = &*obj.path;
+    require_for_mesh(n_loaded as u64, &file.size).map_err(|what| obj.error(what))?;
     let uses_materials = file.used_materials.iter().any(|(name, _)| !name.is_empty());
-    let (materials, tiles) = mtl::load_libraries(path, (&file.libraries, uses_materials), access, images)?;
+    let (materials, tiles) = mtl::load_libraries(obj, (&file.libraries, uses_materials), images)?;
     if let Some((line, statement)) = &file.unknown {
         tracing::warn!("{}:{line}: unknown statement `{}`", path.display(), statement.escape_debug());
     }

@@ -9,18 +9,14 @@ use std::{
 };
 
 use super::{
-    files::{find_file, library_files, own_library},
+    files::{library_files, own_library},
     maps::{MapKind, MapOptions, Term, set_map},
     statement::{split_keyword, statements, words},
-    tiles::{TOKEN, Tiles, files_of_tiles},
+    tiles::{TOKEN, Tiles, files_of_map},
 };
 use crate::{
     scene::{
-        files::{
-            outside::{Access, NamedFile, Reach},
-            read::read_lossy,
-            store,
-        },
+        files::SourceFile,
         formats::{image_files::Images, material_spec::MaterialSpec},
         model::{Alpha, Channel, Clearcoat, Material, Microfacet, SceneError, Sheen, error::Checked},
     },
@@ -69,37 +65,36 @@ struct Map {
 /// the last one counts. Warns of files that do not exist, and of names that leave the folder. Materials whose images
 /// are in tiles come with one more material for each tile.
 pub fn load_libraries(
-    obj: &Path,
+    obj: &SourceFile,
     (libraries, uses_materials): (&[(usize, String)], bool),
-    access: Access,
     images: &mut Images,
 ) -> Result<(Vec<Material>, Tiles), SceneError> {
-    let reach = access.beside(obj);
     let mut described = Vec::new();
     let mut read = HashSet::new();
     for (line, rest) in libraries {
-        for file in library_files(reach, rest) {
-            let warn = |what: &str| tracing::warn!("{}:{line}: {what}", obj.display());
+        for file in library_files(obj, rest) {
+            let warn = |what: &str| tracing::warn!("{}:{line}: {what}", obj.path.display());
             match file {
                 Err(what) => warn(&format!("mtllib {}", one_line(&what))),
-                Ok(NamedFile { path, .. }) if !store::is_file(&path) => {
-                    warn(&format!("{} does not exist: its materials become the default one", shown(&path)));
+                Ok(file) if !file.is_file() => {
+                    warn(&format!("{} does not exist: its materials become the default one", shown(&file.path)));
                 }
-                Ok(NamedFile { path, is_other_case }) => {
-                    if is_other_case {
-                        warn(&format!("mtllib `{}`: {} is taken", rest.escape_debug(), shown(&path)));
+                Ok(file) => {
+                    if file.is_other_case {
+                        warn(&format!("mtllib `{}`: {} is taken", rest.escape_debug(), shown(&file.path)));
                     }
-                    if read.insert(path.clone()) {
-                        described.extend(load_library(reach, &path, images)?);
+                    if read.insert(file.path.clone()) {
+                        described.extend(load_library(obj, &file, images)?);
                     }
                 }
             }
         }
     }
-    let own = if read.is_empty() && uses_materials { own_library(reach, obj) } else { None };
-    if let Some(path) = own {
-        tracing::info!("{}: the materials are those of {}, which it does not name", obj.display(), shown(&path));
-        described.extend(load_library(reach, &path, images)?);
+    let own = if read.is_empty() && uses_materials { own_library(obj) } else { None };
+    if let Some(own) = own {
+        let (obj_path, own_path) = (obj.path.display(), shown(&own.path));
+        tracing::info!("{obj_path}: the materials are those of {own_path}, which it does not name");
+        described.extend(load_library(obj, &own, images)?);
     }
     let (described, tiles) = with_tiles(described);
     Ok((materials(described, images)?, tiles))
@@ -131,15 +126,14 @@ fn with_tiles(described: Vec<Described>) -> (Vec<Described>, Tiles) {
     (all, tiles)
 }
 
-fn load_library(reach: Reach, path: &Path, images: &mut Images) -> Result<Vec<Described>, SceneError> {
-    let text = read_lossy(path)?;
+fn load_library(obj: &SourceFile, mtl: &SourceFile, images: &mut Images) -> Result<Vec<Described>, SceneError> {
+    let (path, text) = (&*mtl.path, mtl.lossy_text()?);
     let (clean, left_out) = clean_mtl(&text);
     for (line, what) in left_out {
         tracing::warn!("{}:{line}: {}; the statement is left out", shown(path), one_line(&what));
     }
-    let more = read_more(reach, path, &text, images);
-    let (materials, _) =
-        tobj::load_mtl_buf(&mut clean.as_bytes()).map_err(|e| SceneError::file(path, e.to_string()))?;
+    let more = read_more(obj, path, &text, images);
+    let (materials, _) = tobj::load_mtl_buf(&mut clean.as_bytes()).map_err(|e| mtl.error(e.to_string()))?;
     let described = |(material, more): (tobj::Material, More)| Described {
         spec: spec(&material),
         name: material.name,
@@ -246,7 +240,7 @@ fn is_transparent(spec: &MaterialSpec, more: &More) -> bool {
 
 /// Reads the maps and the physically based terms, one entry for each material. Warns of terms and maps that are not
 /// shown: once for each kind, and once for each file that is missing or has another name.
-fn read_more(reach: Reach, path: &Path, text: &str, images: &mut Images) -> Vec<More> {
+fn read_more(obj: &SourceFile, path: &Path, text: &str, images: &mut Images) -> Vec<More> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let (mut materials, mut is_replaced, mut is_first): (Vec<More>, bool, bool) = (Vec::new(), false, false);
     let mut told: HashSet<String> = HashSet::new();
@@ -291,41 +285,28 @@ fn read_more(reach: Reach, path: &Path, text: &str, images: &mut Images) -> Vec<
             MapKind::Shown(term) => term,
         };
         let options = MapOptions::new(rest);
-        if let Ok(options) = &options {
-            let tiles = files_of_tiles(reach, folder, &options.name);
-            if !tiles.is_empty() {
-                if options.is_moved() {
-                    warn(line, rest, format!("`-s` and `-o` of `{keyword}` are left out: its image is in tiles"));
-                }
-                if let Some((_, NamedFile { path, .. })) = tiles.iter().find(|(_, file)| file.is_other_case) {
-                    warn(line, &options.name, format!("`{}`: {} is taken", options.name, shown(path)));
-                }
-                let add = |(tile, file): (u32, NamedFile)| Map {
-                    line,
-                    term,
-                    options: options.clone(),
-                    file: images.add(file.path),
-                    tile: Some(tile),
-                };
-                material.maps.extend(tiles.into_iter().map(add));
+        let found = options.and_then(|options| Ok((files_of_map(obj, folder, &options.name)?, options)));
+        let (files, options) = match found {
+            Ok(found) => found,
+            Err(what) => {
+                warn(line, rest, format!("`{keyword}` is not shown: {what}"));
                 continue;
             }
-            if options.name.to_ascii_uppercase().contains(TOKEN) {
-                let what = "stands for the number of a tile, from 1001 on, and there is no such image";
-                warn(line, rest, format!("`{keyword}` is not shown: `{TOKEN}` {what}"));
-                continue;
-            }
+        };
+        let has_tiles = files.iter().any(|(tile, _)| tile.is_some());
+        if !has_tiles && options.name.to_ascii_uppercase().contains(TOKEN) {
+            let what = "stands for the number of a tile, from 1001 on, and there is no such image";
+            warn(line, rest, format!("`{keyword}` is not shown: `{TOKEN}` {what}"));
+            continue;
         }
-        let found = options.and_then(|options| Ok((find_file(reach, folder, &options.name)?, options)));
-        match found {
-            Err(what) => warn(line, rest, format!("`{keyword}` is not shown: {what}")),
-            Ok((NamedFile { path, is_other_case }, options)) => {
-                if is_other_case {
-                    warn(line, &options.name, format!("`{}`: {} is taken", options.name, shown(&path)));
-                }
-                material.maps.push(Map { line, term, options, file: images.add(path), tile: None });
-            }
+        if has_tiles && options.is_moved() {
+            warn(line, rest, format!("`-s` and `-o` of `{keyword}` are left out: its image is in tiles"));
         }
+        if let Some((_, file)) = files.iter().find(|(_, file)| file.is_other_case) {
+            warn(line, &options.name, format!("`{}`: {} is taken", options.name, shown(&file.path)));
+        }
+        let map = |(tile, file)| Map { line, term, options: options.clone(), file: images.add(file), tile };
+        material.maps.extend(files.into_iter().map(map));
     }
     materials
 }

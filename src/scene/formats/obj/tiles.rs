@@ -12,11 +12,8 @@ use std::{
 
 use super::files::find_file;
 use crate::scene::{
-    files::{
-        outside::{NamedFile, Reach},
-        store,
-    },
-    model::Mesh,
+    files::SourceFile,
+    model::{Mesh, error::Checked},
 };
 
 /// Number of the first tile.
@@ -42,12 +39,22 @@ fn around_number(name: &str) -> Option<(&str, &str)> {
     (before.ends_with(['.', '_']) && after.starts_with('.')).then_some((before, after))
 }
 
+/// Returns the files of a map: those of its tiles whose images are there, with the numbers of the tiles, or else the
+/// file of its name.
+pub fn files_of_map(obj: &SourceFile, folder: &Path, name: &str) -> Checked<Vec<(Option<u32>, SourceFile)>> {
+    let tiles = files_of_tiles(obj, folder, name);
+    match tiles.is_empty() {
+        true => Ok(vec![(None, find_file(obj, folder, name)?)]),
+        false => Ok(tiles.into_iter().map(|(tile, file)| (Some(tile), file)).collect()),
+    }
+}
+
 /// Returns the tiles of a map whose images are there, with their files. A map of one image has none.
-pub fn files_of_tiles(reach: Reach, folder: &Path, name: &str) -> Vec<(u32, NamedFile)> {
+fn files_of_tiles(obj: &SourceFile, folder: &Path, name: &str) -> Vec<(u32, SourceFile)> {
     let Some((before, after)) = around_number(name) else { return Vec::new() };
     let file = |tile: u32| {
-        let file = find_file(reach, folder, &format!("{before}{tile}{after}")).ok()?;
-        store::is_file(&file.path).then_some((tile, file))
+        let file = find_file(obj, folder, &format!("{before}{tile}{after}")).ok()?;
+        file.is_file().then_some((tile, file))
     };
     let found: Vec<_> = ALL.filter_map(file).collect();
     let is_one_image = !name.to_ascii_uppercase().contains(TOKEN) && found.len() < 2;

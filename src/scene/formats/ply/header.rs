@@ -1,6 +1,6 @@
 //! The header of a PLY file, which names the elements and what each of their rows has.
 
-use crate::scene::{files::read::lossy_text, model::error::Checked};
+use crate::scene::{files::lossy_text, model::error::Checked};
 
 /// How the numbers of rows are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -123,11 +123,10 @@ pub struct Header {
 impl Header {
     /// Reads the header of a file.
     pub fn read(bytes: &[u8]) -> Checked<Self> {
-        let n_before = if bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
-        let has_cr_alone = bytes[n_before..].starts_with(b"ply\r") && bytes.get(n_before + 4) != Some(&b'\n');
+        let has_cr_alone = bytes.starts_with(b"ply\r") && bytes.get(4) != Some(&b'\n');
         let line_end = if has_cr_alone { b'\r' } else { b'\n' };
         let (mut encoding, mut elements, mut comments) = (None, Vec::<Element>::new(), Vec::new());
-        let (mut n_lines, mut n_bytes) = (0, n_before);
+        let (mut n_lines, mut n_bytes) = (0, 0);
         loop {
             let rest = &bytes[n_bytes..];
             let n = rest.iter().position(|byte| *byte == line_end).ok_or("its header does not end")?;

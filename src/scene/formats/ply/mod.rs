@@ -8,10 +8,7 @@ mod rows;
 mod text;
 mod vertex;
 
-use std::{
-    borrow::Cow,
-    path::{Path, PathBuf},
-};
+use std::borrow::Cow;
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
@@ -28,7 +25,7 @@ use super::{
 };
 use crate::{
     scene::{
-        files::outside::Access,
+        files::SourceFile,
         meshes::{
             needs::{Attributes, MeshSize, require_for_mesh, require_for_rows},
             polygon::Triangulator,
@@ -134,10 +131,10 @@ impl PlyMesh {
     }
 
     /// Reads the images that the file names.
-    pub fn with_materials(self, path: &Path, access: Access, images: &mut Images) -> Loaded {
+    pub fn with_materials(self, file: &SourceFile, images: &mut Images) -> Loaded {
         let Self { mesh, names, uses_crease, warnings } = self;
-        warnings.iter().for_each(|warning| tracing::warn!("{}: {warning}", path.display()));
-        let materials = if mesh.uvs[0].is_empty() { Vec::new() } else { materials(path, &names, access, images) };
+        warnings.iter().for_each(|warning| tracing::warn!("{}: {warning}", file.path.display()));
+        let materials = if mesh.uvs[0].is_empty() { Vec::new() } else { materials(file, &names, images) };
         Loaded { mesh, origin: DVec3::ZERO, materials, uses_crease }
     }
 }
@@ -238,12 +235,11 @@ fn texture_files(comments: &[String]) -> impl Iterator<Item = &str> {
 }
 
 /// Returns one material for each name of an image, which is its base colour. Warns of images that cannot be read.
-fn materials(path: &Path, names: &[String], access: Access, images: &mut Images) -> Vec<Material> {
-    let reach = access.beside(path);
-    let warn = |what: &str| tracing::warn!("{}: TextureFile is not shown: {}", path.display(), one_line(what));
+fn materials(ply: &SourceFile, names: &[String], images: &mut Images) -> Vec<Material> {
+    let warn = |what: &str| tracing::warn!("{}: TextureFile is not shown: {}", ply.path.display(), one_line(what));
     let mut add = |name: &String| {
         let is_shown = !images.is_replaced(name);
-        is_shown.then(|| reach.find(reach.root, name).map(|file| images.add(file.path)))
+        is_shown.then(|| ply.find(ply.folder(), name).map(|file| images.add(file)))
     };
     let files: Vec<Option<Checked<usize>>> = names.iter().map(&mut add).collect();
     images.decode();
@@ -409,8 +405,7 @@ fn checked_ix(stated: f64, vertices: &Vertices, what: impl Fn() -> String) -> Ch
 }
 
 /// Returns the images that the comments of a file's header name. Names that are refused are left out.
-pub(crate) fn named_images(path: &Path, bytes: &[u8], access: Access) -> Vec<PathBuf> {
-    let reach = access.beside(path);
+pub(crate) fn named_images(ply: &SourceFile, bytes: &[u8]) -> Vec<SourceFile> {
     let comments = Header::read(bytes).map(|header| header.comments).unwrap_or_default();
-    texture_files(&comments).filter_map(|name| Some(reach.find(reach.root, name).ok()?.path)).collect()
+    texture_files(&comments).filter_map(|name| ply.find(ply.folder(), name).ok()).collect()
 }

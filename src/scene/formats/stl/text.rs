@@ -22,7 +22,7 @@ pub(super) struct Word<'a> {
     line: usize,
 }
 
-/// The words of a text. A byte order mark is left out.
+/// The words of a text.
 #[derive(Clone)]
 pub(super) struct Words<'a> {
     rest: &'a [u8],
@@ -31,7 +31,7 @@ pub(super) struct Words<'a> {
 
 impl<'a> Words<'a> {
     pub fn new(bytes: &'a [u8]) -> Self {
-        Self { rest: bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes), line: 1 }
+        Self { rest: bytes, line: 1 }
     }
 
     /// Passes over the name of a solid, which may be missing or in any encoding. The name ends with the line, or before

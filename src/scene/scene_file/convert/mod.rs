@@ -11,7 +11,7 @@ use toml::{Table, Value};
 use self::relative::Places;
 use super::sources::is_scene_file;
 use crate::scene::{
-    files::{outside::Access, pack::pack_of, read::read_utf8},
+    files::{SourceFile, pack::pack_of},
     formats::material_spec::MAP_KEYS,
     model::{LoadOptions, Look, Scene, SceneError},
 };
@@ -28,7 +28,7 @@ pub fn scene_file_of(input: &Path, output: &Path, options: &LoadOptions) -> Resu
         let what = "is in a pack: it can be converted before it is packed, or once `unzip` has unpacked it";
         return Err(SceneError::file(input, what));
     }
-    let places = Places::new(output, Access::of(options))?;
+    let places = Places::new(output, options)?;
     if is_scene_file(input) {
         return moved(input, &places, (&scene, options));
     }
@@ -45,7 +45,7 @@ pub fn scene_file_of(input: &Path, output: &Path, options: &LoadOptions) -> Resu
 /// lights and the background that `options` choose, as `scene` has them. A text that needs no change keeps its
 /// comments.
 fn moved(input: &Path, places: &Places, (scene, options): (&Scene, &LoadOptions)) -> Result<String, SceneError> {
-    let text = read_utf8(input)?;
+    let text = SourceFile::new(input, options).text()?;
     let folder = input.parent().unwrap_or(Path::new(""));
     if places.is_here(folder) && options.camera.is_none() && options.look == Look::default() {
         return Ok(text);

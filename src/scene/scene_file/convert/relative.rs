@@ -7,8 +7,8 @@ use std::{
 };
 
 use crate::scene::{
-    files::{outside::Access, store::canonical},
-    model::SceneError,
+    files::canonical,
+    model::{LoadOptions, SceneError},
 };
 
 /// The folder of a file that is to be written.
@@ -16,13 +16,13 @@ pub(super) struct Places {
     output: PathBuf,
     /// The folder of the output, without links.
     folder: PathBuf,
-    access: Access,
+    allow_outside: bool,
 }
 
 impl Places {
-    pub fn new(output: &Path, access: Access) -> Result<Self, SceneError> {
+    pub fn new(output: &Path, options: &LoadOptions) -> Result<Self, SceneError> {
         let folder = folder_of(output).map_err(|error| SceneError::file(output, format!("its folder: {error}")))?;
-        Ok(Self { output: output.to_owned(), folder, access })
+        Ok(Self { output: output.to_owned(), folder, allow_outside: options.allow_outside })
     }
 
     /// Returns whether a folder is the output's.
@@ -39,7 +39,7 @@ impl Places {
         let is_common = |(a, b): &(Component, Component)| a == b;
         let n_common = folder.components().zip(self.folder.components()).take_while(is_common).count();
         let n_up = self.folder.components().count() - n_common;
-        if n_up > 0 && !self.access.is_anywhere() {
+        if n_up > 0 && !self.allow_outside {
             let output = self.output.display();
             let what = format!("does not lie below the folder of `{output}`, which has to name it");
             return Err(failed(what + "; --allow-outside lets it"));

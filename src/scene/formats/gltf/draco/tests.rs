@@ -5,7 +5,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use super::*;
-use crate::scene::files::outside::Access;
+use crate::scene::{LoadOptions, files::SourceFile};
 
 /// A box of 2 x 4 x 6: EdgeBreaker at the lowest speed, only positions.
 const CUBE: &str = "\
@@ -76,7 +76,8 @@ const PYRAMID: [(&str, &str, u32); 6] = [
 const FIRST: &str = "meshes[0].primitives[0]";
 
 fn read(file: &Value) -> Checked<Document> {
-    Document::read(Path::new("m.gltf"), file.to_string().into_bytes(), Access::default())
+    let source = SourceFile::new(Path::new("m.gltf"), &LoadOptions::default());
+    Document::read(source, file.to_string().into_bytes())
 }
 
 fn elements<'a>(document: &'a Document, name: &str, kind: ComponentType) -> &'a [u8] {

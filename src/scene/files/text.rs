@@ -1,14 +1,4 @@
-//! Functions that read a whole file of a scene, as text or as bytes.
-
-use std::path::Path;
-
-use super::store;
-use crate::scene::model::SceneError;
-
-/// Reads text that need not be UTF-8, as [`lossy_text`] does.
-pub(crate) fn read_lossy(path: &Path) -> Result<String, SceneError> {
-    read_bytes(path).map(lossy_text)
-}
+//! The bytes of a file as text.
 
 /// The characters of the bytes 0x80 to 0x9F in Windows-1252. Those above are characters of the same number.
 const WINDOWS_1252: [char; 32] = [
@@ -39,7 +29,7 @@ fn of_bytes(bytes: Vec<u8>) -> String {
         0x80..=0x9f => WINDOWS_1252[usize::from(byte - 0x80)],
         _ => char::from(*byte),
     };
-    without_bom(match String::from_utf8(bytes) {
+    match String::from_utf8(without_bom(bytes)) {
         Ok(text) => text,
         Err(e) => {
             let mut text = String::with_capacity(e.as_bytes().len());
@@ -49,24 +39,21 @@ fn of_bytes(bytes: Vec<u8>) -> String {
             }
             text
         }
+    }
+}
+
+/// Returns bytes as text that must be UTF-8, without a byte order mark. An error is the first line that is not.
+pub fn utf8(bytes: Vec<u8>) -> Result<String, usize> {
+    String::from_utf8(without_bom(bytes)).map_err(|e| {
+        let valid = &e.as_bytes()[..e.utf8_error().valid_up_to()];
+        1 + valid.iter().filter(|byte| **byte == b'\n').count()
     })
 }
 
-/// Reads text that must be UTF-8.
-pub(crate) fn read_utf8(path: &Path) -> Result<String, SceneError> {
-    let text = String::from_utf8(read_bytes(path)?).map_err(|e| {
-        let valid = &e.as_bytes()[..e.utf8_error().valid_up_to()];
-        let line = 1 + valid.iter().filter(|byte| **byte == b'\n').count();
-        SceneError::line(path, line, "is not UTF-8")
-    })?;
-    Ok(without_bom(text))
-}
-
-/// Reads a regular file.
-pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, SceneError> {
-    store::read(path).map_err(|error| SceneError::file(path, format!("cannot be read: {error}")))
-}
-
-fn without_bom(text: String) -> String {
-    text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text)
+/// Takes the byte order mark of UTF-8 from the beginning of bytes.
+pub(crate) fn without_bom(mut bytes: Vec<u8>) -> Vec<u8> {
+    if bytes.starts_with(b"\xef\xbb\xbf") {
+        bytes.drain(..3);
+    }
+    bytes
 }
