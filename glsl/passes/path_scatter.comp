@@ -28,14 +28,14 @@ void store_shadow_ray(uint path_ix, ShadowRay shadow_ray) {
     stored_shadow_rays[3u * path_ix + 2u] = words_of(shadow_ray.light, floatBitsToUint(shadow_ray.t_max));
 }
 
-// Takes a path one step further. Returns whether it goes on and has a shadow ray, for `child_kinds`.
-uint step_of(uint path_ix) {
+// Takes a path one bounce further. Returns whether it goes on and has a shadow ray, for `child_kinds`.
+uint scatter(uint path_ix) {
     uvec2 pixel = pixel_of_path(path_ix);
     PathRay ray = rays[path_ix];
     vec4 words = path_states[path_ix];
     PathState state = PathState(words.xyz, words.w);
     ShadowRay shadow_ray;
-    bool goes_on = step_path(key_of_path(path_ix, pixel), batch.depth, hits[path_ix], ray, state, shadow_ray);
+    bool goes_on = scatter_path(key_of_path(path_ix, pixel), batch.depth, hits[path_ix], ray, state, shadow_ray);
     path_states[path_ix] = vec4(state.radiance, state.pdf);
     // A path without a shadow ray has none already: path_trace.comp has cleared the last one.
     if (shadow_ray.state != SHADOW_RAY_NONE) store_shadow_ray(path_ix, shadow_ray);
@@ -47,7 +47,7 @@ void main() {
     uint place = gl_GlobalInvocationID.x;
     uint kind = 0u;
     if (place < bounces[batch.bounce_ix].n_rays) {
-        kind = step_of(live_paths[list_of(batch.depth) + place]);
+        kind = scatter(live_paths[list_of(batch.depth) + place]);
         child_kinds[place] = kind;
     }
     uint n_of_group;

@@ -1202,15 +1202,16 @@ struct FalseColor {
     float brightest;
 };
 
-// Push constants of `atrous_filter.comp`: the number of the filter's step, from 0 to `EDGE_STEPS - 1`.
-struct EdgeStep {
-    uint step_ix;
+// Push constants of `atrous_filter.comp`: the number of the filter's iteration, from 0 to `N_ATROUS_ITERATIONS - 1`.
+struct AtrousIteration {
+    uint iteration_ix;
 };
 
-// The number of steps of the noise filter `edge`, which is odd. Step i compares pixels at multiples of 2^i pixels.
-#define EDGE_STEPS 5u
-// How far the light of another pixel can get by all steps: 2 * (2^EDGE_STEPS - 1), and the radius of the square in
-// which the variance is estimated (pixels).
+// The number of iterations of the noise filter `edge`, which is odd. Iteration i compares pixels at multiples of 2^i
+// pixels.
+#define N_ATROUS_ITERATIONS 5u
+// How far the light of another pixel can get by all iterations: 2 * (2^N_ATROUS_ITERATIONS - 1), and the radius of the
+// square in which the variance is estimated (pixels).
 #define EDGE_BORDER 65u
 
 // Push constants of `present.frag`, which shows a picture in a window: the sizes of both (pixels).
@@ -1671,7 +1672,7 @@ struct KdSlabExtent {
 // surfaces, as many elements follow for each of the `LIGHT_LAYERS` layers, then for each of the `SURFACE_LAYERS`.
 #define BIND_PIXEL_RADIANCE 16u
 // A vec4 for each pixel: the radiance after noise reduction. With the filter `edge`, as many elements follow: the light
-// on surfaces, and in w the variance of its luminance, between two steps of the filter.
+// on surfaces, and in w the variance of its luminance, between two iterations of the filter.
 #define BIND_PIXEL_FILTERED 17u
 // A word for each pixel: what is displayed, 8 bits a channel, R in the lowest byte.
 #define BIND_PIXEL_DISPLAY 18u

@@ -1,5 +1,5 @@
 //! Path scatter: the light at the hits of paths, and the rays with which they go on. It does what the reference's pass
-//! does, bit for bit. The random numbers of sixteen paths are computed together, and so are the steps of paths at
+//! does, bit for bit. The random numbers of sixteen paths are computed together, and so are the bounces of paths at
 //! [Lambertian](super::lambertian_surfaces) surfaces.
 
 use arrayvec::ArrayVec;
@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::{
     area_lights::meets_light,
     environment_samples::environment_samples,
-    lambertian_steps::{BounceConstants, Samples, lambertian_steps},
+    lambertian_scatter::{BounceConstants, Samples, lambertian_scatter},
     lambertian_surfaces::{LambertianHits, lambertian_surfaces},
     lanes::{LANES, LaneMask},
     path_begin::PixelOfBatch,
@@ -27,7 +27,7 @@ use crate::{
         maps::colour_at,
         path_compact::{counts_of_block, kind_of_path},
         path_scatter::PathBuffers,
-        path_vertex::{HitChoices, PAIRS_OF_HIT, first_pair_of, step_past_lights, step_path},
+        path_vertex::{HitChoices, PAIRS_OF_HIT, first_pair_of, scatter_past_lights, scatter_path},
         paths::place_of_path,
         sampler::SampleKey,
         search_ray::SearchRay,
@@ -36,7 +36,7 @@ use crate::{
 };
 
 const BLOCK_SIZE: usize = SCAN_GROUP_SIZE as usize;
-/// The number of paths from which on it is faster to take their steps together.
+/// The number of paths from which on it is faster to scatter them together.
 const LEAST_GROUP: usize = 4;
 
 /// The random decisions at the hits of a group of paths.
@@ -56,7 +56,7 @@ impl GroupChoices {
     }
 }
 
-/// What all steps of a bounce need.
+/// What all paths of a bounce need.
 pub struct BounceOfPaths<'a> {
     pub inputs: &'a KernelInputs<'a>,
     pub batch: &'a Batch,
@@ -91,14 +91,14 @@ pub fn path_scatter(
     );
     of_blocks.into_par_iter().zip(of_paths).for_each(|(of_block, (rays, states, shadow_rays))| {
         let (live, kinds, counts) = of_block;
-        bounce.step_block(live, kinds, &mut PathsOfBlock { rays, states, shadow_rays });
+        bounce.scatter_block(live, kinds, &mut PathsOfBlock { rays, states, shadow_rays });
         *counts = counts_of_block(kinds);
     });
 }
 
 impl BounceOfPaths<'_> {
-    /// Takes the paths of a block one step further. Writes to `kinds` which of them go on and have a shadow ray.
-    fn step_block(&self, live: &[u32], kinds: &mut [u32], paths: &mut PathsOfBlock) {
+    /// Takes the paths of a block one bounce further. Writes to `kinds` which of them go on and have a shadow ray.
+    fn scatter_block(&self, live: &[u32], kinds: &mut [u32], paths: &mut PathsOfBlock) {
         let mut at_lambertian = ArrayVec::<_, BLOCK_SIZE>::new();
         let (mut at_others, mut missed) = (at_lambertian.clone(), at_lambertian.clone());
         for (place, &path_ix) in live.iter().enumerate() {
@@ -114,18 +114,18 @@ impl BounceOfPaths<'_> {
         }
         for group in at_lambertian.chunks(LANES) {
             if group.len() < LEAST_GROUP {
-                self.step_group(group, &self.choices_of(group), kinds, paths)
+                self.scatter_group(group, &self.choices_of(group), kinds, paths)
             } else {
-                self.step_lambertian(group, kinds, paths)
+                self.scatter_lambertian(group, kinds, paths)
             }
         }
-        at_others.chunks(LANES).for_each(|group| self.step_group(group, &self.choices_of(group), kinds, paths));
+        at_others.chunks(LANES).for_each(|group| self.scatter_group(group, &self.choices_of(group), kinds, paths));
         // Paths that leave the scene need no random numbers.
-        missed.chunks(LANES).for_each(|group| self.step_group(group, &Default::default(), kinds, paths));
+        missed.chunks(LANES).for_each(|group| self.scatter_group(group, &Default::default(), kinds, paths));
     }
 
     fn is_lambertian(&self, hit: &Hit) -> bool {
-        // Their steps by sixteen know no instances.
+        // Groups of sixteen know no instances.
         self.inputs.instanced.is_none()
             && self.are_lambertian[self.inputs.triangle_materials[hit.triangle_ix as usize] as usize]
     }
@@ -159,13 +159,13 @@ impl BounceOfPaths<'_> {
         })
     }
 
-    /// Takes a path one step further. Returns its kind: whether it goes on and has a shadow ray.
-    fn step(&self, path_ix: u32, before_light: bool, choices: HitChoices, paths: &mut PathsOfBlock) -> u32 {
+    /// Takes a path one bounce further. Returns its kind: whether it goes on and has a shadow ray.
+    fn scatter(&self, path_ix: u32, before_light: bool, choices: HitChoices, paths: &mut PathsOfBlock) -> u32 {
         let (ray, state) = (paths.rays.of_path(path_ix), paths.states.of_path(path_ix));
         let (inputs, depth, hit) = (self.inputs, self.batch.depth, &self.hits[path_ix as usize]);
         let (goes_on, shadow_ray) = match before_light {
-            true => step_path(inputs, || choices, depth, hit, ray, state),
-            false => step_past_lights(inputs, || choices, depth, hit, ray, state),
+            true => scatter_path(inputs, || choices, depth, hit, ray, state),
+            false => scatter_past_lights(inputs, || choices, depth, hit, ray, state),
         };
         // A path without a shadow ray has none already.
         if shadow_ray.state != SHADOW_RAY_NONE {
@@ -192,11 +192,17 @@ impl BounceOfPaths<'_> {
         GroupChoices { of_environment: emitters.and_then(of_map), pairs }
     }
 
-    /// Takes a group of paths one step further, one after the other.
-    fn step_group(&self, group: &[(usize, u32)], choices: &GroupChoices, kinds: &mut [u32], paths: &mut PathsOfBlock) {
+    /// Takes a group of paths one bounce further, one after the other.
+    fn scatter_group(
+        &self,
+        group: &[(usize, u32)],
+        choices: &GroupChoices,
+        kinds: &mut [u32],
+        paths: &mut PathsOfBlock,
+    ) {
         let before_lights = self.before_lights(group, paths);
         for (lane, &(place, path_ix)) in group.iter().enumerate() {
-            kinds[place] = self.step(path_ix, before_lights >> lane & 1 == 1, choices.of_lane(lane), paths);
+            kinds[place] = self.scatter(path_ix, before_lights >> lane & 1 == 1, choices.of_lane(lane), paths);
         }
     }
 
@@ -206,14 +212,14 @@ impl BounceOfPaths<'_> {
         for (lane, &(place, path_ix)) in group.iter().enumerate() {
             kinds[place] = 0;
             if before_lights >> lane & 1 == 1 {
-                self.step(path_ix, true, Default::default(), paths);
+                self.scatter(path_ix, true, Default::default(), paths);
             }
         }
     }
 
-    /// Takes a group of paths at Lambertian surfaces one step further. Those that meet a light are stepped as all
+    /// Takes a group of paths at Lambertian surfaces one bounce further. Those that meet a light are taken as all
     /// others.
-    fn step_lambertian(&self, group: &[(usize, u32)], kinds: &mut [u32], paths: &mut PathsOfBlock) {
+    fn scatter_lambertian(&self, group: &[(usize, u32)], kinds: &mut [u32], paths: &mut PathsOfBlock) {
         let (inputs, frame, depth) = (self.inputs, self.inputs.frame(), self.batch.depth);
         // The last ray of a path only meets light.
         if depth + 1 >= frame.max_depth {
@@ -236,23 +242,24 @@ impl BounceOfPaths<'_> {
         }
         let bounce = BounceConstants { depth, clamp: frame.clamp, shapes: self.shapes() };
         let samples = (&samples, &choices.pairs);
-        let steps = dispatch!(self.level, simd => lambertian_steps(simd, &bounce, (&hits, &surfaces), samples));
+        let scattered = dispatch!(self.level, simd => lambertian_scatter(simd, &bounce, (&hits, &surfaces), samples));
         let before_lights = self.before_lights(group, paths);
         for (lane, &(place, path_ix)) in group.iter().enumerate() {
             if before_lights >> lane & 1 == 1 {
-                kinds[place] = self.step(path_ix, true, choices.of_lane(lane), paths);
+                kinds[place] = self.scatter(path_ix, true, choices.of_lane(lane), paths);
                 continue;
             }
             let triangle_ix = self.hits[path_ix as usize].triangle_ix;
-            let (goes_on, has_shadow_ray) = (steps.go_on >> lane & 1 == 1, steps.have_shadow_ray >> lane & 1 == 1);
+            let (goes_on, has_shadow_ray) =
+                (scattered.go_on >> lane & 1 == 1, scattered.have_shadow_ray >> lane & 1 == 1);
             kinds[place] = kind_of_path(goes_on, has_shadow_ray);
             if has_shadow_ray {
-                *paths.shadow_rays.of_path(path_ix) = steps.shadow_ray(lane, triangle_ix);
+                *paths.shadow_rays.of_path(path_ix) = scattered.shadow_ray(lane, triangle_ix);
             }
             if goes_on {
                 let ray = paths.rays.of_path(path_ix);
-                *ray = steps.ray(lane, triangle_ix, ray);
-                paths.states.of_path(path_ix).pdf = steps.pdf[lane];
+                *ray = scattered.ray(lane, triangle_ix, ray);
+                paths.states.of_path(path_ix).pdf = scattered.pdf[lane];
             }
         }
     }
@@ -382,7 +389,7 @@ mod tests {
     }
 
     #[test]
-    fn steps_are_those_of_the_reference() {
+    fn paths_scatter_as_in_the_reference() {
         const N: usize = 3000;
         let mut random = Uniform(1);
         let (mut n_lambertian, mut n_going_on, mut n_shadow_rays) = (0, 0, 0);

@@ -17,8 +17,8 @@ use crate::{
     },
     gpu::GpuError,
     layout::{
-        Auxiliary, Batch, Bounce, EdgeStep, FILTER_CENTRE, Frame, Hit, LIGHT_LAYERS, Material, PathRay, PixelAovs,
-        SAMPLE_BLOCK_LOG2, SCAN_GROUP_SIZE, SURFACE_LAYERS,
+        AtrousIteration, Auxiliary, Batch, Bounce, FILTER_CENTRE, Frame, Hit, LIGHT_LAYERS, Material, PathRay,
+        PixelAovs, SAMPLE_BLOCK_LOG2, SCAN_GROUP_SIZE, SURFACE_LAYERS,
     },
     reference::{
         accumulate, atrous_filter, auxiliary,
@@ -82,8 +82,8 @@ pub struct CpuRenderer {
     pixel_aovs: Vec<PixelAovs>,
     /// Empty unless the noise filter `edge` runs.
     pixel_aux: Vec<Auxiliary>,
-    /// The next step of that filter.
-    edge_step: u32,
+    /// The next iteration of that filter.
+    atrous_iteration: u32,
     queue: Queue,
     paths: Paths,
     /// The materials of paths. Empty for ray trees.
@@ -130,7 +130,7 @@ impl CpuRenderer {
             pixel_display: vec![[0; 4]; n_pixels],
             pixel_aovs: vec![PixelAovs::default(); if options.pixel_aovs { n_pixels } else { 0 }],
             pixel_aux: vec![Auxiliary::default(); if options.noise_filter() == Denoise::Edge { n_pixels } else { 0 }],
-            edge_step: 0,
+            atrous_iteration: 0,
             queue: Queue::default(),
             paths: Paths::default(),
             path_materials: if options.integrator == Integrator::Path {
@@ -272,7 +272,7 @@ impl CpuRenderer {
     /// Returns the mean of the samples so far, after the noise filter if there is one.
     pub fn picture(&self) -> Picture {
         let (window, crop) = (self.options.window(), self.options.crop_or_whole());
-        // The filter `edge` has a second half of `pixel_filtered` for its steps.
+        // The filter `edge` has a second half of `pixel_filtered` for its iterations.
         let filtered = if self.filters() { &self.pixel_filtered } else { &self.pixel_radiance };
         Picture {
             width: crop.width(),
@@ -423,14 +423,14 @@ impl CpuRenderer {
         pixel_filtered.resize(2 * pixel_radiance.len(), [0.0; 4]);
         let demodulate = || demodulate::demodulate(frame, pixel_radiance, pixel_aux, pixel_filtered);
         self.clock.time(Pass::Demodulate, None, demodulate);
-        self.edge_step = 0;
+        self.atrous_iteration = 0;
     }
 
     fn atrous_filter(&mut self) {
         let (frame, aux, filtered) = (&self.frame, &self.pixel_aux, &mut self.pixel_filtered);
-        let step = EdgeStep { step_ix: self.edge_step };
-        self.clock.time(Pass::AtrousFilter, None, || atrous_filter::atrous_filter(frame, &step, aux, filtered));
-        self.edge_step += 1;
+        let iteration = AtrousIteration { iteration_ix: self.atrous_iteration };
+        self.clock.time(Pass::AtrousFilter, None, || atrous_filter::atrous_filter(frame, &iteration, aux, filtered));
+        self.atrous_iteration += 1;
     }
 
     fn path_spine(&mut self, depth: u32) {

@@ -29,7 +29,7 @@ pub enum Role {
 /// How often a frame runs a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scope {
-    /// Once, or for a filter of several steps, once for each step.
+    /// Once, or for a filter of several iterations, once for each.
     Frame,
     /// Once for each batch, for the rays of all its bounces together.
     Batch,
@@ -95,7 +95,7 @@ pub enum Pass {
     Auxiliary,
     /// Divides the light of each pixel by the albedo of what it shows, and estimates its variance.
     Demodulate,
-    /// Blurs the light within surfaces: one step of the noise filter `edge`.
+    /// Blurs the light within surfaces: one iteration of the noise filter `edge`.
     AtrousFilter,
 }
 

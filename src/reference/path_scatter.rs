@@ -6,7 +6,7 @@ use super::{
     inputs::KernelInputs,
     live_paths::parts,
     path_compact::{counts_of_block, kind_of_path},
-    path_vertex::{HitChoices, pairs_of_hit, step_path},
+    path_vertex::{HitChoices, pairs_of_hit, scatter_path},
     paths::{key_of_path, pixel_of_path},
 };
 use crate::layout::{Batch, Hit, PathRay, PathState, SCAN_GROUP_SIZE, SHADOW_RAY_NONE, ShadowRay};
@@ -18,7 +18,7 @@ pub struct PathBuffers<'a> {
     pub shadow_rays: &'a mut [ShadowRay],
 }
 
-/// Takes the paths `live` one step further. Writes whether the path at each place of the list goes on and has a
+/// Takes the paths `live` one bounce further. Writes whether the path at each place of the list goes on and has a
 /// shadow ray (`child_kinds`). Counts both in each block of `SCAN_GROUP_SIZE` places (`scan_blocks`). `live` is in
 /// ascending order.
 pub fn path_scatter(
@@ -41,7 +41,7 @@ pub fn path_scatter(
             let key = key_of_path(inputs, path_ix, pixel_of_path(inputs.frame(), batch, path_ix));
             let (ray, state) = (rays.of_path(path_ix), states.of_path(path_ix));
             let choices = || HitChoices { pairs: pairs_of_hit(key, batch.depth), of_environment: None };
-            let (goes_on, shadow_ray) = step_path(inputs, choices, batch.depth, &hits[path_ix as usize], ray, state);
+            let (goes_on, shadow_ray) = scatter_path(inputs, choices, batch.depth, &hits[path_ix as usize], ray, state);
             // A path without a shadow ray has none already.
             if shadow_ray.state != SHADOW_RAY_NONE {
                 *shadow_rays.of_path(path_ix) = shadow_ray;

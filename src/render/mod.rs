@@ -35,7 +35,7 @@ use self::{
 use crate::{
     buffers::{Needs, Resources},
     frame::{
-        Denoise, FrameKind, FrameRenderer, Integrator, Pass, Picture, Plan, Primary, Profile, RenderOptions, Step,
+        Denoise, FrameKind, FrameRenderer, Integrator, Pass, Picture, Plan, PlanEntry, Primary, Profile, RenderOptions,
         opaque, plan,
     },
     gpu::{Access, AnyBuffer, CommandBuffer, Commands, Context, GpuError},
@@ -213,7 +213,7 @@ impl GpuRenderer {
         self.context.run("show", |commands| {
             self.resources.bind(commands);
             self.update_constants(commands);
-            self.record_section(commands, &plan::display(&self.frame_kind()), &Batch::default());
+            self.record_sequence(commands, &plan::display(&self.frame_kind()), &Batch::default());
         })?;
         self.note_displayed();
         Ok(())
@@ -310,7 +310,7 @@ impl GpuRenderer {
         }
         let end = self.command_buffer("end frame", |commands| {
             self.resources.bind(commands);
-            self.record_section(commands, &plan.image, &Batch::default());
+            self.record_sequence(commands, &plan.image, &Batch::default());
         })?;
         frame.push(Part::plain(end));
         Ok(frame)
@@ -329,29 +329,30 @@ impl GpuRenderer {
         }
     }
 
-    /// Records a section of a batch in one command buffer, or in two if rays of the section can be suspended: the host
-    /// submits the second when all rays of the first have ended.
-    fn parts(&self, name: &str, section: &[Step], batch: &Batch) -> Result<Vec<Part>, GpuError> {
-        let traced = self.traced(section, batch).filter(|_| self.resources.accel.suspended_rays.can_occur());
+    /// Records a sequence of a batch in one command buffer, or in two if rays of the sequence can be suspended: the
+    /// host submits the second when all rays of the first have ended.
+    fn parts(&self, name: &str, sequence: &[PlanEntry], batch: &Batch) -> Result<Vec<Part>, GpuError> {
+        let traced = self.traced(sequence, batch).filter(|_| self.resources.accel.suspended_rays.can_occur());
         let Some(traced) = traced else {
             let all = |commands: &Commands| {
                 self.resources.bind(commands);
-                self.record_section(commands, section, batch);
+                self.record_sequence(commands, sequence, batch);
             };
             return Ok(vec![Part::plain(self.command_buffer(name, all)?)]);
         };
         // `trace` ends with the pass that traces the rays, and the barrier after it.
-        let is_tracing = |step: &Step| matches!(step, Step::Run(Pass::Trace | Pass::Shadow | Pass::PathTrace));
-        let tracing_ix = section.iter().position(is_tracing).expect("a pass that traces rays");
-        let (trace, rest) = section.split_at(tracing_ix + 2);
+        let is_tracing =
+            |entry: &PlanEntry| matches!(entry, PlanEntry::Run(Pass::Trace | Pass::Shadow | Pass::PathTrace));
+        let tracing_ix = sequence.iter().position(is_tracing).expect("a pass that traces rays");
+        let (trace, rest) = sequence.split_at(tracing_ix + 2);
         let tracing = |commands: &Commands| {
             self.resources.bind(commands);
             self.resources.accel.suspended_rays.reset(commands);
-            self.record_section(commands, trace, batch);
+            self.record_sequence(commands, trace, batch);
         };
         let resting = |commands: &Commands| {
             self.resources.bind(commands);
-            self.record_section(commands, rest, batch);
+            self.record_sequence(commands, rest, batch);
         };
         Ok(vec![
             Part::traced(self.command_buffer(name, tracing)?, traced),
@@ -359,11 +360,11 @@ impl GpuRenderer {
         ])
     }
 
-    /// Returns the rays that a section traces through the acceleration structure, if it does. A section has one such
+    /// Returns the rays that a sequence traces through the acceleration structure, if it does. A sequence has one such
     /// pass at most.
-    fn traced(&self, section: &[Step], batch: &Batch) -> Option<Traced> {
-        section.iter().find_map(|step| match step {
-            Step::Run(pass @ (Pass::Trace | Pass::Shadow | Pass::PathTrace)) => {
+    fn traced(&self, sequence: &[PlanEntry], batch: &Batch) -> Option<Traced> {
+        sequence.iter().find_map(|entry| match entry {
+            PlanEntry::Run(pass @ (Pass::Trace | Pass::Shadow | Pass::PathTrace)) => {
                 Some(Traced { pass: *pass, batch: *batch })
             }
             _ => None,
@@ -375,7 +376,7 @@ impl GpuRenderer {
         self.resources.accel.suspended_rays.finish(&self.context, |commands, resume_pass| {
             self.resources.bind(commands);
             let batch = Batch { resume_pass: resume_pass.constant(), ..traced.batch };
-            self.record_section(commands, &[Step::Run(traced.pass)], &batch);
+            self.record_sequence(commands, &[PlanEntry::Run(traced.pass)], &batch);
         })?;
         Ok(())
     }
@@ -386,7 +387,7 @@ impl GpuRenderer {
 
     /// Records the transfers that set the constants and the initial rows of `bounces` and clear the counters, then
     /// the passes of primary visibility.
-    fn begin_frame(&self, commands: &Commands, visibility: &[Step]) {
+    fn begin_frame(&self, commands: &Commands, visibility: &[PlanEntry]) {
         commands.reset_timer();
         self.resources.bind(commands);
         self.update_constants(commands);
@@ -400,7 +401,7 @@ impl GpuRenderer {
         }
         // bounces, counters, pixel_aovs, raster_groups
         commands.barrier(Access::TransferWrite, Access::AnyUse);
-        self.record_section(commands, visibility, &Batch::default());
+        self.record_sequence(commands, visibility, &Batch::default());
     }
 
     fn update_constants(&self, commands: &Commands) {
@@ -412,9 +413,9 @@ impl GpuRenderer {
         commands.barrier(Access::TransferWrite, Access::AnyUse); // frame, noise_tiles
     }
 
-    fn record_section(&self, commands: &Commands, section: &[Step], batch: &Batch) {
+    fn record_sequence(&self, commands: &Commands, sequence: &[PlanEntry], batch: &Batch) {
         let inputs = Inputs { batch: *batch, false_color: self.false_color };
-        self.passes.record_section(commands, &self.resources, section, &inputs);
+        self.passes.record_sequence(commands, &self.resources, sequence, &inputs);
     }
 }
 

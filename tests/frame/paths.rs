@@ -146,8 +146,8 @@ fn a_profile_has_the_passes_of_the_plan() {
     let mut renderer = GpuRenderer::new(device(), &world_of(&scene), &options).expect("a renderer");
     let mut on_cpu = cpu::CpuRenderer::new(&world_of(&scene), &options, Batching::default());
     let plan = Plan::new(&FrameKind::new(&options, &world_of(&scene).frame_constants(&options)));
-    let steps = [plan.bounces.concat(), plan.light, plan.image].concat();
-    let expected: Vec<_> = plan::passes(&steps).map(Pass::name).collect();
+    let entries = [plan.bounces.concat(), plan.light, plan.image].concat();
+    let expected: Vec<_> = plan::passes(&entries).map(Pass::name).collect();
     for profile in [renderer.draw_sample().expect("a sample"), on_cpu.draw_sample()] {
         let found: Vec<_> = profile.passes.iter().map(|pass| pass.name).collect();
         assert_eq!(found, expected);

@@ -91,7 +91,7 @@ fn on_device(stage: &Stage, n_before: u32, child_counts: &[u32]) -> Compacted {
     let batch = Batch { depth: 1, bounce_ix: 1, ..FIRST };
     stage.run(|commands| {
         let inputs = Inputs { batch, ..Inputs::default() };
-        stage.passes.record_section(commands, resources, &plan::next_rays(), &inputs);
+        stage.passes.record_sequence(commands, resources, &plan::next_rays(), &inputs);
     });
     Compacted {
         rays: queue.rays.download().expect("rays"),

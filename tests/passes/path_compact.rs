@@ -2,7 +2,7 @@
 //! with a shadow ray.
 
 use kdray::{
-    frame::{Access, Pass, Step},
+    frame::{Access, Pass, PlanEntry},
     gpu::DeviceOverrides,
     layout::{Batch, Bounce, PATH_GOES_ON, PATH_HAS_SHADOW_RAY, SCAN_GROUP_SIZE, SPINE_ITEMS},
     passes::Inputs,
@@ -40,11 +40,11 @@ fn check(stage: &PathStage, n: usize, [going_on, with_shadow_ray]: [f32; 2], ran
     queue.scan_blocks.upload(&padded(blocks.as_flattened(), queue.scan_blocks.len())).expect("scan_blocks");
     stage.set_n_paths(&[(0, 0), (n as u32, 0)]);
     let batch = Batch { n_pixels: 1200, bounce_ix: 1, depth: 1, ..FIRST };
-    let wait = Step::Barrier { before: Access::Write, after: Access::Update, of: &[] };
-    let wait_for_size = Step::Barrier { before: Access::Write, after: Access::Indirect, of: &[] };
-    let section = [Step::Run(Pass::CompactSpine), wait, wait_for_size, Step::Run(Pass::PathCompact)];
+    let wait = PlanEntry::Barrier { before: Access::Write, after: Access::Update, of: &[] };
+    let wait_for_size = PlanEntry::Barrier { before: Access::Write, after: Access::Indirect, of: &[] };
+    let sequence = [PlanEntry::Run(Pass::CompactSpine), wait, wait_for_size, PlanEntry::Run(Pass::PathCompact)];
     let inputs = Inputs { batch, false_color: None };
-    stage.run(|commands| stage.passes.record_section(commands, &stage.resources, &section, &inputs));
+    stage.run(|commands| stage.passes.record_sequence(commands, &stage.resources, &sequence, &inputs));
 
     let found = stage.resources.bounces.download().expect("bounces");
     let (mut this, mut next) = (Bounce { n_shadow_rays: 0, ..found[1] }, Bounce::of_paths(0, stage.frame()));
