@@ -111,15 +111,15 @@ fn a_slow_variant_warms_up_with_fewer_casts_than_a_fast_one() {
 }
 
 #[test]
-fn primary_rays_go_tile_by_tile() {
+fn primary_rays_go_square_by_square() {
     let sets = ray_sets(&Stage::in_room(mesh(), SIZE, &BuildOptions::default()));
     let pixels: Vec<_> = rays(&sets, RayKind::Primary).iter().map(|ray| ray.pixel_ix).collect();
-    let mut first_tile = pixels[..64].to_vec();
-    first_tile.sort_unstable();
-    // The first tile is in the middle one of three bands.
+    let mut first_square = pixels[..64].to_vec();
+    first_square.sort_unstable();
+    // The first square is in the middle one of three bands.
     let first = 8 * SIZE.0;
-    assert!(first_tile.into_iter().eq((0..8).flat_map(|y| (0..8).map(move |x| first + y * SIZE.0 + x))));
-    // Pixels within the tile follow a Z-order curve.
+    assert!(first_square.into_iter().eq((0..8).flat_map(|y| (0..8).map(move |x| first + y * SIZE.0 + x))));
+    // Pixels within the square follow a Z-order curve.
     let [right, down] = [1, SIZE.0];
     assert_eq!(pixels[..8], [0, 1, down, right + down, 2, 3, 2 + down, 3 + down].map(|pixel| first + pixel));
 }

@@ -18,7 +18,7 @@ use kdray::{
     },
     cast::{CpuCaster, Ray},
     engine::{Engine, NoiseGoal},
-    frame::{Crop, Denoise, Goal, Integrator, NoiseTiles, RenderOptions, SampleRange, TileSamples},
+    frame::{Crop, Denoise, Goal, Integrator, NoiseTileSamples, NoiseTiles, RenderOptions, SampleRange},
     gpu::DeviceOverrides,
     layout::{
         AREA_SPHERE, AreaLight, LIGHT_SPOT, MaterialMaps, NO_TEXTURE, TEXTURE_HALVES, TEXTURE_UV_SET, Texture, Triangle,
@@ -346,9 +346,9 @@ fn goals_of_noise_have_a_range() {
 
 #[test]
 fn tiles_that_do_not_fit_together_are_refused() {
-    let tile = |x, first, end| TileSamples { place: glam::uvec2(x, 0), samples: SampleRange { first, end } };
+    let tile = |x, first, end| NoiseTileSamples { place: glam::uvec2(x, 0), samples: SampleRange { first, end } };
     assert!(NoiseTiles::new(&[tile(0, 0, 16), tile(4095, 16, 32)]).is_ok());
-    let wrong: [&[TileSamples]; 8] = [
+    let wrong: [&[NoiseTileSamples]; 8] = [
         &[],
         &[tile(0, 0, 0)],
         &[tile(0, 16, 0)],

@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Edge filter: one invocation per pixel of the window, in tiles, takes one iteration of the noise filter `edge`, an
+// Edge filter: one invocation per pixel of the window, in squares, takes one iteration of the noise filter `edge`, an
 // edge-avoiding a-trous wavelet transform (Dammertz et al.: Edge-Avoiding A-Trous Wavelet Transform for Fast Global
 // Illumination Filtering, 2010) that is guided by variance (Schied et al.: Spatiotemporal Variance-Guided Filtering,
 // 2017). It replaces the light of the pixel by a mean of 5 x 5 pixels, which are 2^iteration_ix pixels apart. A pixel
@@ -11,7 +11,7 @@
 #include "picture/noise.glsl"
 #include "picture/edge.glsl"
 
-layout(local_size_x = TILE_SIZE, local_size_y = TILE_SIZE) in;
+layout(local_size_x = PIXEL_GROUP_SIZE, local_size_y = PIXEL_GROUP_SIZE) in;
 layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
 layout(std430, set = 0, binding = BIND_PIXEL_AUX) readonly buffer PixelAuxBlock { Auxiliary pixel_aux[]; };
 layout(std430, set = 0, binding = BIND_PIXEL_FILTERED) buffer PixelFilteredBlock { vec4 pixel_filtered[]; };

@@ -9,9 +9,9 @@
 
 // Invocations of a workgroup in ray kernels. An invocation handles one ray, or none (`MOST_LANES_LOG2`).
 #define RAY_GROUP_SIZE 64u
-// Side of the square of pixels that a workgroup of a pixel kernel handles. It is also the side of the tiles in whose
+// Side of the square of pixels that a workgroup of a pixel kernel handles. It is also the side of the squares in whose
 // order pixels are rendered.
-#define TILE_SIZE 8u
+#define PIXEL_GROUP_SIZE 8u
 // Base-2 logarithm of the most lanes that one ray gets. If a dispatch has fewer rays than the device has lanes, each
 // ray gets several lanes, a power of two. Only the first of them works, so that fewer divergent rays share a
 // subgroup.
@@ -765,12 +765,12 @@ struct ShadowRay {
 #define SAMPLE_BLOCK_LOG2 4u
 // Base-2 logarithm of the most samples of each pixel that a frame of paths draws.
 #define MOST_SAMPLES_LOG2 8u
-// Side of a noise tile, which gets samples until its noise is low (pixels). A multiple of `TILE_SIZE`.
+// Side of a noise tile, which gets samples until its noise is low (pixels). A multiple of `PIXEL_GROUP_SIZE`.
 #define NOISE_TILE_SIZE 16u
 // The most noise tiles that are drawn together. Their words fill the smallest uniform buffer that a device may have.
 #define MOST_NOISE_TILES 4096u
 // `Frame.window_x` if the window is a column of noise tiles (rays/noise_tiles.glsl).
-#define WINDOW_OF_TILES 0xffffffffu
+#define WINDOW_OF_NOISE_TILES 0xffffffffu
 // The least pdf, per steradian, with which a lobe samples a direction in which it sees the studio. That of diffuse
 // surfaces is at most 1 / pi.
 #define STUDIO_LEAST_PDF 1.0
@@ -826,7 +826,7 @@ struct Hit {
 // - `queue_capacity`: rays that the ray queue has room for.
 // - `picture_width`, `picture_height`: of the whole picture (pixels).
 // - `window_x`, `window_y`: the picture's pixel at which the window begins. Of paths, `window_x` can also be
-//   `WINDOW_OF_TILES`, and `window_y` is the number of samples that each tile gets then.
+//   `WINDOW_OF_NOISE_TILES`, and `window_y` is the number of samples that each tile gets then.
 // - `sample_x`, `sample_y`: position of the frame's sample in each pixel (pixels from its upper left corner).
 // - `n_samples`: samples of each pixel so far, including this frame's.
 // - `n_lanes`: lanes of the device, which are shared out if there are fewer rays. 0: each ray gets one lane.
@@ -1172,7 +1172,7 @@ struct AccelConstants {
 
 // Push constants of the kernels of a frame.
 //
-// - `first_pixel`, `n_pixels`: the batch's pixels, `[first_pixel, first_pixel + n_pixels)` in tile order.
+// - `first_pixel`, `n_pixels`: the batch's pixels, `[first_pixel, first_pixel + n_pixels)` in the order of the queue.
 // - `bounce_ix`: index of the batch's row in `bounces` for the bounce of this depth. Kernels that light the rays of
 //   all bounces get the batch's first row.
 // - `depth`: of the bounce, 0 for the camera's rays and for kernels that light all rays.
@@ -1376,7 +1376,7 @@ struct GridBuild {
     uint pairs_begin;
     uint cells_begin;
     // Blocks that a workgroup of the sort goes through.
-    uint tiles_per_group;
+    uint blocks_per_group;
     // Workgroups of an attempt's indirect dispatches, in their order: over upper cells, over items, over columns.
     // They are 0, except for the dispatch that counts what `counts` says.
     uint cell_groups_x;

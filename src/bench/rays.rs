@@ -46,8 +46,8 @@ impl RayKind {
     }
 }
 
-/// Rays of one kind, in the order of the renderer's queue: tile by tile, without gaps. They have no source triangle,
-/// since rays that leave a surface start at a distance from it.
+/// Rays of one kind, in the order of the renderer's queue: square by square, without gaps. They have no source
+/// triangle, since rays that leave a surface start at a distance from it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RaySet {
     pub kind: RayKind,

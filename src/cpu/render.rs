@@ -680,7 +680,7 @@ impl FrameRenderer for CpuRenderer {
         Ok(info_span!("render").in_scope(|| self.draw_sample_with(|share| watcher.part(share))))
     }
 
-    fn set_tiles(&mut self, tiles: NoiseTiles) -> Result<(), GpuError> {
+    fn set_noise_tiles(&mut self, tiles: NoiseTiles) -> Result<(), GpuError> {
         let first_sample = tiles.first_sample();
         self.set_window(Some(tiles), first_sample);
         Ok(())

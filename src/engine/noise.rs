@@ -15,8 +15,8 @@ use rayon::prelude::*;
 use crate::{
     cpu,
     frame::{
-        BadOptions, Crop, Drawn, DrawnTiles, MeanLayers, NoiseTiles, Picture, Profile, RenderOptions, SampleRange,
-        TileSamples, check::check,
+        BadOptions, Crop, Drawn, DrawnNoiseTiles, MeanLayers, NoiseTileSamples, NoiseTiles, Picture, Profile,
+        RenderOptions, SampleRange, check::check,
     },
     gpu::GpuError,
     layout::{PixelAovs, SAMPLE_BLOCK_LOG2},
@@ -80,7 +80,7 @@ pub struct NoisePicture {
 }
 
 /// Draws samples of tiles, all of which get equally many.
-pub(super) type DrawTiles<'a> = dyn FnMut(&[TileSamples]) -> Result<DrawnTiles, GpuError> + 'a;
+pub(super) type DrawNoiseTiles<'a> = dyn FnMut(&[NoiseTileSamples]) -> Result<DrawnNoiseTiles, GpuError> + 'a;
 
 /// Number of tiles with which a device has enough to do: 16 samples of each of their pixels are two million paths.
 const ENOUGH_TILES: usize = 512;
@@ -97,24 +97,25 @@ fn n_parts(n_tiles: usize, n_devices: usize, samples: SampleRange) -> u32 {
 pub(super) fn draw_until(
     goal: NoiseGoal,
     options: &RenderOptions,
-    (draw, n_devices): (&mut DrawTiles, usize),
+    (draw, n_devices): (&mut DrawNoiseTiles, usize),
     mut progress: impl FnMut(f32) -> bool,
 ) -> Result<NoisePicture, GpuError> {
-    let mut tiles: Vec<Tile> = NoiseTiles::places_of(&options.crop_or_whole()).into_iter().map(Tile::new).collect();
+    let mut tiles: Vec<NoiseTile> =
+        NoiseTiles::places_of(&options.crop_or_whole()).into_iter().map(NoiseTile::new).collect();
     let mut profile = Profile::default();
     for block in goal.blocks() {
-        let noisy: Vec<&mut Tile> = tiles.iter_mut().filter(|tile| tile.noise > goal.noise).collect();
+        let noisy: Vec<&mut NoiseTile> = tiles.iter_mut().filter(|tile| tile.noise > goal.noise).collect();
         if noisy.is_empty() {
             break;
         }
         let n_parts = n_parts(noisy.len(), n_devices, block);
         let len = block.len() / n_parts;
         let part = |ix: u32| SampleRange { first: block.first + ix * len, end: block.first + (ix + 1) * len };
-        let parts_of = |tile: &&mut Tile| {
+        let parts_of = |tile: &&mut NoiseTile| {
             let place = tile.place;
-            (0..n_parts).map(move |ix| TileSamples { place, samples: part(ix) })
+            (0..n_parts).map(move |ix| NoiseTileSamples { place, samples: part(ix) })
         };
-        let DrawnTiles { drawn, means } = draw(&noisy.iter().flat_map(parts_of).collect::<Vec<_>>())?;
+        let DrawnNoiseTiles { drawn, means } = draw(&noisy.iter().flat_map(parts_of).collect::<Vec<_>>())?;
         profile.add(&drawn.profile);
         let layers = drawn.layers.0.iter().filter(|layer| !layer.is_empty()).map(Vec::as_slice);
         let layers: Vec<&[[f32; 4]]> = [&means[..]].into_iter().chain(layers).collect();
@@ -136,7 +137,7 @@ pub(super) fn draw_until(
 }
 
 /// A tile and its samples.
-struct Tile {
+struct NoiseTile {
     /// In units of the side of a tile.
     place: UVec2,
     /// Number of samples of each pixel.
@@ -149,7 +150,7 @@ struct Tile {
     noise: f32,
 }
 
-impl Tile {
+impl NoiseTile {
     fn new(place: UVec2) -> Self {
         Self { place, n_samples: 0, sums: Vec::new(), pixel_aovs: Vec::new(), noise: f32::INFINITY }
     }
@@ -218,7 +219,7 @@ fn add(sums: &mut [[f32; 4]], others: &[[f32; 4]]) {
 }
 
 /// Joins the tiles to the picture of the options' crop.
-fn joined(tiles: &[Tile], goal: NoiseGoal, options: &RenderOptions, profile: Profile) -> NoisePicture {
+fn joined(tiles: &[NoiseTile], goal: NoiseGoal, options: &RenderOptions, profile: Profile) -> NoisePicture {
     let crop = options.crop_or_whole();
     let n_pixels = crop.width() as usize * crop.height() as usize;
     let mut radiance = vec![[0.0; 4]; n_pixels];

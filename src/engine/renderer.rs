@@ -9,8 +9,8 @@ use super::{
 use crate::{
     cpu::{self, Batching},
     frame::{
-        BadOptions, Denoise, Drawn, DrawnTiles, FrameRenderer, Goal, Integrator, NoiseTiles, PathOptions, Picture,
-        RangeSums, RenderOptions, SampleRange, TileSamples, Unending, Watcher,
+        BadOptions, Denoise, Drawn, DrawnNoiseTiles, FrameRenderer, Goal, Integrator, NoiseTileSamples, NoiseTiles,
+        PathOptions, Picture, RangeSums, RenderOptions, SampleRange, Unending, Watcher,
     },
     gpu::{Context, DeviceInfo, ExternalImage, GpuError, TimelinePoint},
     render::BandedRenderer,
@@ -201,7 +201,7 @@ impl Renderer {
         self.set_camera(camera)?;
         let mut progress = BandProgress { n_bands: self.n_bands(), n_told: 0, watcher: &mut watcher };
         let n_devices = if let Backend::Group(group) = &self.backend { group.n_devices() } else { 1 };
-        let mut draw = |tiles: &[TileSamples]| self.draw_tiles(tiles);
+        let mut draw = |tiles: &[NoiseTileSamples]| self.draw_noise_tiles(tiles);
         let drawn = noise::draw_until(goal, &options, (&mut draw, n_devices), |share| progress.set(share));
         // Also after an error, what is drawn next are rectangles.
         match &mut self.backend {
@@ -209,7 +209,7 @@ impl Renderer {
                 renderer.set_crop(options.crop_or_whole())?;
                 renderer.set_first_sample(0)?;
             }
-            Backend::Group(group) => group.leave_tiles()?,
+            Backend::Group(group) => group.leave_noise_tiles()?,
             Backend::Cpu(renderer) => renderer.set_window(None, 0),
         }
         progress.end();
@@ -217,11 +217,11 @@ impl Renderer {
     }
 
     /// Draws samples of noise tiles.
-    fn draw_tiles(&mut self, tiles: &[TileSamples]) -> Result<DrawnTiles, GpuError> {
+    fn draw_noise_tiles(&mut self, tiles: &[NoiseTileSamples]) -> Result<DrawnNoiseTiles, GpuError> {
         match &mut self.backend {
-            Backend::Device(renderer) => renderer.draw_tiles(tiles),
-            Backend::Group(group) => group.draw_tiles(tiles),
-            Backend::Cpu(renderer) => renderer.draw_tiles(tiles, NoiseTiles::MOST),
+            Backend::Device(renderer) => renderer.draw_noise_tiles(tiles),
+            Backend::Group(group) => group.draw_noise_tiles(tiles),
+            Backend::Cpu(renderer) => renderer.draw_noise_tiles(tiles, NoiseTiles::MOST),
         }
     }
 

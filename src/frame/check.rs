@@ -141,7 +141,7 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
-    use crate::frame::{Crop, TileSamples};
+    use crate::frame::{Crop, NoiseTileSamples};
 
     fn crop(x0: u32, y0: u32, x1: u32, y1: u32) -> Option<Crop> {
         Some(Crop { x0, y0, x1, y1 })
@@ -149,7 +149,7 @@ mod tests {
 
     fn tile(x: u32, y: u32) -> Option<NoiseTiles> {
         let samples = SampleRange { first: 0, end: 16 };
-        Some(NoiseTiles::new(&[TileSamples { place: glam::uvec2(x, y), samples }]).expect("a tile"))
+        Some(NoiseTiles::new(&[NoiseTileSamples { place: glam::uvec2(x, y), samples }]).expect("a tile"))
     }
 
     /// Changes that make one option wrong, and how the error begins.

@@ -19,14 +19,14 @@ pub struct Drawn {
 
 /// Samples of noise tiles, tile by tile.
 #[derive(Clone, Debug, Default)]
-pub struct DrawnTiles {
+pub struct DrawnNoiseTiles {
     /// The AOVs and layers of the tiles' pixels, and the sums of times and counts.
     pub drawn: Drawn,
     /// The means of the samples of each pixel. The fourth component is the mean of their squared luminance.
     pub means: Vec<[f32; 4]>,
 }
 
-impl DrawnTiles {
+impl DrawnNoiseTiles {
     /// Appends further tiles.
     pub(crate) fn append(&mut self, mut next: Self) {
         self.drawn.profile.add(&next.drawn.profile);

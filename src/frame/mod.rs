@@ -41,10 +41,10 @@ pub use self::frame_renderer::FrameRenderer;
 pub use self::{
     aov::{Aov, Channel, Samples},
     crop::Crop,
-    drawn::{Drawn, DrawnTiles, Watcher},
+    drawn::{Drawn, DrawnNoiseTiles, Watcher},
     goal::{Goal, Pacer},
     mean_layers::{MeanLayers, RangeSums},
-    noise_tiles::{NoiseTiles, TileSamples},
+    noise_tiles::{NoiseTileSamples, NoiseTiles},
     pass::{Pass, Role, Scope},
     plan::{Access, FrameKind, PassSequence, Plan, PlanEntry},
     profile::{BounceStats, PassTime, Profile},

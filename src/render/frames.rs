@@ -52,7 +52,7 @@ impl FrameRenderer for GpuRenderer {
         Ok(profile)
     }
 
-    fn set_tiles(&mut self, tiles: NoiseTiles) -> Result<(), GpuError> {
+    fn set_noise_tiles(&mut self, tiles: NoiseTiles) -> Result<(), GpuError> {
         let paths = PathOptions { first_sample: tiles.first_sample(), ..self.options.paths };
         self.set_options(&RenderOptions { noise_tiles: Some(tiles), paths, ..self.options.clone() })
     }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::{
     maps::{MapKind, MapOptions},
     statement::{split_keyword, statements, without_comment},
-    tiles::files_of_tiles,
+    udim::files_of_tiles,
 };
 use crate::scene::{
     files::{
