@@ -202,8 +202,8 @@ pub struct RayGrowth {
 
 impl Report {
     /// Returns the name of the structure's parts: `nodes` or `cells`.
-    pub fn parts(&self) -> &'static str {
-        self.rows.first().map_or("nodes", |row| row.accel.parts())
+    pub fn elements(&self) -> &'static str {
+        self.rows.first().map_or("nodes", |row| row.accel.elements())
     }
 
     /// Returns the growth, or `None` if there are fewer than two sizes.

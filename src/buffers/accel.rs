@@ -175,23 +175,23 @@ impl AccelBuffers {
         let rows = instance_rows(two, instances, two.node_begins(), &mut constants);
         let (n_nodes, n_entries) = (joined.n_nodes(), joined.n_entries());
         let n_slabs = if context.predicates_branches() { 0 } else { joined.n_slabs() };
-        let write_entries = |first: usize, part: &mut [LeafTriangle]| joined.write_entries(triangles, first, part);
+        let write_entries = |first: usize, chunk: &mut [LeafTriangle]| joined.write_entries(triangles, first, chunk);
         let contents = Contents {
             instance_rows: Content::Elements(&rows),
-            kd_nodes: Content::Written { len: n_nodes, write: &|first, part| joined.write_nodes(first, part) },
+            kd_nodes: Content::Written { len: n_nodes, write: &|first, chunk| joined.write_nodes(first, chunk) },
             kd_parents: match context.loop_limit()? {
                 Some(_) => {
-                    Content::Written { len: n_nodes / 2, write: &|first, part| joined.write_parents(first, part) }
+                    Content::Written { len: n_nodes / 2, write: &|first, chunk| joined.write_parents(first, chunk) }
                 }
                 None => Content::Reserved(n_nodes / 2),
             },
             leaf_triangles: Content::Written { len: n_entries, write: &write_entries },
-            leaf_planes: Content::Written { len: n_entries, write: &|first, part| joined.write_planes(first, part) },
-            kd_slabs: Content::Written { len: n_slabs, write: &|first, part| joined.write_slabs(first, part) },
+            leaf_planes: Content::Written { len: n_entries, write: &|first, chunk| joined.write_planes(first, chunk) },
+            kd_slabs: Content::Written { len: n_slabs, write: &|first, chunk| joined.write_slabs(first, chunk) },
             kd_links: Content::Reserved(6 * n_nodes),
             grid_cells: Content::Written {
                 len: joined.n_cells(),
-                write: &|first, part| joined.write_cells(first, part),
+                write: &|first, chunk| joined.write_cells(first, chunk),
             },
             ..common
         };
@@ -230,7 +230,7 @@ impl AccelBuffers {
     ) -> Result<Self, GpuError> {
         let n_nodes = tree.nodes().len();
         let entries = tree.leaf_triangles();
-        let write_entries = |first: usize, part: &mut [LeafTriangle]| leaf_triangles(triangles, entries, first, part);
+        let write_entries = |first: usize, chunk: &mut [LeafTriangle]| leaf_triangles(triangles, entries, first, chunk);
         let contents = Contents {
             kd_nodes: Content::Elements(tree.nodes()),
             // Suspended rays go back to where they stopped by the parents.
@@ -303,7 +303,7 @@ impl AccelBuffers {
         common: Contents,
     ) -> Result<Self, GpuError> {
         let entries = grid.leaf_triangles();
-        let write_entries = |first: usize, part: &mut [LeafTriangle]| leaf_triangles(triangles, entries, first, part);
+        let write_entries = |first: usize, chunk: &mut [LeafTriangle]| leaf_triangles(triangles, entries, first, chunk);
         let contents = Contents {
             grid_cells: Content::Elements(grid.cells()),
             leaf_triangles: Content::Written { len: entries.len(), write: &write_entries },
@@ -366,7 +366,7 @@ impl AccelBuffers {
 
     /// Uploads textures and emitters, and notes where their parts begin.
     fn add_words(&mut self, context: &Arc<Context>, words: &TextureWords) -> Result<(), GpuError> {
-        let content = Content::Written { len: words.len(), write: &|first, part| words.write(first, part) };
+        let content = Content::Written { len: words.len(), write: &|first, chunk| words.write(first, chunk) };
         self.arrays.texture_words = content.upload(context, "texture_words", self.access)?;
         words.note_begins(&mut self.uploaded);
         self.upload_constants(context)
@@ -412,9 +412,9 @@ impl AccelBuffers {
         let mut next = self.clone();
         if traversal.needs_parents() && self.arrays.kd_parents.is_empty() {
             let tree = accel.as_kdtree(geometry.triangles());
-            let write = |first: usize, part: &mut [u32]| match (&joined, tree) {
-                (Some(joined), _) => joined.write_parents(first, part),
-                (None, Some(tree)) => part.copy_from_slice(&tree.parents()[first..][..part.len()]),
+            let write = |first: usize, chunk: &mut [u32]| match (&joined, tree) {
+                (Some(joined), _) => joined.write_parents(first, chunk),
+                (None, Some(tree)) => chunk.copy_from_slice(&tree.parents()[first..][..chunk.len()]),
                 (None, None) => unreachable!("a grid has no links"),
             };
             let len = self.arrays.kd_nodes.len() / 2;
@@ -557,9 +557,9 @@ impl AccelBuffers {
 }
 
 /// Writes the triangles of the leaves' entries from entry `first` on. `entries`: the index of each entry's triangle.
-pub(super) fn leaf_triangles(triangles: &[Triangle], entries: &[u32], first: usize, part: &mut [LeafTriangle]) {
-    let numbers = &entries[first..][..part.len()];
-    part.par_iter_mut().zip(numbers).for_each(|(entry, &triangle_ix)| *entry = leaf_triangle(triangles, triangle_ix));
+pub(super) fn leaf_triangles(triangles: &[Triangle], entries: &[u32], first: usize, chunk: &mut [LeafTriangle]) {
+    let numbers = &entries[first..][..chunk.len()];
+    chunk.par_iter_mut().zip(numbers).for_each(|(entry, &triangle_ix)| *entry = leaf_triangle(triangles, triangle_ix));
 }
 
 /// Returns for each triangle `TRIANGLE_HIDDEN` if its index is in `hidden`, else 0.

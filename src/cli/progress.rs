@@ -248,9 +248,9 @@ pub struct CountedProgress<'a> {
     /// Time after which the stage ends, if it has no number of items.
     ends_after: Option<Duration>,
     /// Finished share of the current item, 0 to 1.
-    part: f32,
+    item_share: f32,
     /// Whether the user sees progress within an item.
-    pub shows_parts: bool,
+    pub shows_item_progress: bool,
     /// Position of the bar when the stage began.
     begin: u64,
     start: Instant,
@@ -261,15 +261,15 @@ impl Progress {
     /// Returns a counter of items that shows the stage's progress and the time left. `message` names the stage.
     pub fn counted(&self, message: &str, n_items: u32) -> CountedProgress<'_> {
         let (message, start) = (message.to_owned(), Instant::now());
-        let (begin, shows_parts) = (self.position(), matches!(self.shown, Shown::Meter(Meter::Bar(_))));
+        let (begin, shows_item_progress) = (self.position(), matches!(self.shown, Shown::Meter(Meter::Bar(_))));
         CountedProgress {
             progress: self,
             message,
             n_done: 0,
             n_items,
             ends_after: None,
-            part: 0.0,
-            shows_parts,
+            item_share: 0.0,
+            shows_item_progress,
             begin,
             start,
             last_line: start,
@@ -288,7 +288,7 @@ impl CountedProgress<'_> {
         /// Least time between two lines if there is no terminal.
         const PAUSE: Duration = Duration::from_secs(5);
         self.n_done += 1;
-        self.part = 0.0;
+        self.item_share = 0.0;
         if self.n_done >= self.n_items {
             return;
         }
@@ -304,8 +304,8 @@ impl CountedProgress<'_> {
     }
 
     /// Notes that a share of the current item is done, 0 to 1.
-    pub fn part(&mut self, share: f32) {
-        self.part = share.clamp(0.0, 1.0);
+    pub fn item_progress(&mut self, share: f32) {
+        self.item_share = share.clamp(0.0, 1.0);
         if let Some(meter) = self.progress.meter() {
             self.move_meter(meter);
         }
@@ -321,7 +321,7 @@ impl CountedProgress<'_> {
         if let Some(time) = self.ends_after {
             return (self.start.elapsed().as_secs_f64() / time.as_secs_f64()).min(1.0);
         }
-        (f64::from(self.n_done) + f64::from(self.part)) / f64::from(self.n_items)
+        (f64::from(self.n_done) + f64::from(self.item_share)) / f64::from(self.n_items)
     }
 
     fn text(&self) -> String {
@@ -418,16 +418,16 @@ mod tests {
         progress.stage("loading", || ());
         progress.stage("rendering", || {
             let mut items = progress.counted("rendering", 2);
-            items.part(0.5);
+            items.item_progress(0.5);
             assert_eq!(bar.position(), BAR_POSITIONS + BAR_POSITIONS / 4);
             items.finish_item();
-            items.part(0.5);
+            items.item_progress(0.5);
             assert_eq!(bar.position(), BAR_POSITIONS + BAR_POSITIONS * 3 / 4);
             assert!(bar.message().starts_with("rendering: 1 of 2, "), "{}", bar.message());
         });
         assert_eq!(bar.position(), 2 * BAR_POSITIONS);
         let mut alone = progress.counted("rendering", 1);
-        alone.part(0.25);
+        alone.item_progress(0.25);
         assert!(bar.message().starts_with("rendering: 25 %, "), "{}", bar.message());
     }
 }

@@ -23,7 +23,7 @@ use crate::{
     reference::{
         emitters::{LightSample, sample_emitter},
         inputs::KernelInputs,
-        live_paths::{Part, parts},
+        live_paths::{PathSlice, path_slices},
         maps::colour_at,
         path_compact::{counts_of_block, kind_of_path},
         path_scatter::PathBuffers,
@@ -71,9 +71,9 @@ pub struct BounceOfPaths<'a> {
 
 /// The paths of a block, one element each.
 struct PathsOfBlock<'a> {
-    rays: Part<'a, PathRay>,
-    states: Part<'a, PathState>,
-    shadow_rays: Part<'a, ShadowRay>,
+    rays: PathSlice<'a, PathRay>,
+    states: PathSlice<'a, PathState>,
+    shadow_rays: PathSlice<'a, ShadowRay>,
 }
 
 /// Does what [`reference::path_scatter`](crate::reference::path_scatter::path_scatter) does.
@@ -85,9 +85,9 @@ pub fn path_scatter(
 ) {
     let of_blocks = (live.par_chunks(BLOCK_SIZE), child_kinds.par_chunks_mut(BLOCK_SIZE), scan_blocks.par_iter_mut());
     let of_paths = (
-        parts(paths.rays, live, BLOCK_SIZE),
-        parts(paths.states, live, BLOCK_SIZE),
-        parts(paths.shadow_rays, live, BLOCK_SIZE),
+        path_slices(paths.rays, live, BLOCK_SIZE),
+        path_slices(paths.states, live, BLOCK_SIZE),
+        path_slices(paths.shadow_rays, live, BLOCK_SIZE),
     );
     of_blocks.into_par_iter().zip(of_paths).for_each(|(of_block, (rays, states, shadow_rays))| {
         let (live, kinds, counts) = of_block;

@@ -277,8 +277,8 @@ impl CpuRenderer {
         Picture {
             width: crop.width(),
             height: crop.height(),
-            radiance: opaque(window.part(&filtered[..self.pixel_radiance.len()], &crop)),
-            display: window.part(&self.pixel_display, &crop),
+            radiance: opaque(window.cut(&filtered[..self.pixel_radiance.len()], &crop)),
+            display: window.cut(&self.pixel_display, &crop),
         }
     }
 
@@ -290,7 +290,7 @@ impl CpuRenderer {
     /// The options do not request AOVs.
     pub fn pixel_aovs(&self) -> Vec<PixelAovs> {
         assert!(self.options.pixel_aovs, "the options ask for AOVs");
-        self.options.window().part(&self.pixel_aovs, &self.options.crop_or_whole())
+        self.options.window().cut(&self.pixel_aovs, &self.options.crop_or_whole())
     }
 
     /// Returns the properties that decide the passes of the next sample. The CPU does not rasterize: for both kinds
@@ -677,7 +677,7 @@ impl FrameRenderer for CpuRenderer {
     }
 
     fn draw_frame(&mut self, watcher: &mut impl Watcher) -> Result<Profile, GpuError> {
-        Ok(info_span!("render").in_scope(|| self.draw_sample_with(|share| watcher.part(share))))
+        Ok(info_span!("render").in_scope(|| self.draw_sample_with(|share| watcher.sample_progress(share))))
     }
 
     fn set_noise_tiles(&mut self, tiles: NoiseTiles) -> Result<(), GpuError> {
@@ -719,7 +719,7 @@ impl FrameRenderer for CpuRenderer {
         layers.0[self.options.mean_layers()]
             .iter_mut()
             .zip(pixels)
-            .for_each(|(layer, pixels)| *layer = window.part(pixels, &crop));
+            .for_each(|(layer, pixels)| *layer = window.cut(pixels, &crop));
         Ok(layers)
     }
 }

@@ -104,9 +104,9 @@ impl Renderer {
         Ok(())
     }
 
-    /// Draws what a camera sees. The watcher is notified of each sample of each band. If it uses [`Watcher::part`], it
-    /// is also notified of the progress within a sample. It can end the picture with fewer samples than the goal
-    /// ([`Watcher::ends`]).
+    /// Draws what a camera sees. The watcher is notified of each sample of each band. If it uses
+    /// [`Watcher::sample_progress`], it is also notified of the progress within a sample. It can end the picture with
+    /// fewer samples than the goal ([`Watcher::ends`]).
     ///
     /// # Errors
     /// The camera shows no picture, the goal is more than [`SampleRange::MOST`] samples, a call fails, one pixel alone
@@ -321,7 +321,7 @@ impl<W: Watcher> BandProgress<'_, W> {
         let n_done = share * self.n_bands as f32;
         // The last band is done when the picture is.
         self.tell_bands((n_done as u32).min(self.n_bands - 1));
-        self.watcher.part((n_done - self.n_told as f32).clamp(0.0, 1.0));
+        self.watcher.sample_progress((n_done - self.n_told as f32).clamp(0.0, 1.0));
         self.watcher.ends()
     }
 

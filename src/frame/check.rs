@@ -57,7 +57,7 @@ impl RenderOptions {
         check("seed", seed, seed <= most, || format!("at most {most}"))?;
         let is_right = first_sample <= MOST_FIRST_SAMPLE;
         check("first_sample", first_sample, is_right, || format!("at most {MOST_FIRST_SAMPLE}"))?;
-        self.check_part()
+        self.check_window()
     }
 
     /// Checks that the samples of a picture can be drawn together: they begin with a block of the tree in which samples
@@ -78,7 +78,7 @@ impl RenderOptions {
     }
 
     /// Checks the crop and the noise tiles.
-    fn check_part(&self) -> Result<(), BadOptions> {
+    fn check_window(&self) -> Result<(), BadOptions> {
         let Self { width, height, .. } = *self;
         if let Some(crop) = self.crop {
             let is_inside = crop.x0 < crop.x1 && crop.x1 <= width && crop.y0 < crop.y1 && crop.y1 <= height;

@@ -38,14 +38,14 @@ impl DrawnNoiseTiles {
 
 /// Follows the progress of a drawing.
 pub trait Watcher {
-    /// Whether the watcher makes use of [`Watcher::part`]. If it does not, the renderer saves the time to wait for
-    /// the device several times in a sample.
-    fn sees_parts(&self) -> bool {
+    /// Whether the watcher makes use of [`Watcher::sample_progress`]. If it does not, the renderer saves the time to
+    /// wait for the device several times in a sample.
+    fn sees_sample_progress(&self) -> bool {
         false
     }
 
     /// Is called when the share `_share` of the sample, 0 to 1, has been drawn.
-    fn part(&mut self, _share: f32) {}
+    fn sample_progress(&mut self, _share: f32) {}
 
     /// Is called when a sample of a band has been drawn.
     fn sample(&mut self);
@@ -62,12 +62,12 @@ pub trait Watcher {
 pub(crate) struct Unending<'a, W>(pub &'a mut W);
 
 impl<W: Watcher> Watcher for Unending<'_, W> {
-    fn sees_parts(&self) -> bool {
-        self.0.sees_parts()
+    fn sees_sample_progress(&self) -> bool {
+        self.0.sees_sample_progress()
     }
 
-    fn part(&mut self, share: f32) {
-        self.0.part(share);
+    fn sample_progress(&mut self, share: f32) {
+        self.0.sample_progress(share);
     }
 
     fn sample(&mut self) {

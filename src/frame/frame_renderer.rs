@@ -115,7 +115,7 @@ pub trait FrameRenderer {
         }
         if pixel_aovs && integrator == Integrator::Path {
             let options = self.options();
-            let means = options.window().part(self.window_mean()?, &options.crop_or_whole());
+            let means = options.window().cut(self.window_mean()?, &options.crop_or_whole());
             drawn.pixel_aovs.iter_mut().zip(means).for_each(|(aovs, mean)| aovs.set_noise(mean, drawn.n_samples));
         }
         drawn.layers = self.mean_layers()?;

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::{
     inputs::KernelInputs,
-    live_paths::parts,
+    live_paths::path_slices,
     path_compact::{counts_of_block, kind_of_path},
     path_vertex::{HitChoices, pairs_of_hit, scatter_path},
     paths::{key_of_path, pixel_of_path},
@@ -31,9 +31,9 @@ pub fn path_scatter(
     let block_size = SCAN_GROUP_SIZE as usize;
     let of_blocks = (live.par_chunks(block_size), child_kinds.par_chunks_mut(block_size), scan_blocks.par_iter_mut());
     let of_paths = (
-        parts(paths.rays, live, block_size),
-        parts(paths.states, live, block_size),
-        parts(paths.shadow_rays, live, block_size),
+        path_slices(paths.rays, live, block_size),
+        path_slices(paths.states, live, block_size),
+        path_slices(paths.shadow_rays, live, block_size),
     );
     of_blocks.into_par_iter().zip(of_paths).for_each(|(of_block, (mut rays, mut states, mut shadow_rays))| {
         let (live, kinds, counts) = of_block;

@@ -305,7 +305,7 @@ mod tests {
             let window = RenderOptions { crop: Some(*band), ..options.clone() }.window();
             let n_pixels = u64::from(window.width()) * u64::from(window.height());
             assert!(n_pixels * Pixels::bytes_per_pixel(options) <= range, "{range}: {band}");
-            let mut n_before = asked.part(&n_bands_of, band);
+            let mut n_before = asked.cut(&n_bands_of, band);
             n_before.iter_mut().for_each(|n| *n += 1);
             asked.place(&mut n_bands_of, band, &n_before);
         }

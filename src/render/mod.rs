@@ -29,7 +29,7 @@ use tracing::info_span;
 
 pub use self::{bands::BandedRenderer, incremental::Displayed, joined::JoinedPicture};
 use self::{
-    incremental::{Part, PartialSample, Traced, Until},
+    incremental::{PendingSample, Recording, Traced, Until},
     schedule::{QueueSizing, Schedule},
 };
 use crate::{
@@ -72,7 +72,7 @@ pub struct GpuRenderer {
     /// Whether `pixel_accumulated`, to which samples are added, contains the first sample.
     has_sums: bool,
     /// The sample of which only some command buffers have run, if there is one.
-    pending: Option<PartialSample>,
+    pending: Option<PendingSample>,
     /// The most pixels of a batch, if the caller has set a limit.
     most_pixels: Option<u32>,
     /// The picture in `pixel_display`; None before there is one.
@@ -267,8 +267,8 @@ impl GpuRenderer {
         Picture {
             width: crop.width(),
             height: crop.height(),
-            radiance: opaque(window.part(radiance, &crop)),
-            display: window.part(display, &crop),
+            radiance: opaque(window.cut(radiance, &crop)),
+            display: window.cut(display, &crop),
         }
     }
 
@@ -282,7 +282,7 @@ impl GpuRenderer {
     pub fn pixel_aovs(&self) -> Result<Vec<PixelAovs>, GpuError> {
         assert!(self.in_use.pixel_aovs, "the options ask for AOVs");
         let pixel_aovs = self.resources.pixels.pixel_aovs.download_first(self.resources.n_pixels())?;
-        Ok(self.in_use.window().part(pixel_aovs, &self.in_use.crop_or_whole()))
+        Ok(self.in_use.window().cut(pixel_aovs, &self.in_use.crop_or_whole()))
     }
 
     /// Returns the frame's buffers, with the contents that the last frame left.
@@ -291,28 +291,28 @@ impl GpuRenderer {
     }
 
     /// Records the plan, in the command buffers that this file's first lines list.
-    fn record(&self) -> Result<Vec<Part>, GpuError> {
+    fn record(&self) -> Result<Vec<Recording>, GpuError> {
         let plan = Plan::new(&self.frame_kind());
         let begin = self.command_buffer("begin frame", |commands| self.begin_frame(commands, &plan.visibility))?;
-        let mut frame = vec![Part::plain(begin)];
+        let mut frame = vec![Recording::plain(begin)];
         for &batch in &self.schedule.batches {
             // The closest hits of each bounce decide the rays of the next one.
             for (depth, bounce) in (0..).zip(&plan.bounces) {
                 let batch = Batch { bounce_ix: batch.bounce_ix + depth, depth, ..batch };
-                frame.extend(self.parts(&format!("bounce {depth}"), bounce, &batch)?);
+                frame.extend(self.recordings(&format!("bounce {depth}"), bounce, &batch)?);
             }
             // Light is computed for the hits of all bounces together.
             if !plan.light.is_empty() {
                 let after_bounces = Batch { depth: plan.bounces.len() as u32, ..batch };
-                frame.extend(self.parts("light", &plan.light, &after_bounces)?);
+                frame.extend(self.recordings("light", &plan.light, &after_bounces)?);
             }
-            frame.last_mut().expect("the parts of the batch").ends_batch = true;
+            frame.last_mut().expect("the recordings of the batch").ends_batch = true;
         }
         let end = self.command_buffer("end frame", |commands| {
             self.resources.bind(commands);
             self.record_sequence(commands, &plan.image, &Batch::default());
         })?;
-        frame.push(Part::plain(end));
+        frame.push(Recording::plain(end));
         Ok(frame)
     }
 
@@ -331,14 +331,14 @@ impl GpuRenderer {
 
     /// Records a sequence of a batch in one command buffer, or in two if rays of the sequence can be suspended: the
     /// host submits the second when all rays of the first have ended.
-    fn parts(&self, name: &str, sequence: &[PlanEntry], batch: &Batch) -> Result<Vec<Part>, GpuError> {
+    fn recordings(&self, name: &str, sequence: &[PlanEntry], batch: &Batch) -> Result<Vec<Recording>, GpuError> {
         let traced = self.traced(sequence, batch).filter(|_| self.resources.accel.suspended_rays.can_occur());
         let Some(traced) = traced else {
             let all = |commands: &Commands| {
                 self.resources.bind(commands);
                 self.record_sequence(commands, sequence, batch);
             };
-            return Ok(vec![Part::plain(self.command_buffer(name, all)?)]);
+            return Ok(vec![Recording::plain(self.command_buffer(name, all)?)]);
         };
         // `trace` ends with the pass that traces the rays, and the barrier after it.
         let is_tracing =
@@ -355,8 +355,8 @@ impl GpuRenderer {
             self.record_sequence(commands, rest, batch);
         };
         Ok(vec![
-            Part::traced(self.command_buffer(name, tracing)?, traced),
-            Part::plain(self.command_buffer(name, resting)?),
+            Recording::traced(self.command_buffer(name, tracing)?, traced),
+            Recording::plain(self.command_buffer(name, resting)?),
         ])
     }
 
@@ -371,7 +371,7 @@ impl GpuRenderer {
         })
     }
 
-    /// Repeats the tracing pass of a part, whose commands have run once, until none of its rays is suspended.
+    /// Repeats the tracing pass of a recording, whose commands have run once, until none of its rays is suspended.
     fn finish_rays(&self, traced: &Traced) -> Result<(), GpuError> {
         self.resources.accel.suspended_rays.finish(&self.context, |commands, resume_pass| {
             self.resources.bind(commands);

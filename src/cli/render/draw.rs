@@ -282,7 +282,7 @@ impl Common<'_> {
         };
         // Progress within a sample takes time, because the CPU waits for the device. Measured frames are drawn without
         // it.
-        items.shows_parts &= args.profile.is_none() && args.trace.is_none() && args.repeat == 1;
+        items.shows_item_progress &= args.profile.is_none() && args.trace.is_none() && args.repeat == 1;
         items
     }
 }
@@ -407,12 +407,12 @@ fn part(common: &Common, sums: &SampleSums) -> Picture {
 struct Bar<'a, 'b>(&'a mut CountedProgress<'b>);
 
 impl Watcher for Bar<'_, '_> {
-    fn sees_parts(&self) -> bool {
-        self.0.shows_parts
+    fn sees_sample_progress(&self) -> bool {
+        self.0.shows_item_progress
     }
 
-    fn part(&mut self, share: f32) {
-        self.0.part(share);
+    fn sample_progress(&mut self, share: f32) {
+        self.0.item_progress(share);
     }
 
     fn sample(&mut self) {
@@ -441,12 +441,12 @@ impl<'a> Relay<'a> {
 }
 
 impl Watcher for &mut Relay<'_> {
-    fn sees_parts(&self) -> bool {
-        self.watcher.sees_parts()
+    fn sees_sample_progress(&self) -> bool {
+        self.watcher.sees_sample_progress()
     }
 
-    fn part(&mut self, share: f32) {
-        self.watcher.part(share);
+    fn sample_progress(&mut self, share: f32) {
+        self.watcher.sample_progress(share);
     }
 
     fn sample(&mut self) {

@@ -347,7 +347,7 @@ impl WholeSamples {
         let n_whole = (self.n_done + 1e-6).floor() as u32;
         (self.n_told..n_whole).for_each(|_| watcher.sample());
         self.n_told = self.n_told.max(n_whole);
-        watcher.part((self.n_done - f64::from(self.n_told)).max(0.0) as f32);
+        watcher.sample_progress((self.n_done - f64::from(self.n_told)).max(0.0) as f32);
     }
 }
 

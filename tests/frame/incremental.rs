@@ -137,7 +137,7 @@ fn steps_make_the_same_picture() {
     renderer.reset_samples();
     for _ in 0..2 {
         let mut shares = vec![0.0];
-        while renderer.draw_part().expect("a step").is_none() {
+        while renderer.draw_next().expect("a step").is_none() {
             shares.push(renderer.progress());
         }
         // There are steps that begin and end the frame, and steps for its bounces and their light. There are more
