@@ -23,7 +23,7 @@ fn in_parts(renderer: &mut GpuRenderer, n_samples: u32) -> (Picture, u32) {
     while renderer.n_samples() < n_samples {
         assert_eq!(renderer.progress() > 0.0, renderer.is_pending());
         n_parts += 1;
-        if let Some(profile) = renderer.draw_batch().expect("a part") {
+        if let Some(profile) = renderer.draw_batch().expect("a batch") {
             assert_eq!(profile.bounces[0].n_rays, 32 * 24);
         }
     }
@@ -67,13 +67,13 @@ fn what_is_dropped_half_way_leaves_no_trace() {
     for n_before in 0..3 {
         renderer.reset_samples();
         in_parts(&mut renderer, n_before);
-        assert!(renderer.draw_batch().expect("a part").is_none() && renderer.is_pending());
+        assert!(renderer.draw_batch().expect("a batch").is_none() && renderer.is_pending());
         // The sample is begun again, in other parts.
         renderer.limit_batches(Some(300 + n_before)).expect("batches");
         assert!(!renderer.is_pending());
         assert!(identical(&in_parts(&mut renderer, 3).0, &whole), "after {n_before} samples");
     }
-    assert!(renderer.draw_batch().expect("a part").is_none());
+    assert!(renderer.draw_batch().expect("a batch").is_none());
     let brighter = RenderOptions { exposure: 2.0, ..options.clone() };
     renderer.set_options(&brighter).expect("options");
     assert!(!renderer.is_pending() && renderer.n_samples() == 3);
@@ -102,24 +102,24 @@ fn the_picture_changes_with_the_last_part() {
     let mut renderer = GpuRenderer::new(context.clone(), &world, &options_of_parts()).expect("a renderer");
     assert_eq!(renderer.displayed(), None);
     renderer.limit_batches(Some(400)).expect("batches");
-    assert!(renderer.draw_batch().expect("a part").is_none());
+    assert!(renderer.draw_batch().expect("a batch").is_none());
     assert_eq!(renderer.displayed(), None);
-    assert!(renderer.draw_batch().expect("a part").is_some());
+    assert!(renderer.draw_batch().expect("a batch").is_some());
     let seen_from = |camera: Camera, size| Some(Displayed { size, camera });
     assert_eq!(renderer.displayed(), seen_from(scene.camera, (32, 24)));
     let elsewhere = Camera { projection: Projection::Perspective { vertical_fov_degrees: 20.0 }, ..scene.camera };
     renderer.set_camera(&elsewhere);
     let before = renderer.displayed_picture().expect("a picture");
-    assert!(renderer.draw_batch().expect("a part").is_none());
+    assert!(renderer.draw_batch().expect("a batch").is_none());
     assert_eq!(renderer.displayed(), seen_from(scene.camera, (32, 24)), "what is seen is still the one before");
     assert_eq!(renderer.displayed_picture().expect("a picture"), before);
-    assert!(renderer.draw_batch().expect("a part").is_some());
+    assert!(renderer.draw_batch().expect("a batch").is_some());
     assert_eq!(renderer.displayed(), seen_from(elsewhere, (32, 24)));
     renderer.resize(16, 12).expect("a size");
-    assert!(renderer.draw_batch().expect("a part").is_some());
+    assert!(renderer.draw_batch().expect("a batch").is_some());
     assert_eq!(renderer.displayed(), seen_from(elsewhere, (16, 12)));
     renderer.resize(32, 24).expect("a size");
-    assert!(renderer.draw_batch().expect("a part").is_none());
+    assert!(renderer.draw_batch().expect("a batch").is_none());
     assert_eq!(renderer.displayed(), seen_from(elsewhere, (16, 12)), "what is seen is still the small one");
     let small = renderer.displayed_picture().expect("a picture").expect("one is shown");
     assert_eq!((small.width, small.height, small.display.len()), (16, 12, 16 * 12));
@@ -164,7 +164,7 @@ fn views_of_first_hits_trace_primary_rays_only() {
     for (view, most_pixels) in [(View::Depth, None), (View::Normal, Some(200)), (View::Id, None)] {
         renderer.limit_batches(most_pixels).expect("batches");
         assert!(renderer.set_view(view, 1.0));
-        assert!(renderer.draw_batch().expect("a part").is_some() == most_pixels.is_none());
+        assert!(renderer.draw_batch().expect("a batch").is_some() == most_pixels.is_none());
         renderer.reset_samples();
         let profile = renderer.draw_sample().expect("a sample");
         let names: Vec<_> = profile.passes.iter().map(|pass| pass.name).collect();
