@@ -61,8 +61,8 @@ const CHANGES: &[Change] = &[
         it.textures.textures[0].size = 0xffff_ffff;
     }),
     ("textures: texture 0 has texels of mip level 2 behind the # words of texels", |it| {
-        let level = it.textures.textures[0].first_texel as usize + 2;
-        it.textures.texels[level] = it.textures.texels.len() as u32 - 15;
+        let mip = it.textures.textures[0].first_texel as usize + 2;
+        it.textures.texels[mip] = it.textures.texels.len() as u32 - 15;
     }),
     ("textures: texture # has texels of mip level # behind the # words of texels", |it| {
         it.textures.textures.last_mut().unwrap().flags |= TEXTURE_HALVES;

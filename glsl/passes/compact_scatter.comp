@@ -30,8 +30,8 @@ void make_children(uint ray_ix, uint kinds, uint child_ix) {
         child_ix += 1u;
     }
     if ((kinds & CHILD_TRANSMITTED) != 0u) {
-        bool uses_level = !next.passes_straight;
-        store_ray(child_ix, child_ray(surface, next.transmitted, hit, ray, next.transmitted_weight, uses_level));
+        bool is_deeper = !next.passes_straight;
+        store_ray(child_ix, child_ray(surface, next.transmitted, hit, ray, next.transmitted_weight, is_deeper));
     }
 }
 

@@ -482,9 +482,9 @@ struct Material {
 // m11 v + offset_v), where (0, 0) is the image's upper left corner and (1, 1) its lower right one.
 //
 // - `first_texel`: index in `texels` of a table of `n_mips` words. Each of them is the index in `texels` of a mip
-//   level's first texel. A level's texels are stored row by row, from the top.
-// - `size`: of level 0, texels. The width is in bits 0..15, the height in 16..31. Each further level is half as wide
-//   and half as high, rounded down, but at least 1.
+//   mip level's first texel. A mip level's texels are stored row by row, from the top.
+// - `size`: of mip level 0, texels. The width is in bits 0..15, the height in 16..31. Each further mip level is half as
+//   wide and half as high, rounded down, but at least 1.
 // - `flags`: `TEXTURE_SRGB` and its like.
 // - `n_mips`: down to the mip level of one texel.
 struct Texture {
@@ -679,7 +679,7 @@ struct CornerSurface {
 #define MAPS_CORNERS_HAVE_OPACITY 8u
 
 // A ray of a picture, 48 bytes. Its hits have t in `(0, t_max]`. In frames with `Frame.extra_bounces`, `t_max` also
-// says how many levels of rays the ray has used (shading/children.glsl).
+// says the ray's depth (shading/children.glsl).
 //
 // - `origin`: world units.
 // - `pixel_ix`: index of the pixel that receives the ray's light, rows from the top of the window.
@@ -822,7 +822,7 @@ struct Hit {
 // - `exposure`: factor of radiance before the tone curve.
 // - `denoise_threshold`: a pixel is smoothed if the differences between its luminance and those of its four
 //   neighbours add up to more than this.
-// - `max_depth`: bounces, of which the camera's rays are the first: one for each level of rays, and `extra_bounces`.
+// - `max_depth`: bounces, of which the camera's rays are the first: one for each ray depth, and `extra_bounces`.
 // - `queue_capacity`: rays that the ray queue has room for.
 // - `picture_width`, `picture_height`: of the whole picture (pixels).
 // - `window_x`, `window_y`: the picture's pixel at which the window begins. Of paths, `window_x` can also be
@@ -841,8 +841,8 @@ struct Hit {
 //   `samples_reciprocal`: 1 / `n_samples`. The host divides, because devices round quotients in different ways.
 // - `has_studio`: 1 if metals and glass mirror a studio (shading/studio.glsl). `to_viewer`: horizontal unit vector
 //   towards the viewer for whom it was set up, world space.
-// - `extra_bounces`: bounces beside the levels of rays, for rays that pass straight through blended surfaces, which use
-//   no level. 0 if the scene has no such surfaces, and in frames of paths.
+// - `extra_bounces`: bounces beyond the ray depth, for rays that pass straight through blended surfaces, which make
+//   them no deeper. 0 if the scene has no such surfaces, and in frames of paths.
 struct Frame {
     mat4 clip_from_world;
     vec3 eye;
@@ -1146,7 +1146,7 @@ struct AccelConstants {
 // Whether shadow rays are alpha-tested: whether there are masked or blended materials.
 #define CONSTANT_SHADOW_ALPHA_TEST 23u
 
-// Whether rays can pass through blended surfaces without using a level of rays: whether there are such surfaces.
+// Whether rays can pass through blended surfaces without getting deeper: whether there are such surfaces.
 #define CONSTANT_BLENDED 20u
 // Whether camera rays pass through back faces: whether there are single-sided materials (shading/back_faces.glsl).
 #define CONSTANT_CULLS_BACK_FACES 21u

@@ -66,7 +66,7 @@ pub struct BounceOfPaths<'a> {
     pub are_lambertian: &'a [bool],
     /// The closest hits of paths.
     pub hits: &'a [Hit],
-    pub level: Level,
+    pub simd_level: Level,
 }
 
 /// The paths of a block, one element each.
@@ -152,7 +152,7 @@ impl BounceOfPaths<'_> {
             let t_max = if hit.triangle_ix == NO_TRIANGLE { f32::INFINITY } else { hit.t };
             rays.set(lane, &SearchRay { t_max, ..SearchRay::from(&*paths.rays.of_path(path_ix)) });
         }
-        dispatch!(self.level, simd => {
+        dispatch!(self.simd_level, simd => {
             let (origin, direction) = (Vec3x16::load(simd, &rays.origin), Vec3x16::load(simd, &rays.direction));
             let t_max = f32x16::load_array_ref(simd, &rays.t_max);
             meets_light(shapes, origin, direction, t_max).to_bitmask() as LaneMask
@@ -183,11 +183,11 @@ impl BounceOfPaths<'_> {
         }
         let depth = self.batch.depth;
         let pairs: [PairsSoa; PAIRS_OF_HIT] =
-            dispatch!(self.level, simd => random_pairs(simd, &keys, first_pair_of(depth)));
+            dispatch!(self.simd_level, simd => random_pairs(simd, &keys, first_pair_of(depth)));
         let emitters = self.inputs.emitters.filter(|_| depth + 1 < self.inputs.frame().max_depth);
         let of_map = |emitters: &Emitters| {
             let u = [&pairs[0][1], &pairs[1][0]];
-            emitters.environment.as_ref().map(|map| environment_samples(self.level, emitters, map, u))
+            emitters.environment.as_ref().map(|map| environment_samples(self.simd_level, emitters, map, u))
         };
         GroupChoices { of_environment: emitters.and_then(of_map), pairs }
     }
@@ -230,7 +230,7 @@ impl BounceOfPaths<'_> {
             let hit = &self.hits[path_ix as usize];
             hits.set(lane, paths.rays.of_path(path_ix), hit, &inputs.triangles[hit.triangle_ix as usize]);
         }
-        let surfaces = dispatch!(self.level, simd => lambertian_surfaces(simd, &hits));
+        let surfaces = dispatch!(self.simd_level, simd => lambertian_surfaces(simd, &hits));
         let choices = self.choices_of(group);
         let mut samples = Samples::default();
         for (lane, &(_, path_ix)) in group.iter().enumerate() {
@@ -242,7 +242,8 @@ impl BounceOfPaths<'_> {
         }
         let bounce = BounceConstants { depth, clamp: frame.clamp, shapes: self.shapes() };
         let samples = (&samples, &choices.pairs);
-        let scattered = dispatch!(self.level, simd => lambertian_scatter(simd, &bounce, (&hits, &surfaces), samples));
+        let scattered =
+            dispatch!(self.simd_level, simd => lambertian_scatter(simd, &bounce, (&hits, &surfaces), samples));
         let before_lights = self.before_lights(group, paths);
         for (lane, &(place, path_ix)) in group.iter().enumerate() {
             if before_lights >> lane & 1 == 1 {
@@ -411,10 +412,10 @@ mod tests {
             let begun = expected.clone();
             let (paths, results) = expected.buffers();
             reference::path_scatter::path_scatter(inputs, batch, (&live, &hits), paths, results);
-            for level in [Level::new(), Level::baseline()] {
+            for simd_level in [Level::new(), Level::baseline()] {
                 let mut found = begun.clone();
                 let (paths, results) = found.buffers();
-                let bounce = BounceOfPaths { inputs, batch, pixels, are_lambertian, hits: &hits, level };
+                let bounce = BounceOfPaths { inputs, batch, pixels, are_lambertian, hits: &hits, simd_level };
                 n_lambertian +=
                     hits.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE && bounce.is_lambertian(hit)).count();
                 path_scatter(&bounce, &live, paths, results);

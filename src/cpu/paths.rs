@@ -109,7 +109,7 @@ impl Paths {
             self.are_lambertian = lambertian_materials(inputs);
         }
         let (pixels, are_lambertian) = (&self.pixels, &self.are_lambertian);
-        let bounce = BounceOfPaths { inputs, batch, pixels, are_lambertian, hits, level: Level::new() };
+        let bounce = BounceOfPaths { inputs, batch, pixels, are_lambertian, hits, simd_level: Level::new() };
         path_scatter(&bounce, live, paths, (child_kinds, &mut self.scan_blocks));
     }
 

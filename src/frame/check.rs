@@ -16,7 +16,7 @@ impl From<BadOptions> for GpuError {
 impl RenderOptions {
     /// The longest side of a picture, pixels: that of an image on common GPUs.
     pub const MOST_SIDE: u32 = 16_384;
-    /// The most levels of rays.
+    /// The greatest ray depth.
     pub const MOST_DEPTH: u32 = 64;
     /// The greatest threshold of [`Denoise::Paper`].
     pub const MOST_THRESHOLD: f32 = 4.0;

@@ -53,7 +53,7 @@ fn stage_of(capacity: u32, materials: &[Material]) -> Stage {
 }
 
 /// Returns a ray whose pixel is its index, and its hit. Where some surfaces are blended, the rays have used 0 to 4 of
-/// the five levels, by turns.
+/// the five depths, by turns.
 fn parent(stage: &Stage, i: usize, triangle_ix: u32) -> (PathRay, Hit) {
     let n_used = if stage.resources.constants().extra_bounces > 0 { i as u32 % 5 } else { 0 };
     let ray = PathRay {
@@ -192,16 +192,16 @@ fn all_children_keep_their_order() {
     assert_eq!((next.n_rays, next.trace_groups_x, next.scan_groups_x, next.shade_groups_x), (0, 0, 0, 40));
 }
 
-/// Rays that have used all levels go on only where they pass straight through a blended surface. Other children use a
-/// level more than their parents.
+/// Rays at the last depth go on only where they pass straight through a blended surface. Other children are
+/// one deeper than their parents.
 #[test]
-fn levels_are_counted_where_surfaces_are_blended() {
+fn depth_is_counted_where_surfaces_are_blended() {
     let stage = stage_of(100, &[scenes::veil(Vec3::ONE, 0.5), scenes::mirror(Vec3::splat(0.5)), scenes::glass(1.5)]);
     let found = check(&stage, 0, &[0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 2, 2, 2, 2, 2]);
-    let (both, levels) = (CHILD_REFLECTED | CHILD_TRANSMITTED, [1; 4].into_iter().chain([0]));
+    let (both, depths) = (CHILD_REFLECTED | CHILD_TRANSMITTED, [1; 4].into_iter().chain([0]));
     let of_veil = [CHILD_TRANSMITTED; 5].into_iter();
     let expected: Vec<_> =
-        of_veil.chain(levels.clone().map(|n| n * CHILD_REFLECTED)).chain(levels.map(|n| n * both)).collect();
+        of_veil.chain(depths.clone().map(|n| n * CHILD_REFLECTED)).chain(depths.map(|n| n * both)).collect();
     assert_eq!(found.child_kinds[..15], expected);
     let n_used = |ray: &PathRay| f32::INFINITY.to_bits() - ray.t_max.to_bits();
     let of_children: Vec<_> = found.rays[15..32].iter().map(n_used).collect();
