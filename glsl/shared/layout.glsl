@@ -445,7 +445,7 @@ struct GridCell {
 // - `tf`: weight of refracted light by colour.
 // - `transmission`, `metallic`, `roughness`: of microfacets (shading/microfacet.glsl), 0..1.
 // - `absorption`: of light in the solid behind the surface, by colour (per world unit).
-// - `clearcoat`: share of the surface that a clear layer covers, 0..1. `clearcoat_roughness`: of this layer, 0..1.
+// - `clearcoat`: share of the surface that a clear coat covers, 0..1. `clearcoat_roughness`: of this coat, 0..1.
 // - `sheen_colour`, `sheen_roughness`: reflectance and roughness (0..1) of the sheen of cloth.
 // - `conductor_eta`, `conductor_k`: complex index of refraction of a metal with `MATERIAL_CONDUCTOR`, by colour.
 //
