@@ -4,7 +4,7 @@
 use std::{collections::BTreeSet, fs};
 
 use kdray::frame::{
-    Access, Denoise, FrameKind, Integrator, Pass, Plan, PlanEntry, Primary, RenderOptions, Resource,
+    Access, Denoise, FrameProperties, Integrator, Pass, Plan, PlanEntry, Primary, RenderOptions, Resource,
     plan::{self, passes},
 };
 use kdray::layout::Frame;
@@ -15,13 +15,13 @@ use spirq::{
 };
 
 /// Returns frames with every combination of passes.
-fn kinds() -> Vec<FrameKind> {
-    let mut kinds = Vec::new();
+fn frames() -> Vec<FrameProperties> {
+    let mut frames = Vec::new();
     for (&primary, n_bounces) in Primary::ALL.iter().zip([3, 2, 1]).chain(Primary::ALL.iter().zip([1, 3, 2])) {
         for flags in 0..192_u32 {
             let [pixel_aovs, is_lit, has_lights, adds_samples, shows_aovs, of_paths] =
                 std::array::from_fn(|bit| flags & (1 << bit) != 0);
-            let kind = FrameKind {
+            let frame = FrameProperties {
                 integrator: if of_paths { Integrator::Path } else { Integrator::Whitted },
                 primary,
                 n_bounces,
@@ -34,12 +34,12 @@ fn kinds() -> Vec<FrameKind> {
                 denoise: [Denoise::Off, Denoise::Paper { threshold: 1.0 }, Denoise::Edge][flags as usize / 64],
                 shows_aovs: shows_aovs && pixel_aovs,
             };
-            if of_paths || kind.denoise != Denoise::Edge {
-                kinds.push(kind);
+            if of_paths || frame.denoise != Denoise::Edge {
+                frames.push(frame);
             }
         }
     }
-    kinds
+    frames
 }
 
 /// Returns all entries of a frame of two batches, one after the other.
@@ -100,9 +100,9 @@ fn hazards(entries: &[PlanEntry], denoises: bool) -> Vec<String> {
 
 #[test]
 fn no_pass_runs_before_what_it_needs_is_there() {
-    for kind in kinds() {
-        let found = hazards(&entries(&Plan::new(&kind)), kind.denoise != Denoise::Off && kind.is_lit);
-        assert!(found.is_empty(), "{kind:?}: {found:#?}");
+    for frame in frames() {
+        let found = hazards(&entries(&Plan::new(&frame)), frame.denoise != Denoise::Off && frame.is_lit);
+        assert!(found.is_empty(), "{frame:?}: {found:#?}");
     }
 }
 
@@ -110,8 +110,8 @@ fn no_pass_runs_before_what_it_needs_is_there() {
 #[test]
 fn every_barrier_is_needed() {
     let paper = RenderOptions::default().denoise;
-    let kinds = [(Integrator::Whitted, paper), (Integrator::Path, paper), (Integrator::Path, Denoise::Edge)];
-    for (integrator, denoise) in kinds {
+    let frames = [(Integrator::Whitted, paper), (Integrator::Path, paper), (Integrator::Path, Denoise::Edge)];
+    for (integrator, denoise) in frames {
         let options = RenderOptions {
             integrator,
             denoise,
@@ -122,8 +122,10 @@ fn every_barrier_is_needed() {
             primary: Primary::SoftwareRaster,
             ..RenderOptions::default()
         };
-        let all =
-            entries(&Plan::new(&FrameKind::new(&options, &Frame { n_lights: 1, max_depth: 3, ..Frame::default() })));
+        let all = entries(&Plan::new(&FrameProperties::new(
+            &options,
+            &Frame { n_lights: 1, max_depth: 3, ..Frame::default() },
+        )));
         let barriers: Vec<_> = (0..all.len()).filter(|&i| matches!(all[i], PlanEntry::Barrier { .. })).collect();
         assert!(barriers.len() > 20);
         for &i in &barriers {
@@ -138,13 +140,13 @@ fn every_barrier_is_needed() {
 /// A barrier names only resources that earlier passes have accessed in the way that it states.
 #[test]
 fn barriers_name_what_they_are_for() {
-    for kind in kinds() {
-        let all = entries(&Plan::new(&kind));
+    for frame in frames() {
+        let all = entries(&Plan::new(&frame));
         for (i, entry) in all.iter().enumerate() {
             let PlanEntry::Barrier { before, of, .. } = entry else { continue };
             let earlier: Vec<_> = passes(&all[..i]).flat_map(|pass| accesses(pass, true)).collect();
             for resource in *of {
-                assert!(earlier.contains(&(*resource, *before)), "{kind:?}: {resource:?} of {entry:?}");
+                assert!(earlier.contains(&(*resource, *before)), "{frame:?}: {resource:?} of {entry:?}");
             }
         }
     }
@@ -210,8 +212,8 @@ fn a_missing_barrier_is_noticed() {
 
 #[test]
 fn the_number_of_passes_is_that_of_the_entries() {
-    for kind in kinds() {
-        let plan = Plan::new(&kind);
+    for frame in frames() {
+        let plan = Plan::new(&frame);
         assert_eq!(plan.n_passes(2), passes(&entries(&plan)).count());
     }
 }

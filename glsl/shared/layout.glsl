@@ -215,14 +215,14 @@
 // The greatest magnitude of a transformed texture coordinate. Others are replaced by it, and NaN by 0.
 #define TEXTURE_MAX_COORDINATE 1048576.0
 
-// Bit of `child_kinds`: a reflected ray continues from the hit. It precedes a transmitted one in the queue.
+// Bit of `child_flags`: a reflected ray continues from the hit. It precedes a transmitted one in the queue.
 #define CHILD_REFLECTED 1u
-// Bit of `child_kinds`: a transmitted ray continues from the hit.
+// Bit of `child_flags`: a transmitted ray continues from the hit.
 #define CHILD_TRANSMITTED 2u
-// What `child_kinds` has for a path that goes on. This and the next constant are counts in the two halves of a word, so
+// What `child_flags` has for a path that goes on. This and the next constant are counts in the two halves of a word, so
 // that one prefix sum over a workgroup counts both.
 #define PATH_GOES_ON 1u
-// What `child_kinds` has, in addition, for a path with a shadow ray to a light.
+// What `child_flags` has, in addition, for a path with a shadow ray to a light.
 #define PATH_HAS_SHADOW_RAY 0x10000u
 
 // `light_visibility` of a ray's hit and a light: no shadow ray was traced, since the hit would not show the light.
@@ -1651,7 +1651,7 @@ struct KdSlabExtent {
 #define BIND_RAYS 8u
 // A word for each ray: bits of `CHILD_REFLECTED` and its like. In frames of paths, it is `PATH_GOES_ON` and
 // `PATH_HAS_SHADOW_RAY`.
-#define BIND_CHILD_KINDS 9u
+#define BIND_CHILD_FLAGS 9u
 // A word for each ray: the index of its first child in the queue. A ray without children has the index that a child
 // of it would have.
 #define BIND_FIRST_CHILDREN 10u

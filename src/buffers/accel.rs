@@ -9,7 +9,7 @@ use super::{
     SuspendedRays,
     device_trees::{Arrays, DeviceTrees, Geometries, builder_options, with_room_for},
     scene_arrays::{Content, Contents, SceneAccess, SceneArrays},
-    surface_kinds::SurfaceKinds,
+    surface_features::SurfaceFeatures,
     texture_words::TextureWords,
     two_level::{Joined, instance_rows, leaf_triangle},
 };
@@ -65,7 +65,7 @@ pub struct AccelBuffers {
     pub n_triangles: usize,
     /// Whether rays pass through some of the triangles.
     filters: bool,
-    surface_kinds: SurfaceKinds,
+    surface_features: SurfaceFeatures,
     /// The contents of `constants`.
     uploaded: AccelConstants,
     /// Where the trees of geometries are; none unless the device has built some of them.
@@ -93,7 +93,7 @@ impl AccelBuffers {
         let mut made = Self::with_room(context, world.geometry(), words.len())?;
         made.add_materials(context, &scene.triangle_materials)?;
         made.add_words(context, &words)?;
-        made.surface_kinds = SurfaceKinds::of(scene);
+        made.surface_features = SurfaceFeatures::of(scene);
         made.has_emitters = of_paths;
         Ok(made)
     }
@@ -343,7 +343,7 @@ impl AccelBuffers {
             has_emitters: false,
             n_triangles: n_triangles as usize,
             filters: false,
-            surface_kinds: SurfaceKinds::default(),
+            surface_features: SurfaceFeatures::default(),
             structure,
             is_instanced: false,
             uploaded,
@@ -536,7 +536,7 @@ impl AccelBuffers {
             .set(constants::GRID_LEVELS, n_levels)
             .set(constants::INSTANCED, self.is_instanced)
             .set(constants::ITERATION_BUDGET, budget);
-        self.surface_kinds.set(constants, of_paths)
+        self.surface_features.set(constants, of_paths)
     }
 
     /// Uploads the constants, with the arrays' addresses if kernels read by address. They go to a new buffer, since

@@ -25,7 +25,7 @@ use crate::{
         inputs::KernelInputs,
         live_paths::{PathSlice, path_slices},
         maps::colour_at,
-        path_compact::{counts_of_block, kind_of_path},
+        path_compact::{counts_of_block, flags_of_path},
         path_scatter::PathBuffers,
         path_vertex::{HitChoices, PAIRS_OF_HIT, first_pair_of, scatter_past_lights, scatter_path},
         paths::place_of_path,
@@ -81,24 +81,24 @@ pub fn path_scatter(
     bounce: &BounceOfPaths,
     live: &[u32],
     paths: PathBuffers,
-    (child_kinds, scan_blocks): (&mut [u32], &mut [[u32; 2]]),
+    (child_flags, scan_blocks): (&mut [u32], &mut [[u32; 2]]),
 ) {
-    let of_blocks = (live.par_chunks(BLOCK_SIZE), child_kinds.par_chunks_mut(BLOCK_SIZE), scan_blocks.par_iter_mut());
+    let of_blocks = (live.par_chunks(BLOCK_SIZE), child_flags.par_chunks_mut(BLOCK_SIZE), scan_blocks.par_iter_mut());
     let of_paths = (
         path_slices(paths.rays, live, BLOCK_SIZE),
         path_slices(paths.states, live, BLOCK_SIZE),
         path_slices(paths.shadow_rays, live, BLOCK_SIZE),
     );
     of_blocks.into_par_iter().zip(of_paths).for_each(|(of_block, (rays, states, shadow_rays))| {
-        let (live, kinds, counts) = of_block;
-        bounce.scatter_block(live, kinds, &mut PathsOfBlock { rays, states, shadow_rays });
-        *counts = counts_of_block(kinds);
+        let (live, flags, counts) = of_block;
+        bounce.scatter_block(live, flags, &mut PathsOfBlock { rays, states, shadow_rays });
+        *counts = counts_of_block(flags);
     });
 }
 
 impl BounceOfPaths<'_> {
-    /// Takes the paths of a block one bounce further. Writes to `kinds` which of them go on and have a shadow ray.
-    fn scatter_block(&self, live: &[u32], kinds: &mut [u32], paths: &mut PathsOfBlock) {
+    /// Takes the paths of a block one bounce further. Writes to `flags` which of them go on and have a shadow ray.
+    fn scatter_block(&self, live: &[u32], flags: &mut [u32], paths: &mut PathsOfBlock) {
         let mut at_lambertian = ArrayVec::<_, BLOCK_SIZE>::new();
         let (mut at_others, mut missed) = (at_lambertian.clone(), at_lambertian.clone());
         for (place, &path_ix) in live.iter().enumerate() {
@@ -114,14 +114,14 @@ impl BounceOfPaths<'_> {
         }
         for group in at_lambertian.chunks(LANES) {
             if group.len() < LEAST_GROUP {
-                self.scatter_group(group, &self.choices_of(group), kinds, paths)
+                self.scatter_group(group, &self.choices_of(group), flags, paths)
             } else {
-                self.scatter_lambertian(group, kinds, paths)
+                self.scatter_lambertian(group, flags, paths)
             }
         }
-        at_others.chunks(LANES).for_each(|group| self.scatter_group(group, &self.choices_of(group), kinds, paths));
+        at_others.chunks(LANES).for_each(|group| self.scatter_group(group, &self.choices_of(group), flags, paths));
         // Paths that leave the scene need no random numbers.
-        missed.chunks(LANES).for_each(|group| self.scatter_group(group, &Default::default(), kinds, paths));
+        missed.chunks(LANES).for_each(|group| self.scatter_group(group, &Default::default(), flags, paths));
     }
 
     fn is_lambertian(&self, hit: &Hit) -> bool {
@@ -159,7 +159,7 @@ impl BounceOfPaths<'_> {
         })
     }
 
-    /// Takes a path one bounce further. Returns its kind: whether it goes on and has a shadow ray.
+    /// Takes a path one bounce further. Returns its flags: whether it goes on and has a shadow ray.
     fn scatter(&self, path_ix: u32, before_light: bool, choices: HitChoices, paths: &mut PathsOfBlock) -> u32 {
         let (ray, state) = (paths.rays.of_path(path_ix), paths.states.of_path(path_ix));
         let (inputs, depth, hit) = (self.inputs, self.batch.depth, &self.hits[path_ix as usize]);
@@ -171,7 +171,7 @@ impl BounceOfPaths<'_> {
         if shadow_ray.state != SHADOW_RAY_NONE {
             *paths.shadow_rays.of_path(path_ix) = shadow_ray;
         }
-        kind_of_path(goes_on, shadow_ray.state != SHADOW_RAY_NONE)
+        flags_of_path(goes_on, shadow_ray.state != SHADOW_RAY_NONE)
     }
 
     /// Makes the random decisions at the hits of a group of paths. The last ray of a path only meets light, so that no
@@ -197,20 +197,20 @@ impl BounceOfPaths<'_> {
         &self,
         group: &[(usize, u32)],
         choices: &GroupChoices,
-        kinds: &mut [u32],
+        flags: &mut [u32],
         paths: &mut PathsOfBlock,
     ) {
         let before_lights = self.before_lights(group, paths);
         for (lane, &(place, path_ix)) in group.iter().enumerate() {
-            kinds[place] = self.scatter(path_ix, before_lights >> lane & 1 == 1, choices.of_lane(lane), paths);
+            flags[place] = self.scatter(path_ix, before_lights >> lane & 1 == 1, choices.of_lane(lane), paths);
         }
     }
 
     /// Ends a group of paths at Lambertian surfaces, with the light that their rays meet before.
-    fn end_at_lambertian(&self, group: &[(usize, u32)], kinds: &mut [u32], paths: &mut PathsOfBlock) {
+    fn end_at_lambertian(&self, group: &[(usize, u32)], flags: &mut [u32], paths: &mut PathsOfBlock) {
         let before_lights = self.before_lights(group, paths);
         for (lane, &(place, path_ix)) in group.iter().enumerate() {
-            kinds[place] = 0;
+            flags[place] = 0;
             if before_lights >> lane & 1 == 1 {
                 self.scatter(path_ix, true, Default::default(), paths);
             }
@@ -219,11 +219,11 @@ impl BounceOfPaths<'_> {
 
     /// Takes a group of paths at Lambertian surfaces one bounce further. Those that meet a light are taken as all
     /// others.
-    fn scatter_lambertian(&self, group: &[(usize, u32)], kinds: &mut [u32], paths: &mut PathsOfBlock) {
+    fn scatter_lambertian(&self, group: &[(usize, u32)], flags: &mut [u32], paths: &mut PathsOfBlock) {
         let (inputs, frame, depth) = (self.inputs, self.inputs.frame(), self.batch.depth);
         // The last ray of a path only meets light.
         if depth + 1 >= frame.max_depth {
-            return self.end_at_lambertian(group, kinds, paths);
+            return self.end_at_lambertian(group, flags, paths);
         }
         let mut hits = LambertianHits::default();
         for (lane, &(_, path_ix)) in group.iter().enumerate() {
@@ -247,13 +247,13 @@ impl BounceOfPaths<'_> {
         let before_lights = self.before_lights(group, paths);
         for (lane, &(place, path_ix)) in group.iter().enumerate() {
             if before_lights >> lane & 1 == 1 {
-                kinds[place] = self.scatter(path_ix, true, choices.of_lane(lane), paths);
+                flags[place] = self.scatter(path_ix, true, choices.of_lane(lane), paths);
                 continue;
             }
             let triangle_ix = self.hits[path_ix as usize].triangle_ix;
             let (goes_on, has_shadow_ray) =
                 (scattered.go_on >> lane & 1 == 1, scattered.have_shadow_ray >> lane & 1 == 1);
-            kinds[place] = kind_of_path(goes_on, has_shadow_ray);
+            flags[place] = flags_of_path(goes_on, has_shadow_ray);
             if has_shadow_ray {
                 *paths.shadow_rays.of_path(path_ix) = scattered.shadow_ray(lane, triangle_ix);
             }
@@ -344,7 +344,7 @@ mod tests {
         rays: Vec<PathRay>,
         states: Vec<PathState>,
         shadow_rays: Vec<ShadowRay>,
-        kinds: Vec<u32>,
+        flags: Vec<u32>,
         blocks: Vec<[u32; 2]>,
     }
 
@@ -361,14 +361,14 @@ mod tests {
                 rays: (0..n).map(|_| ray(random)).collect(),
                 states: (0..n).map(|_| PathState { radiance: random.point(), pdf: random.point().x }).collect(),
                 shadow_rays: vec![ShadowRay::zeroed(); n],
-                kinds: vec![9; n],
+                flags: vec![9; n],
                 blocks: vec![[9; 2]; n.div_ceil(BLOCK_SIZE)],
             }
         }
 
         fn buffers(&mut self) -> (PathBuffers<'_>, (&mut [u32], &mut [[u32; 2]])) {
-            let Self { rays, states, shadow_rays, kinds, blocks } = self;
-            (PathBuffers { rays, states, shadow_rays }, (kinds, blocks))
+            let Self { rays, states, shadow_rays, flags, blocks } = self;
+            (PathBuffers { rays, states, shadow_rays }, (flags, blocks))
         }
 
         /// Returns the bits of all floats, of which those of NaN are not told apart.
@@ -376,7 +376,7 @@ mod tests {
             let words = [bytemuck::cast_slice(&self.rays), bytemuck::cast_slice(&self.states)];
             let all =
                 words.concat().into_iter().chain(bytemuck::cast_slice::<_, u32>(&self.shadow_rays).iter().copied());
-            let all = all.chain(self.kinds.clone()).chain(self.blocks.concat());
+            let all = all.chain(self.flags.clone()).chain(self.blocks.concat());
             all.map(|word: u32| if word & 0x7fff_ffff > 0x7f80_0000 { f32::NAN.to_bits() } else { word }).collect()
         }
     }
@@ -407,7 +407,7 @@ mod tests {
             let hits: Vec<_> = (0..N).map(|i| hit_at_random(&mut random, i % 9 == 0)).collect();
             let (pixels, are_lambertian) = (&pixels_of_batch(inputs, batch)[..], &lambertian_materials(inputs)[..]);
             let live: Vec<_> = (0..N as u32).filter(|i| i % 7 != 0).collect();
-            expected.kinds.truncate(live.len());
+            expected.flags.truncate(live.len());
             expected.blocks.truncate(live.len().div_ceil(BLOCK_SIZE));
             let begun = expected.clone();
             let (paths, results) = expected.buffers();

@@ -12,7 +12,7 @@ use super::{
 use crate::{
     accel::kdtree::TraversalLinks,
     frame::{
-        BounceStats, Denoise, FrameKind, FrameRenderer, Integrator, MeanLayers, NoiseTiles, Pass, Picture, Plan,
+        BounceStats, Denoise, FrameProperties, FrameRenderer, Integrator, MeanLayers, NoiseTiles, Pass, Picture, Plan,
         Primary, Profile, RenderOptions, Watcher, opaque, plan::passes,
     },
     gpu::GpuError,
@@ -200,7 +200,7 @@ impl CpuRenderer {
             }
             self.pixel_aovs.fill(PixelAovs::default());
         }
-        let plan = Plan::new(&self.frame_kind());
+        let plan = Plan::new(&self.frame_properties());
         if is_new {
             passes(&plan.visibility).for_each(|pass| self.run(pass, 0));
         }
@@ -295,10 +295,10 @@ impl CpuRenderer {
 
     /// Returns the properties that decide the passes of the next sample. The CPU does not rasterize: for both kinds
     /// of rasterization it runs the pass `visibility` of `Primary::Raster`, which here traces a ray for each pixel.
-    fn frame_kind(&self) -> FrameKind {
-        let kind = FrameKind::new(&self.options, &self.frame);
-        let primary = if kind.primary == Primary::Trace { Primary::Trace } else { Primary::Raster };
-        FrameKind { primary, adds_samples: self.n_samples > 0, ..kind }
+    fn frame_properties(&self) -> FrameProperties {
+        let properties = FrameProperties::new(&self.options, &self.frame);
+        let primary = if properties.primary == Primary::Trace { Primary::Trace } else { Primary::Raster };
+        FrameProperties { primary, adds_samples: self.n_samples > 0, ..properties }
     }
 
     /// Draws a batch of pixels: first all bounces are traced, then their hits are lit. If there are more rays than
@@ -545,13 +545,13 @@ impl CpuRenderer {
     /// Determines which rays continue from the bounce's hits, and counts them.
     fn compact_reduce(&mut self, depth: u32) {
         let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
-        let Queue { rays, bounces, hits, child_kinds, scan_blocks, .. } = &mut self.queue;
+        let Queue { rays, bounces, hits, child_flags, scan_blocks, .. } = &mut self.queue;
         let places = bounces[depth as usize].rays();
-        child_kinds.resize(rays.len(), 0);
+        child_flags.resize(rays.len(), 0);
         scan_blocks.resize(places.len().div_ceil(SCAN_GROUP_SIZE as usize), 0);
         let parents = Parents { rays: &rays[places.clone()], hits: &hits[places.clone()] };
-        let kinds = &mut child_kinds[places];
-        self.clock.time(Pass::CompactReduce, Some(depth), || compact::reduce(&inputs, parents, kinds, scan_blocks));
+        let flags = &mut child_flags[places];
+        self.clock.time(Pass::CompactReduce, Some(depth), || compact::reduce(&inputs, parents, flags, scan_blocks));
     }
 
     /// Computes the prefix sums of the counts, and from them the size of the next bounce.
@@ -567,7 +567,7 @@ impl CpuRenderer {
     /// Writes the next bounce's rays behind those of this bounce, unless the queue has no room for them.
     fn compact_scatter(&mut self, depth: u32) {
         let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
-        let Queue { rays, bounces, hits, child_kinds, first_children, scan_blocks, .. } = &mut self.queue;
+        let Queue { rays, bounces, hits, child_flags, first_children, scan_blocks, .. } = &mut self.queue;
         let (this, next) = (bounces[depth as usize], bounces[depth as usize + 1]);
         if next.overflow != 0 {
             return;
@@ -577,9 +577,9 @@ impl CpuRenderer {
         rays.resize(next.rays().end, PathRay::zeroed());
         let (so_far, next_rays) = rays.split_at_mut(next.rays().start);
         let parents = Parents { rays: &so_far[places.clone()], hits: &hits[places.clone()] };
-        let (kinds, first_children) = (&child_kinds[places.clone()], &mut first_children[places]);
+        let (flags, first_children) = (&child_flags[places.clone()], &mut first_children[places]);
         self.clock.time(Pass::CompactScatter, Some(depth), || {
-            compact::scatter(&inputs, parents, kinds, scan_blocks, next.first_ray, first_children, next_rays);
+            compact::scatter(&inputs, parents, flags, scan_blocks, next.first_ray, first_children, next_rays);
         });
     }
 

@@ -46,7 +46,7 @@ pub use self::{
     mean_layers::{MeanLayers, RangeSums},
     noise_tiles::{NoiseTileSamples, NoiseTiles},
     pass::{Pass, Role, Scope},
-    plan::{Access, FrameKind, PassSequence, Plan, PlanEntry},
+    plan::{Access, FrameProperties, PassSequence, Plan, PlanEntry},
     profile::{BounceStats, PassTime, Profile},
     resource::Resource,
     sample_range::{BlockSum, SampleRange, SampleSums, variance_of_joined},

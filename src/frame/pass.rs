@@ -3,7 +3,7 @@
 use super::resource::{
     Resource,
     Resource::{
-        Bounces, ChildKinds, Counters, FirstChildren, Hits, LightVisibility, LivePaths, PathSnapshots, PathStates,
+        Bounces, ChildFlags, Counters, FirstChildren, Hits, LightVisibility, LivePaths, PathSnapshots, PathStates,
         PixelAccumulated, PixelAovs, PixelAux, PixelDisplay, PixelFiltered, PixelNearest, PixelRadiance, RasterGroups,
         RayRadiance, Rays, ScanBlocks, ShadowRays, SuspendedRays, TriangleIds,
     },
@@ -191,7 +191,7 @@ const TABLE: [Info; 27] = [
         scope: Scope::Bounce,
         color: [200, 90, 110],
         reads: &[Rays, Hits, Bounces],
-        writes: &[ChildKinds, ScanBlocks],
+        writes: &[ChildFlags, ScanBlocks],
         indirect: Some(Bounces),
     },
     Info {
@@ -210,7 +210,7 @@ const TABLE: [Info; 27] = [
         role: Role::Compaction,
         scope: Scope::Bounce,
         color: [245, 160, 165],
-        reads: &[Rays, Hits, ChildKinds, ScanBlocks, Bounces],
+        reads: &[Rays, Hits, ChildFlags, ScanBlocks, Bounces],
         writes: &[Rays, FirstChildren],
         indirect: Some(Bounces),
     },
@@ -311,7 +311,7 @@ const TABLE: [Info; 27] = [
         scope: Scope::Bounce,
         color: [240, 200, 70],
         reads: &[Rays, Hits, LivePaths, Bounces, PathStates],
-        writes: &[Rays, PathStates, ShadowRays, ChildKinds, ScanBlocks],
+        writes: &[Rays, PathStates, ShadowRays, ChildFlags, ScanBlocks],
         indirect: Some(Bounces),
     },
     Info {
@@ -320,7 +320,7 @@ const TABLE: [Info; 27] = [
         role: Role::Compaction,
         scope: Scope::Bounce,
         color: [250, 150, 150],
-        reads: &[ChildKinds, ScanBlocks, Bounces, LivePaths],
+        reads: &[ChildFlags, ScanBlocks, Bounces, LivePaths],
         writes: &[LivePaths],
         indirect: Some(Bounces),
     },

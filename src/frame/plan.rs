@@ -8,7 +8,7 @@ use super::{
     resource::{
         Resource,
         Resource::{
-            Bounces, ChildKinds, Counters, FirstChildren, Hits, LightVisibility, LivePaths, PathSnapshots, PathStates,
+            Bounces, ChildFlags, Counters, FirstChildren, Hits, LightVisibility, LivePaths, PathSnapshots, PathStates,
             PixelAccumulated, PixelAovs, PixelAux, PixelFiltered, PixelNearest, PixelRadiance, RasterGroups,
             RayRadiance, Rays, ScanBlocks, ShadowRays,
         },
@@ -42,7 +42,7 @@ pub enum PlanEntry {
         /// The accesses of later passes.
         after: Access,
         /// The resources for which the plan needs the barrier. The Vulkan barrier itself is not limited to them: it
-        /// orders accesses of these kinds to all memory.
+        /// orders accesses of these types to all memory.
         of: &'static [Resource],
     },
 }
@@ -52,7 +52,7 @@ pub type PassSequence = Vec<PlanEntry>;
 
 /// The properties of a frame that decide which passes it has.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FrameKind {
+pub struct FrameProperties {
     /// How light is computed.
     pub integrator: Integrator,
     /// How primary rays find their triangles. Those of paths are always traced.
@@ -78,9 +78,9 @@ pub struct FrameKind {
     pub shows_aovs: bool,
 }
 
-impl FrameKind {
-    /// Returns the kind of a frame with the most passes that frames of these options can have: the frame is lit, and
-    /// its sample is added to earlier ones. It displays the picture. To display an AOV takes no more passes.
+impl FrameProperties {
+    /// Returns the properties of the frame with the most passes that frames of these options can have: the frame is
+    /// lit, and its sample is added to earlier ones. It displays the picture. To display an AOV takes no more passes.
     pub fn new(options: &RenderOptions, constants: &Frame) -> Self {
         Self {
             integrator: options.integrator,
@@ -116,17 +116,17 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Returns the passes of a frame of this kind.
-    pub fn new(kind: &FrameKind) -> Self {
-        match kind.integrator {
-            Integrator::Whitted => Self::of_ray_trees(kind),
-            Integrator::Path => Self::of_paths(kind),
+    /// Returns the passes of a frame with these properties.
+    pub fn new(frame: &FrameProperties) -> Self {
+        match frame.integrator {
+            Integrator::Whitted => Self::of_ray_trees(frame),
+            Integrator::Path => Self::of_paths(frame),
         }
     }
 
     /// Returns the passes of a frame that traces paths.
-    fn of_paths(kind: &FrameKind) -> Self {
-        let mut light = if kind.light_layers { layer().to_vec() } else { PassSequence::new() };
+    fn of_paths(frame: &FrameProperties) -> Self {
+        let mut light = if frame.light_layers { layer().to_vec() } else { PassSequence::new() };
         light.extend([PlanEntry::Run(Pass::PathResolve), barrier(Access::Write, Access::Update, &[PixelRadiance])]);
         let sums = vec![
             PlanEntry::Run(Pass::PathAccumulate),
@@ -134,19 +134,19 @@ impl Plan {
         ];
         Self {
             visibility: PassSequence::new(),
-            bounces: (0..kind.n_bounces).map(|depth| bounce_of_paths(kind, depth)).collect(),
-            light: if kind.is_lit { light } else { PassSequence::new() },
-            image: [if kind.is_lit { sums } else { PassSequence::new() }, display(kind)].concat(),
+            bounces: (0..frame.n_bounces).map(|depth| bounce_of_paths(frame, depth)).collect(),
+            light: if frame.is_lit { light } else { PassSequence::new() },
+            image: [if frame.is_lit { sums } else { PassSequence::new() }, display(frame)].concat(),
         }
     }
 
     /// Returns the passes of a frame that traces the paper's trees of reflected and refracted rays.
-    fn of_ray_trees(kind: &FrameKind) -> Self {
+    fn of_ray_trees(frame: &FrameProperties) -> Self {
         Self {
-            visibility: visibility(kind.primary),
-            bounces: (0..kind.n_bounces).map(|depth| bounce(kind, depth)).collect(),
-            light: if kind.is_lit { light(kind.has_lights) } else { PassSequence::new() },
-            image: [samples(kind), display(kind)].concat(),
+            visibility: visibility(frame.primary),
+            bounces: (0..frame.n_bounces).map(|depth| bounce(frame, depth)).collect(),
+            light: if frame.is_lit { light(frame.has_lights) } else { PassSequence::new() },
+            image: [samples(frame), display(frame)].concat(),
         }
     }
 
@@ -183,7 +183,7 @@ pub fn visibility(primary: Primary) -> PassSequence {
 }
 
 /// Returns the sequence of one bounce of paths: closest hits, then the light that the paths meet and the way on.
-fn bounce_of_paths(kind: &FrameKind, depth: u32) -> PassSequence {
+fn bounce_of_paths(frame: &FrameProperties, depth: u32) -> PassSequence {
     let mut bounce = PassSequence::new();
     if depth == 0 {
         bounce.extend([
@@ -195,24 +195,24 @@ fn bounce_of_paths(kind: &FrameKind, depth: u32) -> PassSequence {
         PlanEntry::Run(Pass::PathTrace),
         barrier(Access::Write, Access::Update, &[Hits, PathStates, ShadowRays, Counters, PixelAovs]),
     ]);
-    if depth == 0 && kind.pixel_aovs {
+    if depth == 0 && frame.pixel_aovs {
         bounce.extend([PlanEntry::Run(Pass::PixelAovs), barrier(Access::Write, Access::Update, &[PixelAovs])]);
     }
-    bounce.extend(surface_layers(kind, depth));
-    if kind.is_lit {
+    bounce.extend(surface_layers(frame, depth));
+    if frame.is_lit {
         bounce.extend([
             PlanEntry::Run(Pass::PathScatter),
-            barrier(Access::Write, Access::Update, &[Rays, PathStates, ShadowRays, ChildKinds, ScanBlocks]),
+            barrier(Access::Write, Access::Update, &[Rays, PathStates, ShadowRays, ChildFlags, ScanBlocks]),
         ]);
     }
-    if depth == 0 && kind.is_lit && kind.denoise == Denoise::Edge {
+    if depth == 0 && frame.is_lit && frame.denoise == Denoise::Edge {
         bounce.extend([PlanEntry::Run(Pass::Auxiliary), barrier(Access::Write, Access::Update, &[PixelAux])]);
     }
     // The last layer is complete after the last bounce.
-    if depth + 1 < LIGHT_LAYERS && kind.is_lit && kind.light_layers {
+    if depth + 1 < LIGHT_LAYERS && frame.is_lit && frame.light_layers {
         bounce.extend(layer());
     }
-    if depth + 1 < kind.n_bounces {
+    if depth + 1 < frame.n_bounces {
         bounce.extend([
             barrier(Access::Indirect, Access::Write, &[Bounces]),
             PlanEntry::Run(Pass::CompactSpine),
@@ -226,8 +226,8 @@ fn bounce_of_paths(kind: &FrameKind, depth: u32) -> PassSequence {
 }
 
 /// Returns the entries that add up what camera rays hit, if the frame has them and `depth` is the bounce of these rays.
-fn surface_layers(kind: &FrameKind, depth: u32) -> PassSequence {
-    if depth > 0 || !kind.is_lit || !kind.surface_layers {
+fn surface_layers(frame: &FrameProperties, depth: u32) -> PassSequence {
+    if depth > 0 || !frame.is_lit || !frame.surface_layers {
         return PassSequence::new();
     }
     vec![PlanEntry::Run(Pass::SurfaceLayers), barrier(Access::Write, Access::Update, &[PixelRadiance])]
@@ -240,13 +240,13 @@ fn layer() -> [PlanEntry; 2] {
 
 /// Returns the sequence that finds the closest hits of one bounce's rays and, from these, makes the next bounce's
 /// rays.
-fn bounce(kind: &FrameKind, depth: u32) -> PassSequence {
-    let mut bounce = closest_hits(kind, depth);
-    if depth == 0 && kind.pixel_aovs {
+fn bounce(frame: &FrameProperties, depth: u32) -> PassSequence {
+    let mut bounce = closest_hits(frame, depth);
+    if depth == 0 && frame.pixel_aovs {
         bounce.extend([PlanEntry::Run(Pass::PixelAovs), barrier(Access::Write, Access::Update, &[PixelAovs])]);
     }
-    bounce.extend(surface_layers(kind, depth));
-    if depth + 1 < kind.n_bounces {
+    bounce.extend(surface_layers(frame, depth));
+    if depth + 1 < frame.n_bounces {
         bounce.extend(next_rays());
     }
     bounce
@@ -254,8 +254,8 @@ fn bounce(kind: &FrameKind, depth: u32) -> PassSequence {
 
 /// Returns the entries that find the closest hits of one bounce's rays. If the frame rasterizes triangles, primary rays
 /// are intersected with these. All other rays are traced through the acceleration structure.
-fn closest_hits(kind: &FrameKind, depth: u32) -> PassSequence {
-    let is_rasterized = depth == 0 && kind.primary != Primary::Trace;
+fn closest_hits(frame: &FrameProperties, depth: u32) -> PassSequence {
+    let is_rasterized = depth == 0 && frame.primary != Primary::Trace;
     vec![
         PlanEntry::Run(if is_rasterized { Pass::PrimaryHit } else { Pass::Trace }),
         barrier(Access::Write, Access::Update, &[Hits, Counters, PixelAovs]),
@@ -267,7 +267,7 @@ fn closest_hits(kind: &FrameKind, depth: u32) -> PassSequence {
 pub fn next_rays() -> PassSequence {
     vec![
         PlanEntry::Run(Pass::CompactReduce),
-        barrier(Access::Write, Access::Update, &[ChildKinds, ScanBlocks]),
+        barrier(Access::Write, Access::Update, &[ChildFlags, ScanBlocks]),
         barrier(Access::Indirect, Access::Write, &[Bounces]),
         PlanEntry::Run(Pass::CompactSpine),
         barrier(Access::Write, Access::Read, &[ScanBlocks, Bounces]),
@@ -301,20 +301,20 @@ fn light(has_lights: bool) -> PassSequence {
 
 /// Returns the entries that turn the frame's sample into the mean of all samples. There are none for a picture's first
 /// sample and for a frame that is not lit.
-fn samples(kind: &FrameKind) -> PassSequence {
-    if !kind.is_lit || !kind.adds_samples {
+fn samples(frame: &FrameProperties) -> PassSequence {
+    if !frame.is_lit || !frame.adds_samples {
         return PassSequence::new();
     }
     vec![PlanEntry::Run(Pass::Accumulate), barrier(Access::Write, Access::Read, &[PixelAccumulated, PixelRadiance])]
 }
 
 /// Returns the entries that turn the mean of all samples into the displayed picture, or display an AOV in its place.
-pub fn display(kind: &FrameKind) -> PassSequence {
+pub fn display(frame: &FrameProperties) -> PassSequence {
     let mut display = PassSequence::new();
-    if kind.is_lit {
-        display.extend(noise_filter(kind.denoise));
+    if frame.is_lit {
+        display.extend(noise_filter(frame.denoise));
     }
-    display.push(PlanEntry::Run(if kind.shows_aovs { Pass::FalseColor } else { Pass::Tonemap }));
+    display.push(PlanEntry::Run(if frame.shows_aovs { Pass::FalseColor } else { Pass::Tonemap }));
     display
 }
 

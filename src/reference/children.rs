@@ -39,7 +39,7 @@ fn scattering_at(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> (Surface, S
 }
 
 /// The ray's children that carry light, as bits `CHILD_*`.
-pub fn child_kinds_of(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> u32 {
+pub fn child_flags_of(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> u32 {
     if hit.triangle_ix == NO_TRIANGLE {
         return 0;
     }
@@ -53,16 +53,16 @@ pub fn child_kinds_of(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> u32 {
     reflected | transmitted
 }
 
-/// The ray's children of these kinds (bits `CHILD_*`), the reflected one first.
-pub fn children_of(inputs: &KernelInputs, ray: &PathRay, hit: &Hit, kinds: u32) -> impl Iterator<Item = PathRay> {
-    let scattering = (kinds != 0).then(|| scattering_at(inputs, ray, hit));
+/// The ray's children of these flags (bits `CHILD_*`), the reflected one first.
+pub fn children_of(inputs: &KernelInputs, ray: &PathRay, hit: &Hit, flags: u32) -> impl Iterator<Item = PathRay> {
+    let scattering = (flags != 0).then(|| scattering_at(inputs, ray, hit));
     let children = scattering.map(|(surface, next)| {
         [
             (CHILD_REFLECTED, next.reflected, next.reflected_weight, true),
             (CHILD_TRANSMITTED, next.transmitted, next.transmitted_weight, !next.passes_straight),
         ]
-        .map(|(kind, direction, weight, is_deeper)| {
-            (kinds & kind != 0).then(|| {
+        .map(|(flag, direction, weight, is_deeper)| {
+            (flags & flag != 0).then(|| {
                 let child = surface.ray_from(direction, hit.triangle_ix, ray, ray.throughput * weight);
                 let is_deeper = is_deeper && inputs.frame().extra_bounces > 0;
                 PathRay { t_max: if is_deeper { ray.t_max.next_down() } else { ray.t_max }, ..child }

@@ -35,8 +35,8 @@ use self::{
 use crate::{
     buffers::{Needs, Resources},
     frame::{
-        Denoise, FrameKind, FrameRenderer, Integrator, Pass, Picture, Plan, PlanEntry, Primary, Profile, RenderOptions,
-        opaque, plan,
+        Denoise, FrameProperties, FrameRenderer, Integrator, Pass, Picture, Plan, PlanEntry, Primary, Profile,
+        RenderOptions, opaque, plan,
     },
     gpu::{Access, AnyBuffer, CommandBuffer, Commands, Context, GpuError},
     layout::{Batch, FalseColor, MATERIAL_REFLECT, MATERIAL_REFRACT, PixelAovs},
@@ -213,7 +213,7 @@ impl GpuRenderer {
         self.context.run("show", |commands| {
             self.resources.bind(commands);
             self.update_constants(commands);
-            self.record_sequence(commands, &plan::display(&self.frame_kind()), &Batch::default());
+            self.record_sequence(commands, &plan::display(&self.frame_properties()), &Batch::default());
         })?;
         self.note_displayed();
         Ok(())
@@ -292,7 +292,7 @@ impl GpuRenderer {
 
     /// Records the plan, in the command buffers that this file's first lines list.
     fn record(&self) -> Result<Vec<Recording>, GpuError> {
-        let plan = Plan::new(&self.frame_kind());
+        let plan = Plan::new(&self.frame_properties());
         let begin = self.command_buffer("begin frame", |commands| self.begin_frame(commands, &plan.visibility))?;
         let mut frame = vec![Recording::plain(begin)];
         for &batch in &self.schedule.batches {
@@ -317,15 +317,15 @@ impl GpuRenderer {
     }
 
     /// Returns the properties of the next sample's frame that decide which passes it has.
-    fn frame_kind(&self) -> FrameKind {
+    fn frame_properties(&self) -> FrameProperties {
         let only_primary_rays = self.draws_primary_rays_only();
         let constants = self.resources.constants();
-        FrameKind {
+        FrameProperties {
             n_bounces: if only_primary_rays { 1 } else { constants.max_depth },
             is_lit: !only_primary_rays,
             adds_samples: constants.n_samples > 1,
             shows_aovs: self.in_use.pixel_aovs && self.false_color.is_some(),
-            ..FrameKind::new(&self.in_use, constants)
+            ..FrameProperties::new(&self.in_use, constants)
         }
     }
 

@@ -50,7 +50,7 @@ PathRay child_ray(Surface surface, vec3 direction, Hit hit, PathRay ray, vec3 we
 }
 
 // The ray's children that carry light, as bits CHILD_*.
-uint child_kinds_of(PathRay ray, Hit hit) {
+uint child_flags_of(PathRay ray, Hit hit) {
     if (hit.triangle_ix == NO_TRIANGLE) return 0u;
     place(hit.triangle_ix);
     // Textures may change what a material scatters.

@@ -155,7 +155,7 @@ mod tests {
             Statistics,
             kdtree::{BuildOptions, KdTree},
         },
-        bench::{Spread, difference::Difference, rays::RayKind, size::RayCost, traversal::StepsARay},
+        bench::{Spread, difference::Difference, rays::RaySetKind, size::RayCost, traversal::StepsARay},
     };
 
     use super::*;
@@ -169,7 +169,7 @@ mod tests {
             accel: Statistics::KdTree(
                 KdTree::build(&[], &BuildOptions::default()).statistics(0, &BuildOptions::default()),
             ),
-            rays: RayKind::ALL
+            rays: RaySetKind::ALL
                 .map(|rays| RayCost {
                     rays,
                     n_rays: 1000,
