@@ -636,7 +636,7 @@ struct AreaLight {
 #define AREA_SPHERE 2u
 #define AREA_SUN 3u
 
-// Replaces the index of a part of `texture_words` that the scene does not have.
+// Replaces the index of an array in `texture_words` that the scene does not have.
 #define NO_WORDS 0xffffffffu
 
 // What a corner of a triangle has beside its position and normal, 8 bytes.
@@ -841,8 +841,8 @@ struct Hit {
 //   `samples_reciprocal`: 1 / `n_samples`. The host divides, because devices round quotients in different ways.
 // - `has_studio`: 1 if metals and glass mirror a studio (shading/studio.glsl). `to_viewer`: horizontal unit vector
 //   towards the viewer for whom it was set up, world space.
-// - `extra_bounces`: bounces beyond the ray depth, for rays that pass straight through blended surfaces, which make
-//   them no deeper. 0 if the scene has no such surfaces, and in frames of paths.
+// - `extra_bounces`: bounces in addition to the ray depths, for rays that pass straight through blended surfaces, which
+//   make them no deeper. 0 if the scene has no such surfaces, and in frames of paths.
 struct Frame {
     mat4 clip_from_world;
     vec3 eye;
@@ -1530,7 +1530,7 @@ struct KdLevel {
     uint pair_groups_z;
 };
 
-// A reference of a kd-tree's build: a triangle in a cell, and the bounds of its part there, grown by its margin
+// A reference of a kd-tree's build: a triangle in a cell, and the bounds of its piece there, grown by its margin
 // (`Reference` in src/accel/bounds.rs). `cell_ix` is among the cells of the level.
 struct KdReference {
     vec3 box_min;
@@ -1774,7 +1774,7 @@ struct KdSlabExtent {
 // One `KdReference` for each reference of the level.
 #define BIND_KD_REFERENCES_FROM 132u
 #define BIND_KD_REFERENCES_TO 133u
-// For each reference that its cell's plane cuts: the part above. The part below replaces the reference itself.
+// For each reference that its cell's plane cuts: the piece above. The piece below replaces the reference itself.
 #define BIND_KD_ABOVE 134u
 // One `KdCell` for each open cell of the level.
 #define BIND_KD_CELLS_FROM 135u
@@ -1825,7 +1825,7 @@ struct KdSlabExtent {
 #define BIND_KD_SLAB_PATCHES 199u
 // One `KdSlabExtent` for each node.
 #define BIND_KD_SLAB_EXTENTS 200u
-// A vec4 for each entry: the area vector of the part of its triangle near its leaf (scaled units), and 0.
+// A vec4 for each entry: the area vector of the piece of its triangle near its leaf (scaled units), and 0.
 #define BIND_KD_SLAB_AREAS 201u
 // A word for each candidate with more than `KD_SLAB_SMALL` entries: its node, in any order.
 #define BIND_KD_SLAB_LARGE 202u

@@ -146,7 +146,7 @@ impl Report {
         }
     }
 
-    /// Returns a chart of the parts of a frame.
+    /// Returns a chart of the phases of a frame.
     pub fn chart(&self) -> BarChart {
         let value = |part: &Phase| part.ms.map(|ms| ms.median).filter(|ms| *ms > 0.0);
         BarChart {

@@ -201,7 +201,7 @@ pub struct RayGrowth {
 }
 
 impl Report {
-    /// Returns the name of the structure's parts: `nodes` or `cells`.
+    /// Returns the name of the structure's elements: `nodes` or `cells`.
     pub fn elements(&self) -> &'static str {
         self.rows.first().map_or("nodes", |row| row.accel.elements())
     }

@@ -364,7 +364,7 @@ impl AccelBuffers {
         self.upload_constants(context)
     }
 
-    /// Uploads textures and emitters, and notes where their parts begin.
+    /// Uploads textures and emitters, and notes where their arrays begin.
     fn add_words(&mut self, context: &Arc<Context>, words: &TextureWords) -> Result<(), GpuError> {
         let content = Content::Written { len: words.len(), write: &|first, chunk| words.write(first, chunk) };
         self.arrays.texture_words = content.upload(context, "texture_words", self.access)?;

@@ -26,7 +26,7 @@ pub trait FrameRenderer {
     /// The base-2 logarithm of the number of samples that the next frame of paths draws.
     fn samples_log2(&mut self) -> &mut u32;
 
-    /// Draws the next frame. Tells the watcher of its parts, but not of its samples.
+    /// Draws the next frame. Tells the watcher of the progress within it, but not of its samples.
     ///
     /// # Errors
     /// A call fails, or one pixel alone makes more rays than the queue holds.

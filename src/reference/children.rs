@@ -17,9 +17,8 @@ fn kept_weight(ray: &PathRay, material: &Material, weight: Vec3) -> Vec3 {
     if (ray.throughput * weight).cmpgt(Vec3::splat(least)).any() { weight } else { Vec3::ZERO }
 }
 
-/// Whether the ray is at the last depth, and has no children that are deeper. In frames with bounces
-/// beyond the ray depth, the `t_max` of a ray says the ray's depth: as many floats lie between it and
-/// infinity.
+/// Whether the ray is at the last depth, and has no children that are deeper. In frames with more bounces than depths,
+/// the `t_max` of a ray says the ray's depth: as many floats lie between it and infinity.
 fn is_at_last_depth(frame: &Frame, ray: &PathRay) -> bool {
     let n_used = || f32::INFINITY.to_bits() - ray.t_max.to_bits();
     frame.extra_bounces > 0 && n_used() + 1 >= frame.max_depth - frame.extra_bounces

@@ -1,8 +1,8 @@
 // The child rays that start at a hit: reflected, transmitted, both or none. Twin of src/reference/children.rs.
 //
-// A child is one deeper than its parent, unless it passes straight through a blended surface. The rays of a
-// frame have no end, so `t_max` can say a ray's depth: as many floats lie between it and infinity.
-// Without blended surfaces, the depth is the bounce, and `t_max` stays.
+// A child is one deeper than its parent, unless it passes straight through a blended surface. The rays of a frame have
+// no end, so `t_max` can say a ray's depth: as many floats lie between it and infinity. Without blended surfaces, the
+// depth is the bounce, and `t_max` stays.
 #ifndef KDRAY_CHILDREN
 #define KDRAY_CHILDREN
 
