@@ -16,7 +16,7 @@ use kdray::{
     },
     bench::{
         difference::Difference,
-        rays::{RayKind, RaySet, ray_sets},
+        rays::{RaySet, RaySetKind, ray_sets},
         stage::Stage,
         traversal::Tracers,
     },
@@ -52,7 +52,7 @@ fn closest_hits(stage: &Stage, rays: &[PathRay]) -> Vec<Hit> {
     rays.iter().map(|ray| traverser.traverse::<false>(&stage.inputs(), &ray.into())).collect()
 }
 
-fn rays(sets: &[RaySet; 4], kind: RayKind) -> &[PathRay] {
+fn rays(sets: &[RaySet; 4], kind: RaySetKind) -> &[PathRay] {
     &sets.iter().find(|set| set.kind == kind).unwrap().rays
 }
 
@@ -65,14 +65,14 @@ fn in_a_room_every_ray_but_the_lit_shadow_rays_hits() {
         assert!(set.rays.iter().all(|ray| (ray.direction.length() - 1.0).abs() < 1e-5), "{}", set.kind.name());
         let hits = closest_hits(&stage, &set.rays);
         let n_hits = hits.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count();
-        if set.kind == RayKind::Shadow {
+        if set.kind == RaySetKind::Shadow {
             assert!((N_PIXELS / 20..N_PIXELS * 19 / 20).contains(&n_hits), "{n_hits} of {N_PIXELS} in shadow");
         } else {
             assert_eq!(n_hits, N_PIXELS, "{}", set.kind.name());
         }
     }
     let on_mesh = |hit: &Hit| hit.triangle_ix < stage.scene().triangles.len() as u32 - 12;
-    let n_on_mesh = closest_hits(&stage, rays(&sets, RayKind::Primary)).iter().filter(|hit| on_mesh(hit)).count();
+    let n_on_mesh = closest_hits(&stage, rays(&sets, RaySetKind::Primary)).iter().filter(|hit| on_mesh(hit)).count();
     assert!((N_PIXELS / 20..N_PIXELS).contains(&n_on_mesh), "{n_on_mesh} of {N_PIXELS} see the mesh");
 }
 
@@ -80,7 +80,7 @@ fn in_a_room_every_ray_but_the_lit_shadow_rays_hits() {
 fn without_a_room_only_primary_hits_have_further_rays() {
     let stage = Stage::open(mesh(), SIZE, &BuildOptions::default());
     let sets = ray_sets(&stage);
-    let primary = rays(&sets, RayKind::Primary);
+    let primary = rays(&sets, RaySetKind::Primary);
     let hits = closest_hits(&stage, primary);
     let pixels: Vec<_> = primary
         .iter()
@@ -89,7 +89,7 @@ fn without_a_room_only_primary_hits_have_further_rays() {
         .map(|(ray, _)| ray.pixel_ix)
         .collect();
     assert!((1..N_PIXELS).contains(&pixels.len()));
-    for kind in [RayKind::Shadow, RayKind::Mirror, RayKind::Diffuse] {
+    for kind in [RaySetKind::Shadow, RaySetKind::Mirror, RaySetKind::Diffuse] {
         assert!(rays(&sets, kind).iter().map(|ray| ray.pixel_ix).eq(pixels.iter().copied()), "{}", kind.name());
     }
 }
@@ -111,15 +111,15 @@ fn a_slow_variant_warms_up_with_fewer_casts_than_a_fast_one() {
 }
 
 #[test]
-fn primary_rays_go_tile_by_tile() {
+fn primary_rays_go_square_by_square() {
     let sets = ray_sets(&Stage::in_room(mesh(), SIZE, &BuildOptions::default()));
-    let pixels: Vec<_> = rays(&sets, RayKind::Primary).iter().map(|ray| ray.pixel_ix).collect();
-    let mut first_tile = pixels[..64].to_vec();
-    first_tile.sort_unstable();
-    // The first tile is in the middle one of three bands.
+    let pixels: Vec<_> = rays(&sets, RaySetKind::Primary).iter().map(|ray| ray.pixel_ix).collect();
+    let mut first_square = pixels[..64].to_vec();
+    first_square.sort_unstable();
+    // The first square is in the middle one of three bands.
     let first = 8 * SIZE.0;
-    assert!(first_tile.into_iter().eq((0..8).flat_map(|y| (0..8).map(move |x| first + y * SIZE.0 + x))));
-    // Pixels within the tile follow a Z-order curve.
+    assert!(first_square.into_iter().eq((0..8).flat_map(|y| (0..8).map(move |x| first + y * SIZE.0 + x))));
+    // Pixels within the square follow a Z-order curve.
     let [right, down] = [1, SIZE.0];
     assert_eq!(pixels[..8], [0, 1, down, right + down, 2, 3, 2 + down, 3 + down].map(|pixel| first + pixel));
 }
@@ -128,7 +128,7 @@ fn primary_rays_go_tile_by_tile() {
 fn rays_leave_the_hits_of_the_primary_rays() {
     let stage = Stage::in_room(mesh(), SIZE, &BuildOptions::default());
     let sets = ray_sets(&stage);
-    let primary = rays(&sets, RayKind::Primary);
+    let primary = rays(&sets, RaySetKind::Primary);
     let hits = closest_hits(&stage, primary);
     for (ray_ix, (came, hit)) in primary.iter().zip(&hits).enumerate() {
         let point = came.origin + hit.t * came.direction;
@@ -136,15 +136,17 @@ fn rays_leave_the_hits_of_the_primary_rays() {
         let normal = (t.v1 - t.v0).cross(t.v2 - t.v0).normalize();
         let side = |direction: Vec3| direction.dot(normal) * came.direction.dot(normal);
         let leaving = |kind| rays(&sets, kind)[ray_ix];
-        for kind in [RayKind::Shadow, RayKind::Mirror, RayKind::Diffuse] {
+        for kind in [RaySetKind::Shadow, RaySetKind::Mirror, RaySetKind::Diffuse] {
             assert!((leaving(kind).origin - point).length() < 1e-3, "{}", kind.name());
         }
-        assert!(side(leaving(RayKind::Mirror).direction) < 0.0 && side(leaving(RayKind::Diffuse).direction) <= 1e-6);
-        let shadow = leaving(RayKind::Shadow);
+        assert!(
+            side(leaving(RaySetKind::Mirror).direction) < 0.0 && side(leaving(RaySetKind::Diffuse).direction) <= 1e-6
+        );
+        let shadow = leaving(RaySetKind::Shadow);
         assert!((shadow.origin + shadow.t_max * shadow.direction - stage.light.position).length() < 1e-3);
         if hit.triangle_ix as usize >= stage.scene().triangles.len() - 12 {
             let mirrored = came.direction - 2.0 * came.direction.dot(normal) * normal;
-            assert!((leaving(RayKind::Mirror).direction - mirrored).length() < 1e-5);
+            assert!((leaving(RaySetKind::Mirror).direction - mirrored).length() < 1e-5);
         }
     }
 }
@@ -187,7 +189,7 @@ fn a_wrong_tree_is_noticed() {
     assert_ne!(measured(&stage).n_hits, 0);
     let found = closest_hits(&stage, &sets[0].rays);
     let right = closest_hits(&Stage::in_room(mesh(), SIZE, &BuildOptions::default()), &sets[0].rays);
-    assert!(Difference::of(RayKind::Primary, &right, &found).n_differing > 0);
+    assert!(Difference::of(RaySetKind::Primary, &right, &found).n_differing > 0);
 }
 
 fn kdray(directory: &Path, arguments: &[&str]) -> Output {

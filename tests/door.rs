@@ -18,7 +18,7 @@ use kdray::{
     },
     cast::{CpuCaster, Ray},
     engine::{Engine, NoiseGoal},
-    frame::{Crop, Denoise, Goal, Integrator, NoiseTiles, RenderOptions, SampleRange, TileSamples},
+    frame::{Crop, Denoise, Goal, Integrator, NoiseTileSamples, NoiseTiles, RenderOptions, SampleRange},
     gpu::DeviceOverrides,
     layout::{
         AREA_SPHERE, AreaLight, LIGHT_SPOT, MaterialMaps, NO_TEXTURE, TEXTURE_HALVES, TEXTURE_UV_SET, Texture, Triangle,
@@ -61,8 +61,8 @@ const CHANGES: &[Change] = &[
         it.textures.textures[0].size = 0xffff_ffff;
     }),
     ("textures: texture 0 has texels of mip level 2 behind the # words of texels", |it| {
-        let level = it.textures.textures[0].first_texel as usize + 2;
-        it.textures.texels[level] = it.textures.texels.len() as u32 - 15;
+        let mip = it.textures.textures[0].first_texel as usize + 2;
+        it.textures.texels[mip] = it.textures.texels.len() as u32 - 15;
     }),
     ("textures: texture # has texels of mip level # behind the # words of texels", |it| {
         it.textures.textures.last_mut().unwrap().flags |= TEXTURE_HALVES;
@@ -346,9 +346,9 @@ fn goals_of_noise_have_a_range() {
 
 #[test]
 fn tiles_that_do_not_fit_together_are_refused() {
-    let tile = |x, first, end| TileSamples { place: glam::uvec2(x, 0), samples: SampleRange { first, end } };
+    let tile = |x, first, end| NoiseTileSamples { place: glam::uvec2(x, 0), samples: SampleRange { first, end } };
     assert!(NoiseTiles::new(&[tile(0, 0, 16), tile(4095, 16, 32)]).is_ok());
-    let wrong: [&[TileSamples]; 8] = [
+    let wrong: [&[NoiseTileSamples]; 8] = [
         &[],
         &[tile(0, 0, 0)],
         &[tile(0, 16, 0)],

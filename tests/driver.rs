@@ -18,7 +18,7 @@ use kdray::{
             raster::Raster,
             report::{RasterResult, SetResult},
         },
-        rays::{RayKind, RaySet, ray_sets},
+        rays::{RaySet, RaySetKind, ray_sets},
         stage::Stage,
     },
     buffers::{AccelBuffers, CastResources},
@@ -140,7 +140,7 @@ fn a_wrong_tree_is_noticed() {
     for set in &ray_sets(&stage) {
         let result = SetResult::new(set.kind, &trials(&stage, &wrong, set));
         let apart = result.kdray[0].apart;
-        assert!(!apart.is_rounding(result.n_rays) || set.kind == RayKind::Shadow, "{} {apart:?}", set.kind.name());
+        assert!(!apart.is_rounding(result.n_rays) || set.kind == RaySetKind::Shadow, "{} {apart:?}", set.kind.name());
     }
 }
 
@@ -200,9 +200,9 @@ fn the_suite_runs_or_says_what_the_device_lacks() {
         Ok(_) => {
             let text = stdout(&succeed(directory.path(), &suite));
             let json: Value = serde_json::from_slice(&fs::read(directory.path().join("x.json")).unwrap()).unwrap();
-            for (set, kind) in json["sets"].as_array().unwrap().iter().zip(RayKind::ALL) {
+            for (set, kind) in json["sets"].as_array().unwrap().iter().zip(RaySetKind::ALL) {
                 assert!(set["rays"] == kind.name() && text.contains(kind.name()));
-                assert!(set["n_hits"].as_u64() > Some(0) || kind == RayKind::Shadow);
+                assert!(set["n_hits"].as_u64() > Some(0) || kind == RaySetKind::Shadow);
                 assert!(set["kdray"].as_array().unwrap().iter().all(|rival| rival["ratio"].as_f64() > Some(0.0)));
             }
             assert!(json["builds"]["bvh_ms"]["median"].as_f64() > Some(0.0));

@@ -183,7 +183,7 @@ fn triangles_above_the_limit_have_the_hosts_grid() {
     assert_silent(&context);
 }
 
-/// The mesh is large enough for several rows of workgroups, and for several tiles per workgroup of the sort.
+/// The mesh is large enough for several rows of workgroups, and for several blocks per workgroup of the sort.
 #[test]
 fn many_triangles_have_the_hosts_grid() {
     let context = device();

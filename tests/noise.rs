@@ -103,7 +103,7 @@ fn the_progress_of_a_picture_in_bands_adds_up_to_one_sample() {
     #[derive(Default)]
     struct Told(Vec<Option<f32>>);
     impl Watcher for &mut Told {
-        fn part(&mut self, share: f32) {
+        fn sample_progress(&mut self, share: f32) {
             self.0.push(Some(share));
         }
 

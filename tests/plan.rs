@@ -4,7 +4,7 @@
 use std::{collections::BTreeSet, fs};
 
 use kdray::frame::{
-    Access, Denoise, FrameKind, Integrator, Pass, Plan, Primary, RenderOptions, Resource, Step,
+    Access, Denoise, FrameProperties, Integrator, Pass, Plan, PlanEntry, Primary, RenderOptions, Resource,
     plan::{self, passes},
 };
 use kdray::layout::Frame;
@@ -15,13 +15,13 @@ use spirq::{
 };
 
 /// Returns frames with every combination of passes.
-fn kinds() -> Vec<FrameKind> {
-    let mut kinds = Vec::new();
+fn frames() -> Vec<FrameProperties> {
+    let mut frames = Vec::new();
     for (&primary, n_bounces) in Primary::ALL.iter().zip([3, 2, 1]).chain(Primary::ALL.iter().zip([1, 3, 2])) {
         for flags in 0..192_u32 {
             let [pixel_aovs, is_lit, has_lights, adds_samples, shows_aovs, of_paths] =
                 std::array::from_fn(|bit| flags & (1 << bit) != 0);
-            let kind = FrameKind {
+            let frame = FrameProperties {
                 integrator: if of_paths { Integrator::Path } else { Integrator::Whitted },
                 primary,
                 n_bounces,
@@ -34,16 +34,16 @@ fn kinds() -> Vec<FrameKind> {
                 denoise: [Denoise::Off, Denoise::Paper { threshold: 1.0 }, Denoise::Edge][flags as usize / 64],
                 shows_aovs: shows_aovs && pixel_aovs,
             };
-            if of_paths || kind.denoise != Denoise::Edge {
-                kinds.push(kind);
+            if of_paths || frame.denoise != Denoise::Edge {
+                frames.push(frame);
             }
         }
     }
-    kinds
+    frames
 }
 
-/// Returns all steps of a frame of two batches, one after the other.
-fn steps(plan: &Plan) -> Vec<Step> {
+/// Returns all entries of a frame of two batches, one after the other.
+fn entries(plan: &Plan) -> Vec<PlanEntry> {
     let batch = [plan.bounces.concat(), plan.light.clone()].concat();
     [plan.visibility.clone(), batch.clone(), batch, plan.image.clone()].concat()
 }
@@ -65,8 +65,8 @@ fn accesses(pass: Pass, denoises: bool) -> Vec<(Resource, Access)> {
 }
 
 /// Tells whether a barrier orders a later access of a resource after an earlier one.
-fn orders(barrier: &Step, resource: Resource, earlier: Access, later: Access) -> bool {
-    let Step::Barrier { before, after, of } = *barrier else { return false };
+fn orders(barrier: &PlanEntry, resource: Resource, earlier: Access, later: Access) -> bool {
+    let PlanEntry::Barrier { before, after, of } = *barrier else { return false };
     let is_kernel = |access| access != Access::Indirect;
     // A write after a read waits for the kernel or for the indirect read. No memory has to be made visible.
     if earlier != Access::Write {
@@ -79,16 +79,16 @@ fn orders(barrier: &Step, resource: Resource, earlier: Access, later: Access) ->
 }
 
 /// Describes the pairs of passes of which the second may run too early.
-fn hazards(steps: &[Step], denoises: bool) -> Vec<String> {
+fn hazards(entries: &[PlanEntry], denoises: bool) -> Vec<String> {
     let mut found = Vec::new();
-    for (j, later) in steps.iter().enumerate() {
-        let Step::Run(later) = later else { continue };
-        for (i, earlier) in steps[..j].iter().enumerate() {
-            let Step::Run(earlier) = earlier else { continue };
+    for (j, later) in entries.iter().enumerate() {
+        let PlanEntry::Run(later) = later else { continue };
+        for (i, earlier) in entries[..j].iter().enumerate() {
+            let PlanEntry::Run(earlier) = earlier else { continue };
             for (resource, first) in accesses(*earlier, denoises) {
                 for (_, then) in accesses(*later, denoises).into_iter().filter(|(other, _)| *other == resource) {
                     let conflict = first == Access::Write || then == Access::Write;
-                    if conflict && !steps[i..j].iter().any(|step| orders(step, resource, first, then)) {
+                    if conflict && !entries[i..j].iter().any(|entry| orders(entry, resource, first, then)) {
                         found.push(format!("{earlier:?} {first:?}s {resource:?}, {later:?} {then:?}s it"));
                     }
                 }
@@ -100,9 +100,9 @@ fn hazards(steps: &[Step], denoises: bool) -> Vec<String> {
 
 #[test]
 fn no_pass_runs_before_what_it_needs_is_there() {
-    for kind in kinds() {
-        let found = hazards(&steps(&Plan::new(&kind)), kind.denoise != Denoise::Off && kind.is_lit);
-        assert!(found.is_empty(), "{kind:?}: {found:#?}");
+    for frame in frames() {
+        let found = hazards(&entries(&Plan::new(&frame)), frame.denoise != Denoise::Off && frame.is_lit);
+        assert!(found.is_empty(), "{frame:?}: {found:#?}");
     }
 }
 
@@ -110,8 +110,8 @@ fn no_pass_runs_before_what_it_needs_is_there() {
 #[test]
 fn every_barrier_is_needed() {
     let paper = RenderOptions::default().denoise;
-    let kinds = [(Integrator::Whitted, paper), (Integrator::Path, paper), (Integrator::Path, Denoise::Edge)];
-    for (integrator, denoise) in kinds {
+    let frames = [(Integrator::Whitted, paper), (Integrator::Path, paper), (Integrator::Path, Denoise::Edge)];
+    for (integrator, denoise) in frames {
         let options = RenderOptions {
             integrator,
             denoise,
@@ -122,14 +122,16 @@ fn every_barrier_is_needed() {
             primary: Primary::SoftwareRaster,
             ..RenderOptions::default()
         };
-        let all =
-            steps(&Plan::new(&FrameKind::new(&options, &Frame { n_lights: 1, max_depth: 3, ..Frame::default() })));
-        let barriers: Vec<_> = (0..all.len()).filter(|&i| matches!(all[i], Step::Barrier { .. })).collect();
+        let all = entries(&Plan::new(&FrameProperties::new(
+            &options,
+            &Frame { n_lights: 1, max_depth: 3, ..Frame::default() },
+        )));
+        let barriers: Vec<_> = (0..all.len()).filter(|&i| matches!(all[i], PlanEntry::Barrier { .. })).collect();
         assert!(barriers.len() > 20);
         for &i in &barriers {
             let mut without = all.clone();
             // This removes the equal barriers of all batches and bounces.
-            without.retain(|step| *step != all[i]);
+            without.retain(|entry| *entry != all[i]);
             assert!(!hazards(&without, true).is_empty(), "{integrator}, {denoise:?}: {:?} is not needed", all[i]);
         }
     }
@@ -138,13 +140,13 @@ fn every_barrier_is_needed() {
 /// A barrier names only resources that earlier passes have accessed in the way that it states.
 #[test]
 fn barriers_name_what_they_are_for() {
-    for kind in kinds() {
-        let all = steps(&Plan::new(&kind));
-        for (i, step) in all.iter().enumerate() {
-            let Step::Barrier { before, of, .. } = step else { continue };
+    for frame in frames() {
+        let all = entries(&Plan::new(&frame));
+        for (i, entry) in all.iter().enumerate() {
+            let PlanEntry::Barrier { before, of, .. } = entry else { continue };
             let earlier: Vec<_> = passes(&all[..i]).flat_map(|pass| accesses(pass, true)).collect();
             for resource in *of {
-                assert!(earlier.contains(&(*resource, *before)), "{kind:?}: {resource:?} of {step:?}");
+                assert!(earlier.contains(&(*resource, *before)), "{frame:?}: {resource:?} of {entry:?}");
             }
         }
     }
@@ -201,17 +203,17 @@ fn passes_declare_what_their_kernels_read_and_write() {
 
 #[test]
 fn a_missing_barrier_is_noticed() {
-    let section = plan::next_rays();
-    assert_eq!(hazards(&section, true), Vec::<String>::new());
-    let scatter_waits = |step: &Step| matches!(step, Step::Barrier { after: Access::Read, .. });
-    let without: Vec<_> = section.into_iter().filter(|step| !scatter_waits(step)).collect();
+    let sequence = plan::next_rays();
+    assert_eq!(hazards(&sequence, true), Vec::<String>::new());
+    let scatter_waits = |entry: &PlanEntry| matches!(entry, PlanEntry::Barrier { after: Access::Read, .. });
+    let without: Vec<_> = sequence.into_iter().filter(|entry| !scatter_waits(entry)).collect();
     assert!(hazards(&without, true).iter().any(|hazard| hazard.contains("CompactSpine Writes ScanBlocks")));
 }
 
 #[test]
-fn the_number_of_passes_is_that_of_the_steps() {
-    for kind in kinds() {
-        let plan = Plan::new(&kind);
-        assert_eq!(plan.n_passes(2), passes(&steps(&plan)).count());
+fn the_number_of_passes_is_that_of_the_entries() {
+    for frame in frames() {
+        let plan = Plan::new(&frame);
+        assert_eq!(plan.n_passes(2), passes(&entries(&plan)).count());
     }
 }

@@ -54,7 +54,7 @@ struct Samples {
 }
 
 impl Watcher for &mut Samples {
-    fn part(&mut self, share: f32) {
+    fn sample_progress(&mut self, share: f32) {
         self.last_part = share;
     }
 

@@ -1,21 +1,21 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Edge filter: one invocation per pixel of the window, in tiles, takes one step of the noise filter `edge`, an
+// Edge filter: one invocation per pixel of the window, in squares, takes one iteration of the noise filter `edge`, an
 // edge-avoiding a-trous wavelet transform (Dammertz et al.: Edge-Avoiding A-Trous Wavelet Transform for Fast Global
 // Illumination Filtering, 2010) that is guided by variance (Schied et al.: Spatiotemporal Variance-Guided Filtering,
-// 2017). It replaces the light of the pixel by a mean of 5 x 5 pixels, which are 2^step_ix pixels apart. A pixel counts
-// the more, the more alike its surface is, and the less its light differs beyond the noise. The last step multiplies
-// the light by the albedo again and adds what the camera sees directly.
-// Reads pixel_aux; updates pixel_filtered: even steps read its second half and write the first one.
+// 2017). It replaces the light of the pixel by a mean of 5 x 5 pixels, which are 2^iteration_ix pixels apart. A pixel
+// counts the more, the more alike its surface is, and the less its light differs beyond the noise. The last iteration
+// multiplies the light by the albedo again and adds what the camera sees directly.
+// Reads pixel_aux; updates pixel_filtered: even iterations read its second half and write the first one.
 #include "layout.glsl"
 #include "picture/noise.glsl"
 #include "picture/edge.glsl"
 
-layout(local_size_x = TILE_SIZE, local_size_y = TILE_SIZE) in;
+layout(local_size_x = PIXEL_GROUP_SIZE, local_size_y = PIXEL_GROUP_SIZE) in;
 layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
 layout(std430, set = 0, binding = BIND_PIXEL_AUX) readonly buffer PixelAuxBlock { Auxiliary pixel_aux[]; };
 layout(std430, set = 0, binding = BIND_PIXEL_FILTERED) buffer PixelFilteredBlock { vec4 pixel_filtered[]; };
-layout(push_constant) uniform EdgeStepBlock { EdgeStep edge_step; };
+layout(push_constant) uniform AtrousIterationBlock { AtrousIteration atrous_iteration; };
 
 // How many standard deviations of noise the luminances of two pixels of one sample may differ until the weight has
 // fallen to 1 / e.
@@ -34,9 +34,9 @@ const float LEAST_VARIANCE = 1.0e-16;
 // The weights of the five pixels in a row: a B-spline.
 const float SPLINE[3] = float[3](0.375, 0.25, 0.0625);
 
-// Where the half of pixel_filtered begins that the step reads.
+// Where the half of pixel_filtered begins that the iteration reads.
 uint source_begin() {
-    return (edge_step.step_ix & 1u) == 0u ? frame.width * frame.height : 0u;
+    return (atrous_iteration.iteration_ix & 1u) == 0u ? frame.width * frame.height : 0u;
 }
 
 bool is_in_window(ivec2 pixel) {
@@ -71,7 +71,7 @@ vec4 mean_around(ivec2 pixel, Auxiliary aux, vec4 light) {
     vec4 sum = vec4(0.0);
     for (int y = -2; y <= 2; ++y) {
         for (int x = -2; x <= 2; ++x) {
-            ivec2 other = pixel + (ivec2(x, y) << edge_step.step_ix);
+            ivec2 other = pixel + (ivec2(x, y) << atrous_iteration.iteration_ix);
             if (!is_in_window(other)) continue;
             vec4 found = pixel_filtered[source_begin() + index_of(other)];
             float weight = SPLINE[abs(x)] * SPLINE[abs(y)] * surface_weight(aux, pixel_aux[index_of(other)]);
@@ -91,6 +91,6 @@ void main() {
     int pixel_ix = index_of(pixel);
     Auxiliary aux = pixel_aux[pixel_ix];
     vec4 light = mean_around(pixel, aux, pixel_filtered[source_begin() + pixel_ix]);
-    if (edge_step.step_ix + 1u == EDGE_STEPS) light = vec4(light.xyz * aux.albedo + aux.seen, 1.0);
+    if (atrous_iteration.iteration_ix + 1u == N_ATROUS_ITERATIONS) light = vec4(light.xyz * aux.albedo + aux.seen, 1.0);
     pixel_filtered[frame.width * frame.height - source_begin() + pixel_ix] = light;
 }

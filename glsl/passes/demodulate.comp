@@ -1,14 +1,14 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Demodulate: one invocation per pixel of the window, in tiles, divides the light that the pixel's surfaces scatter to
-// the camera by their albedo, so that the noise filter `edge` does not blur textures. It estimates the variance of the
-// light's luminance from the samples, and from the pixels around.
+// Demodulate: one invocation per pixel of the window, in squares, divides the light that the pixel's surfaces scatter
+// to the camera by their albedo, so that the noise filter `edge` does not blur textures. It estimates the variance of
+// the light's luminance from the samples, and from the pixels around.
 // Reads pixel_radiance and pixel_aux; writes the second half of pixel_filtered.
 #include "layout.glsl"
 #include "picture/noise.glsl"
 #include "picture/edge.glsl"
 
-layout(local_size_x = TILE_SIZE, local_size_y = TILE_SIZE) in;
+layout(local_size_x = PIXEL_GROUP_SIZE, local_size_y = PIXEL_GROUP_SIZE) in;
 layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
 layout(std430, set = 0, binding = BIND_PIXEL_RADIANCE) readonly buffer PixelRadianceBlock { vec4 pixel_radiance[]; };
 layout(std430, set = 0, binding = BIND_PIXEL_AUX) readonly buffer PixelAuxBlock { Auxiliary pixel_aux[]; };

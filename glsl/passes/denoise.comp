@@ -1,13 +1,13 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Denoise (the paper's section 2.4): one invocation per pixel of the window, in tiles, compares the pixel with its
+// Denoise (the paper's section 2.4): one invocation per pixel of the window, in squares, compares the pixel with its
 // four neighbours. If the luminance differences add up to more than the threshold, it replaces the pixel by the mean
 // of the five.
 // Reads pixel_radiance; writes pixel_filtered.
 #include "layout.glsl"
 #include "picture/display.glsl"
 
-layout(local_size_x = TILE_SIZE, local_size_y = TILE_SIZE) in;
+layout(local_size_x = PIXEL_GROUP_SIZE, local_size_y = PIXEL_GROUP_SIZE) in;
 layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
 layout(std430, set = 0, binding = BIND_PIXEL_RADIANCE) readonly buffer PixelRadianceBlock { vec4 pixel_radiance[]; };
 layout(std430, set = 0, binding = BIND_PIXEL_FILTERED) writeonly buffer PixelFilteredBlock { vec4 pixel_filtered[]; };

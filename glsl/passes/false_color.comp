@@ -1,12 +1,12 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// False colour: one invocation per pixel of the window, in tiles, displays one of the pixel's AOVs (VIEW_*) in
+// False colour: one invocation per pixel of the window, in squares, displays one of the pixel's AOVs (VIEW_*) in
 // place of its colour.
 // Reads pixel_aovs; writes pixel_display (R in the lowest byte).
 #include "layout.glsl"
 #include "picture/false_color.glsl"
 
-layout(local_size_x = TILE_SIZE, local_size_y = TILE_SIZE) in;
+layout(local_size_x = PIXEL_GROUP_SIZE, local_size_y = PIXEL_GROUP_SIZE) in;
 layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
 layout(std430, set = 0, binding = BIND_PIXEL_AOVS) readonly buffer PixelAovsBlock { PixelAovs pixel_aovs[]; };
 layout(std430, set = 0, binding = BIND_PIXEL_DISPLAY) writeonly buffer PixelDisplayBlock { uint pixel_display[]; };

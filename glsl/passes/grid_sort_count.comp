@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_ballot : require
-// Grid, sort, 1 of 3: each workgroup goes through build.tiles_per_group tiles of GRID_BLOCK_SIZE pairs. It counts how
+// Grid, sort, 1 of 3: each workgroup goes through build.blocks_per_group blocks of GRID_BLOCK_SIZE pairs. It counts how
 // many of their pairs have each value of one digit of the cell's index. grid_spine.comp is the second kernel. The
 // sort is a least-significant-digit radix sort (Satish, Harris, Garland, "Designing efficient sorting algorithms for
 // manycore GPUs", 2009).
@@ -18,8 +18,8 @@ shared uint n_by_digit[GRID_DIGITS];
 void main() {
     if (gl_LocalInvocationIndex < GRID_DIGITS) n_by_digit[gl_LocalInvocationIndex] = 0u;
     barrier();
-    uint begin = gl_WorkGroupID.x * build.tiles_per_group * GRID_BLOCK_SIZE;
-    uint end = min(begin + build.tiles_per_group * GRID_BLOCK_SIZE, build.n_pairs);
+    uint begin = gl_WorkGroupID.x * build.blocks_per_group * GRID_BLOCK_SIZE;
+    uint end = min(begin + build.blocks_per_group * GRID_BLOCK_SIZE, build.n_pairs);
     for (uint first = begin; first < end; first += SCAN_GROUP_SIZE) {
         uint pair_ix = first + gl_LocalInvocationIndex;
         bool has_pair = pair_ix < end;

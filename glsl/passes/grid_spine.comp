@@ -46,7 +46,7 @@ void finish(uint total) {
     size_dispatches();
 }
 
-uint part_of(uint begin, uint end, uint first, uint i) {
+uint counts_of(uint begin, uint end, uint first, uint i) {
     return first + i < end ? scan_blocks[begin + first + i] : 0u;
 }
 
@@ -57,9 +57,9 @@ void main() {
     uint mine = min(scan_rank() * n_each, n), end = min(mine + n_each, n);
     uint sum = 0u;
     for (uint first = mine; first < end; first += N_AT_ONCE) {
-        uint part[N_AT_ONCE];
-        for (uint i = 0u; i < N_AT_ONCE; ++i) part[i] = part_of(begin, end, first, i);
-        for (uint i = 0u; i < N_AT_ONCE; ++i) sum = sum + part[i] < sum ? 0xffffffffu : sum + part[i];
+        uint counts[N_AT_ONCE];
+        for (uint i = 0u; i < N_AT_ONCE; ++i) counts[i] = counts_of(begin, end, first, i);
+        for (uint i = 0u; i < N_AT_ONCE; ++i) sum = sum + counts[i] < sum ? 0xffffffffu : sum + counts[i];
     }
     uint total, n_65536;
     uint before = workgroup_exclusive_add(sum, total);
@@ -67,11 +67,11 @@ void main() {
     // whether the total has.
     workgroup_exclusive_add(sum >> 16, n_65536);
     for (uint first = mine; first < end; first += N_AT_ONCE) {
-        uint part[N_AT_ONCE];
-        for (uint i = 0u; i < N_AT_ONCE; ++i) part[i] = part_of(begin, end, first, i);
+        uint counts[N_AT_ONCE];
+        for (uint i = 0u; i < N_AT_ONCE; ++i) counts[i] = counts_of(begin, end, first, i);
         for (uint i = 0u; i < N_AT_ONCE; ++i) {
             if (first + i < end) scan_blocks[begin + first + i] = before;
-            before += part[i];
+            before += counts[i];
         }
     }
     barrier();

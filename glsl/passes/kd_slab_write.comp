@@ -12,10 +12,10 @@ layout(std430, set = 0, binding = BIND_KD_SLAB_PATCHES) readonly buffer PatchesB
 layout(std430, set = 0, binding = BIND_KD_SLAB_EXTENTS) readonly buffer ExtentsBlock { KdSlabExtent extents[]; };
 layout(std430, set = 0, binding = BIND_KD_SLAB_SLABS) writeonly buffer SlabsBlock { Slab slabs[]; };
 
-// The reach of a slab beyond the parts, in units of the epsilon of planes.rs at its scale. There, rounding may move a
+// The reach of a slab beyond the pieces, in units of the epsilon of planes.rs at its scale. There, rounding may move a
 // slab by 5 units of 2^-24 of the length of that scale. Here it moves the slab by 7: 5.2 for the height of the cell's
 // centre and 1.7 for the offset. REACH makes up for that: it adds 16 units. What is left of the errors are shares of
-// heights from the cell's centre, which SLACK covers (slab_parts.glsl).
+// heights from the cell's centre, which SLACK covers (slab_pieces.glsl).
 const float REACH = 1.0625;
 // 1 / half is off by 5 units of 2^-24, and its product with an extent by 2 more. The thickness makes up for that.
 const float THICKENING = 1.000001;

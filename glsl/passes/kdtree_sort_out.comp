@@ -36,12 +36,12 @@ uint sides_by_bounds(KdReference reference, KdCell cell) {
 
 // Splits a reference that its plane cuts, and returns its sides.
 uint split(uint reference_ix) {
-    KdReference reference = references_from[reference_ix], part_above;
-    split_reference(triangles[reference.triangle_ix], cells_from[reference.cell_ix], reference, part_above);
-    bool is_below = !is_empty(reference), is_above = !is_empty(part_above);
-    // Only a reference with parts on both sides is read from two places.
-    references_from[reference_ix] = is_below ? reference : part_above;
-    if (is_below) above[reference_ix] = part_above;
+    KdReference reference = references_from[reference_ix], piece_above;
+    split_reference(triangles[reference.triangle_ix], cells_from[reference.cell_ix], reference, piece_above);
+    bool is_below = !is_empty(reference), is_above = !is_empty(piece_above);
+    // Only a reference with pieces on both sides is read from two places.
+    references_from[reference_ix] = is_below ? reference : piece_above;
+    if (is_below) above[reference_ix] = piece_above;
     return (is_below ? BELOW : 0u) | (is_above ? ABOVE : 0u);
 }
 

@@ -37,7 +37,7 @@ uvec3 exclusive_add(uvec3 value, out uvec3 total) {
     return before;
 }
 
-uvec3 part_of(uint begin, uint end, uint i) {
+uvec3 counts_of(uint begin, uint end, uint i) {
     return i < end ? scan_blocks[begin + i].xyz : uvec3(0u);
 }
 
@@ -63,9 +63,9 @@ void finish_cells(uint cutoff, uvec3 sums) {
 void find_full(uvec2 mine, uint begin, uvec3 before) {
     KdLevel level = levels[stage.level_ix];
     for (uint i = mine.x; i < mine.y; ++i) {
-        uvec4 part = scan_blocks[begin + i];
-        before += part.xyz;
-        if (has_room(level, before, part.w)) continue;
+        uvec4 counts = scan_blocks[begin + i];
+        before += counts.xyz;
+        if (has_room(level, before, counts.w)) continue;
         atomicMin(first_full, i);
         break;
     }
@@ -79,22 +79,22 @@ void main() {
     if (gl_LocalInvocationIndex == 0u) first_full = 0xffffffffu;
     uvec3 sum = uvec3(0u);
     for (uint first = mine.x; first < mine.y; first += N_AT_ONCE) {
-        uvec3 part[N_AT_ONCE];
-        for (uint i = 0u; i < N_AT_ONCE; ++i) part[i] = part_of(begin, mine.y, first + i);
-        for (uint i = 0u; i < N_AT_ONCE; ++i) sum += part[i];
+        uvec3 counts[N_AT_ONCE];
+        for (uint i = 0u; i < N_AT_ONCE; ++i) counts[i] = counts_of(begin, mine.y, first + i);
+        for (uint i = 0u; i < N_AT_ONCE; ++i) sum += counts[i];
     }
     uvec3 total;
     uvec3 before = exclusive_add(sum, total);
     if (SCANS == KD_SCANS_CELLS) find_full(mine, begin, before);
     barrier();
     for (uint first = mine.x; first < mine.y; first += N_AT_ONCE) {
-        uvec3 part[N_AT_ONCE];
-        for (uint i = 0u; i < N_AT_ONCE; ++i) part[i] = part_of(begin, mine.y, first + i);
+        uvec3 counts[N_AT_ONCE];
+        for (uint i = 0u; i < N_AT_ONCE; ++i) counts[i] = counts_of(begin, mine.y, first + i);
         for (uint i = 0u; i < N_AT_ONCE; ++i) {
             if (first + i >= mine.y) break;
             if (first + i == first_full) sums_before_full = before;
             scan_blocks[begin + first + i] = uvec4(before, 0u);
-            before += part[i];
+            before += counts[i];
         }
     }
     barrier();

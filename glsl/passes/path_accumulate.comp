@@ -1,8 +1,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Path accumulate: one invocation per pixel of the window, in tiles, and per layer of light adds the sum of the frame's
-// samples to those of earlier frames, and replaces it by the mean of all samples. The first layer, z = 0, is the
-// picture itself.
+// Path accumulate: one invocation per pixel of the window, in squares, and per layer of light adds the sum of the
+// frame's samples to those of earlier frames, and replaces it by the mean of all samples. The first layer, z = 0, is
+// the picture itself.
 //
 // All samples of a picture are added in one binary tree, whose leaves are the samples in the order of their indices: a
 // sum of 2^n samples that begins at a multiple of 2^n is the sum of its two halves. So the picture has the same bits
@@ -12,7 +12,7 @@
 // Updates pixel_accumulated and pixel_radiance (the frame's sum, then the mean).
 #include "layout.glsl"
 
-layout(local_size_x = TILE_SIZE, local_size_y = TILE_SIZE) in;
+layout(local_size_x = PIXEL_GROUP_SIZE, local_size_y = PIXEL_GROUP_SIZE) in;
 layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
 layout(std430, set = 0, binding = BIND_PIXEL_RADIANCE) buffer PixelRadianceBlock { vec4 pixel_radiance[]; };
 layout(std430, set = 0, binding = BIND_PIXEL_ACCUMULATED) buffer PixelAccumulatedBlock { vec4 pixel_accumulated[]; };

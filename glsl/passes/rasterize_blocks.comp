@@ -26,15 +26,15 @@ uvec2 halves(uint packed) {
     return uvec2(packed & 0xffffu, packed >> 16);
 }
 
-// Tests the pixels of a block that the triangle may cover. Each invocation takes one pixel of each tile of
-// TILE_SIZE x TILE_SIZE pixels.
+// Tests the pixels of a block that the triangle may cover. Each invocation takes one pixel of each square of
+// PIXEL_GROUP_SIZE x PIXEL_GROUP_SIZE pixels.
 void rasterize(Triangle triangle, uint triangle_ix, Rectangle block) {
     vec3 a = triangle.v0 - frame.eye, b = triangle.v1 - frame.eye, c = triangle.v2 - frame.eye;
     EdgeHeights heights = edge_heights(a, b, c, block);
     if (misses(heights, block)) return;
-    uvec2 in_tile = uvec2(gl_LocalInvocationIndex % TILE_SIZE, gl_LocalInvocationIndex / TILE_SIZE);
-    for (uint y = in_tile.y; y < block.size.y; y += RAY_GROUP_SIZE / TILE_SIZE) {
-        for (uint x = in_tile.x; x < block.size.x; x += TILE_SIZE) {
+    uvec2 in_square = uvec2(gl_LocalInvocationIndex % PIXEL_GROUP_SIZE, gl_LocalInvocationIndex / PIXEL_GROUP_SIZE);
+    for (uint y = in_square.y; y < block.size.y; y += RAY_GROUP_SIZE / PIXEL_GROUP_SIZE) {
+        for (uint x = in_square.x; x < block.size.x; x += PIXEL_GROUP_SIZE) {
             uvec2 offset = uvec2(x, y);
             if (!misses_pixel(heights, offset)) test_pixel(block.first + offset, triangle, triangle_ix);
         }

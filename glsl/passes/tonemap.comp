@@ -1,13 +1,13 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Tonemap: one invocation per pixel of the window, in tiles, applies the exposure and a tone curve and encodes the
+// Tonemap: one invocation per pixel of the window, in squares, applies the exposure and a tone curve and encodes the
 // result as sRGB with 8 bits per channel.
 // Reads pixel_filtered; writes pixel_display (R in the lowest byte).
 #include "layout.glsl"
 #include "picture/display.glsl"
 #include "picture/tone_curves.glsl"
 
-layout(local_size_x = TILE_SIZE, local_size_y = TILE_SIZE) in;
+layout(local_size_x = PIXEL_GROUP_SIZE, local_size_y = PIXEL_GROUP_SIZE) in;
 layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
 layout(std430, set = 0, binding = BIND_PIXEL_FILTERED) readonly buffer PixelFilteredBlock { vec4 pixel_filtered[]; };
 layout(std430, set = 0, binding = BIND_PIXEL_DISPLAY) writeonly buffer PixelDisplayBlock { uint pixel_display[]; };

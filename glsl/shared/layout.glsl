@@ -9,9 +9,9 @@
 
 // Invocations of a workgroup in ray kernels. An invocation handles one ray, or none (`MOST_LANES_LOG2`).
 #define RAY_GROUP_SIZE 64u
-// Side of the square of pixels that a workgroup of a pixel kernel handles. It is also the side of the tiles in whose
+// Side of the square of pixels that a workgroup of a pixel kernel handles. It is also the side of the squares in whose
 // order pixels are rendered.
-#define TILE_SIZE 8u
+#define PIXEL_GROUP_SIZE 8u
 // Base-2 logarithm of the most lanes that one ray gets. If a dispatch has fewer rays than the device has lanes, each
 // ray gets several lanes, a power of two. Only the first of them works, so that fewer divergent rays share a
 // subgroup.
@@ -215,14 +215,14 @@
 // The greatest magnitude of a transformed texture coordinate. Others are replaced by it, and NaN by 0.
 #define TEXTURE_MAX_COORDINATE 1048576.0
 
-// Bit of `child_kinds`: a reflected ray continues from the hit. It precedes a transmitted one in the queue.
+// Bit of `child_flags`: a reflected ray continues from the hit. It precedes a transmitted one in the queue.
 #define CHILD_REFLECTED 1u
-// Bit of `child_kinds`: a transmitted ray continues from the hit.
+// Bit of `child_flags`: a transmitted ray continues from the hit.
 #define CHILD_TRANSMITTED 2u
-// What `child_kinds` has for a path that goes on. This and the next constant are counts in the two halves of a word, so
+// What `child_flags` has for a path that goes on. This and the next constant are counts in the two halves of a word, so
 // that one prefix sum over a workgroup counts both.
 #define PATH_GOES_ON 1u
-// What `child_kinds` has, in addition, for a path with a shadow ray to a light.
+// What `child_flags` has, in addition, for a path with a shadow ray to a light.
 #define PATH_HAS_SHADOW_RAY 0x10000u
 
 // `light_visibility` of a ray's hit and a light: no shadow ray was traced, since the hit would not show the light.
@@ -445,7 +445,7 @@ struct GridCell {
 // - `tf`: weight of refracted light by colour.
 // - `transmission`, `metallic`, `roughness`: of microfacets (shading/microfacet.glsl), 0..1.
 // - `absorption`: of light in the solid behind the surface, by colour (per world unit).
-// - `clearcoat`: share of the surface that a clear layer covers, 0..1. `clearcoat_roughness`: of this layer, 0..1.
+// - `clearcoat`: share of the surface that a clear coat covers, 0..1. `clearcoat_roughness`: of this coat, 0..1.
 // - `sheen_colour`, `sheen_roughness`: reflectance and roughness (0..1) of the sheen of cloth.
 // - `conductor_eta`, `conductor_k`: complex index of refraction of a metal with `MATERIAL_CONDUCTOR`, by colour.
 //
@@ -482,9 +482,9 @@ struct Material {
 // m11 v + offset_v), where (0, 0) is the image's upper left corner and (1, 1) its lower right one.
 //
 // - `first_texel`: index in `texels` of a table of `n_mips` words. Each of them is the index in `texels` of a mip
-//   level's first texel. A level's texels are stored row by row, from the top.
-// - `size`: of level 0, texels. The width is in bits 0..15, the height in 16..31. Each further level is half as wide
-//   and half as high, rounded down, but at least 1.
+//   mip level's first texel. A mip level's texels are stored row by row, from the top.
+// - `size`: of mip level 0, texels. The width is in bits 0..15, the height in 16..31. Each further mip level is half as
+//   wide and half as high, rounded down, but at least 1.
 // - `flags`: `TEXTURE_SRGB` and its like.
 // - `n_mips`: down to the mip level of one texel.
 struct Texture {
@@ -636,7 +636,7 @@ struct AreaLight {
 #define AREA_SPHERE 2u
 #define AREA_SUN 3u
 
-// Replaces the index of a part of `texture_words` that the scene does not have.
+// Replaces the index of an array in `texture_words` that the scene does not have.
 #define NO_WORDS 0xffffffffu
 
 // What a corner of a triangle has beside its position and normal, 8 bytes.
@@ -679,7 +679,7 @@ struct CornerSurface {
 #define MAPS_CORNERS_HAVE_OPACITY 8u
 
 // A ray of a picture, 48 bytes. Its hits have t in `(0, t_max]`. In frames with `Frame.extra_bounces`, `t_max` also
-// says how many levels of rays the ray has used (shading/children.glsl).
+// says the ray's depth (shading/children.glsl).
 //
 // - `origin`: world units.
 // - `pixel_ix`: index of the pixel that receives the ray's light, rows from the top of the window.
@@ -765,12 +765,12 @@ struct ShadowRay {
 #define SAMPLE_BLOCK_LOG2 4u
 // Base-2 logarithm of the most samples of each pixel that a frame of paths draws.
 #define MOST_SAMPLES_LOG2 8u
-// Side of a noise tile, which gets samples until its noise is low (pixels). A multiple of `TILE_SIZE`.
+// Side of a noise tile, which gets samples until its noise is low (pixels). A multiple of `PIXEL_GROUP_SIZE`.
 #define NOISE_TILE_SIZE 16u
 // The most noise tiles that are drawn together. Their words fill the smallest uniform buffer that a device may have.
 #define MOST_NOISE_TILES 4096u
 // `Frame.window_x` if the window is a column of noise tiles (rays/noise_tiles.glsl).
-#define WINDOW_OF_TILES 0xffffffffu
+#define WINDOW_OF_NOISE_TILES 0xffffffffu
 // The least pdf, per steradian, with which a lobe samples a direction in which it sees the studio. That of diffuse
 // surfaces is at most 1 / pi.
 #define STUDIO_LEAST_PDF 1.0
@@ -822,11 +822,11 @@ struct Hit {
 // - `exposure`: factor of radiance before the tone curve.
 // - `denoise_threshold`: a pixel is smoothed if the differences between its luminance and those of its four
 //   neighbours add up to more than this.
-// - `max_depth`: bounces, of which the camera's rays are the first: one for each level of rays, and `extra_bounces`.
+// - `max_depth`: bounces, of which the camera's rays are the first: one for each ray depth, and `extra_bounces`.
 // - `queue_capacity`: rays that the ray queue has room for.
 // - `picture_width`, `picture_height`: of the whole picture (pixels).
 // - `window_x`, `window_y`: the picture's pixel at which the window begins. Of paths, `window_x` can also be
-//   `WINDOW_OF_TILES`, and `window_y` is the number of samples that each tile gets then.
+//   `WINDOW_OF_NOISE_TILES`, and `window_y` is the number of samples that each tile gets then.
 // - `sample_x`, `sample_y`: position of the frame's sample in each pixel (pixels from its upper left corner).
 // - `n_samples`: samples of each pixel so far, including this frame's.
 // - `n_lanes`: lanes of the device, which are shared out if there are fewer rays. 0: each ray gets one lane.
@@ -841,8 +841,8 @@ struct Hit {
 //   `samples_reciprocal`: 1 / `n_samples`. The host divides, because devices round quotients in different ways.
 // - `has_studio`: 1 if metals and glass mirror a studio (shading/studio.glsl). `to_viewer`: horizontal unit vector
 //   towards the viewer for whom it was set up, world space.
-// - `extra_bounces`: bounces beside the levels of rays, for rays that pass straight through blended surfaces, which use
-//   no level. 0 if the scene has no such surfaces, and in frames of paths.
+// - `extra_bounces`: bounces in addition to the ray depths, for rays that pass straight through blended surfaces, which
+//   make them no deeper. 0 if the scene has no such surfaces, and in frames of paths.
 struct Frame {
     mat4 clip_from_world;
     vec3 eye;
@@ -1146,7 +1146,7 @@ struct AccelConstants {
 // Whether shadow rays are alpha-tested: whether there are masked or blended materials.
 #define CONSTANT_SHADOW_ALPHA_TEST 23u
 
-// Whether rays can pass through blended surfaces without using a level of rays: whether there are such surfaces.
+// Whether rays can pass through blended surfaces without getting deeper: whether there are such surfaces.
 #define CONSTANT_BLENDED 20u
 // Whether camera rays pass through back faces: whether there are single-sided materials (shading/back_faces.glsl).
 #define CONSTANT_CULLS_BACK_FACES 21u
@@ -1172,7 +1172,7 @@ struct AccelConstants {
 
 // Push constants of the kernels of a frame.
 //
-// - `first_pixel`, `n_pixels`: the batch's pixels, `[first_pixel, first_pixel + n_pixels)` in tile order.
+// - `first_pixel`, `n_pixels`: the batch's pixels, `[first_pixel, first_pixel + n_pixels)` in the order of the queue.
 // - `bounce_ix`: index of the batch's row in `bounces` for the bounce of this depth. Kernels that light the rays of
 //   all bounces get the batch's first row.
 // - `depth`: of the bounce, 0 for the camera's rays and for kernels that light all rays.
@@ -1202,15 +1202,16 @@ struct FalseColor {
     float brightest;
 };
 
-// Push constants of `atrous_filter.comp`: the number of the filter's step, from 0 to `EDGE_STEPS - 1`.
-struct EdgeStep {
-    uint step_ix;
+// Push constants of `atrous_filter.comp`: the number of the filter's iteration, from 0 to `N_ATROUS_ITERATIONS - 1`.
+struct AtrousIteration {
+    uint iteration_ix;
 };
 
-// The number of steps of the noise filter `edge`, which is odd. Step i compares pixels at multiples of 2^i pixels.
-#define EDGE_STEPS 5u
-// How far the light of another pixel can get by all steps: 2 * (2^EDGE_STEPS - 1), and the radius of the square in
-// which the variance is estimated (pixels).
+// The number of iterations of the noise filter `edge`, which is odd. Iteration i compares pixels at multiples of 2^i
+// pixels.
+#define N_ATROUS_ITERATIONS 5u
+// How far the light of another pixel can get by all iterations: 2 * (2^N_ATROUS_ITERATIONS - 1), and the radius of the
+// square in which the variance is estimated (pixels).
 #define EDGE_BORDER 65u
 
 // Push constants of `present.frag`, which shows a picture in a window: the sizes of both (pixels).
@@ -1375,7 +1376,7 @@ struct GridBuild {
     uint pairs_begin;
     uint cells_begin;
     // Blocks that a workgroup of the sort goes through.
-    uint tiles_per_group;
+    uint blocks_per_group;
     // Workgroups of an attempt's indirect dispatches, in their order: over upper cells, over items, over columns.
     // They are 0, except for the dispatch that counts what `counts` says.
     uint cell_groups_x;
@@ -1529,7 +1530,7 @@ struct KdLevel {
     uint pair_groups_z;
 };
 
-// A reference of a kd-tree's build: a triangle in a cell, and the bounds of its part there, grown by its margin
+// A reference of a kd-tree's build: a triangle in a cell, and the bounds of its piece there, grown by its margin
 // (`Reference` in src/accel/bounds.rs). `cell_ix` is among the cells of the level.
 struct KdReference {
     vec3 box_min;
@@ -1650,7 +1651,7 @@ struct KdSlabExtent {
 #define BIND_RAYS 8u
 // A word for each ray: bits of `CHILD_REFLECTED` and its like. In frames of paths, it is `PATH_GOES_ON` and
 // `PATH_HAS_SHADOW_RAY`.
-#define BIND_CHILD_KINDS 9u
+#define BIND_CHILD_FLAGS 9u
 // A word for each ray: the index of its first child in the queue. A ray without children has the index that a child
 // of it would have.
 #define BIND_FIRST_CHILDREN 10u
@@ -1671,7 +1672,7 @@ struct KdSlabExtent {
 // surfaces, as many elements follow for each of the `LIGHT_LAYERS` layers, then for each of the `SURFACE_LAYERS`.
 #define BIND_PIXEL_RADIANCE 16u
 // A vec4 for each pixel: the radiance after noise reduction. With the filter `edge`, as many elements follow: the light
-// on surfaces, and in w the variance of its luminance, between two steps of the filter.
+// on surfaces, and in w the variance of its luminance, between two iterations of the filter.
 #define BIND_PIXEL_FILTERED 17u
 // A word for each pixel: what is displayed, 8 bits a channel, R in the lowest byte.
 #define BIND_PIXEL_DISPLAY 18u
@@ -1773,7 +1774,7 @@ struct KdSlabExtent {
 // One `KdReference` for each reference of the level.
 #define BIND_KD_REFERENCES_FROM 132u
 #define BIND_KD_REFERENCES_TO 133u
-// For each reference that its cell's plane cuts: the part above. The part below replaces the reference itself.
+// For each reference that its cell's plane cuts: the piece above. The piece below replaces the reference itself.
 #define BIND_KD_ABOVE 134u
 // One `KdCell` for each open cell of the level.
 #define BIND_KD_CELLS_FROM 135u
@@ -1824,7 +1825,7 @@ struct KdSlabExtent {
 #define BIND_KD_SLAB_PATCHES 199u
 // One `KdSlabExtent` for each node.
 #define BIND_KD_SLAB_EXTENTS 200u
-// A vec4 for each entry: the area vector of the part of its triangle near its leaf (scaled units), and 0.
+// A vec4 for each entry: the area vector of the piece of its triangle near its leaf (scaled units), and 0.
 #define BIND_KD_SLAB_AREAS 201u
 // A word for each candidate with more than `KD_SLAB_SMALL` entries: its node, in any order.
 #define BIND_KD_SLAB_LARGE 202u

@@ -79,15 +79,18 @@ impl<'a> Columns<'a> {
         }
     }
 
-    /// Cuts the first `n` rows off, in parts of `len` and a rest.
-    pub fn split_off_parts(&mut self, n: usize, len: usize) -> Vec<Columns<'a>> {
+    /// Cuts the first `n` rows off, in chunks of `len` and a rest.
+    pub fn split_off_chunks(&mut self, n: usize, len: usize) -> Vec<Columns<'a>> {
         (0..n).step_by(len).map(|first| self.split_off(len.min(n - first))).collect()
     }
 
     /// Writes hits, one per row.
     pub fn write(mut self, placed: Placed, hits: &[Hit]) {
-        let parts = self.split_off_parts(hits.len(), ROWS_AT_ONCE);
-        parts.into_par_iter().zip(hits.par_chunks(ROWS_AT_ONCE)).for_each(|(part, hits)| part.write_rows(placed, hits));
+        let chunks = self.split_off_chunks(hits.len(), ROWS_AT_ONCE);
+        chunks
+            .into_par_iter()
+            .zip(hits.par_chunks(ROWS_AT_ONCE))
+            .for_each(|(chunk, hits)| chunk.write_rows(placed, hits));
     }
 
     fn write_rows(self, placed: Placed, hits: &[Hit]) {

@@ -10,7 +10,7 @@ use bytemuck::{Zeroable, cast_slice};
 use glam::{DMat4, DVec3, DVec4, Vec3};
 use kdray::{
     accel::Query,
-    cast::{Hit, NO_TRIANGLE, QueryPoint, RAYS_PER_PART, Ray},
+    cast::{Hit, NO_TRIANGLE, QueryPoint, RAYS_PER_CHUNK, Ray},
     engine::Caster,
 };
 use numpy::{
@@ -28,7 +28,7 @@ use super::{
 };
 
 /// Rays that are cast between two looks at Ctrl-C, by a GPU or by others: some tenths of a second.
-const RAYS_AT_ONCE: [usize; 2] = [16 * RAYS_PER_PART, RAYS_PER_PART / 2];
+const RAYS_AT_ONCE: [usize; 2] = [16 * RAYS_PER_CHUNK, RAYS_PER_CHUNK / 2];
 /// The same number of queries that take longer.
 const QUERIES_AT_ONCE: [usize; 2] = [1 << 20, 1 << 16];
 
@@ -53,7 +53,7 @@ type Outputs<'py> = (
 );
 
 /// Of a geometry: vertices (N, 3), triangles (M, 3) and transform (3, 4), which are flat, and the mask.
-type Parts<'py> = (Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f64>>, u8);
+type GeometryArrays<'py> = (Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f64>>, u8);
 
 /// ray_splits, ray_ids, t_hit, geometry_ids, primitive_ids, uvs.
 type Lists<'py> = (
@@ -308,7 +308,7 @@ impl Core {
     }
 
     /// A geometry, or None where one was removed.
-    fn geometry<'py>(&self, py: Python<'py>, id: u32) -> PyResult<Option<Parts<'py>>> {
+    fn geometry<'py>(&self, py: Python<'py>, id: u32) -> PyResult<Option<GeometryArrays<'py>>> {
         let geometry = self.with(py, |state| Ok(state.geometry(id).cloned()))?;
         Ok(geometry.map(|geometry| {
             let rows = geometry.transform.transpose().to_cols_array();
@@ -336,11 +336,14 @@ impl Core {
             let at_once = of_processor(RAYS_AT_ONCE, state);
             in_chunks(state, Queries { n: rows.len(), at_once, mask, pool: &pool }, |first, (caster, placed)| {
                 let n = at_once.min(rows.len() - first);
-                let parts: Vec<_> =
-                    columns.split_off_parts(n, RAYS_PER_PART).into_iter().map(|part| Mutex::new(Some(part))).collect();
+                let chunks: Vec<_> = columns
+                    .split_off_chunks(n, RAYS_PER_CHUNK)
+                    .into_iter()
+                    .map(|chunk| Mutex::new(Some(chunk)))
+                    .collect();
                 let take = |begin: usize, hits: &[Hit]| {
-                    let part = locked(&parts[begin / RAYS_PER_PART]).take().expect("each part is taken once");
-                    part.write(placed, hits);
+                    let chunk = locked(&chunks[begin / RAYS_PER_CHUNK]).take().expect("each chunk is taken once");
+                    chunk.write(placed, hits);
                 };
                 let make = |begin: usize, rays: &mut [Ray]| rows.write(first + begin, rays);
                 caster.cast_stream(n, Query::Closest, make, take).map_err(failed)
@@ -365,10 +368,10 @@ impl Core {
             let at_once = of_processor(RAYS_AT_ONCE, state);
             in_chunks(state, Queries { n: rows.len(), at_once, mask, pool: &pool }, |first, (caster, _)| {
                 let n = at_once.min(rows.len() - first);
-                let parts: Vec<_> = output[first..][..n].chunks_mut(RAYS_PER_PART).map(Mutex::new).collect();
+                let chunks: Vec<_> = output[first..][..n].chunks_mut(RAYS_PER_CHUNK).map(Mutex::new).collect();
                 let take = |begin: usize, hits: &[Hit]| {
-                    let mut part = locked(&parts[begin / RAYS_PER_PART]);
-                    part.iter_mut().zip(hits).for_each(|(out, hit)| *out = hit.triangle_ix != NO_TRIANGLE);
+                    let mut chunk = locked(&chunks[begin / RAYS_PER_CHUNK]);
+                    chunk.iter_mut().zip(hits).for_each(|(out, hit)| *out = hit.triangle_ix != NO_TRIANGLE);
                 };
                 let make = |begin: usize, rays: &mut [Ray]| rows.write(first + begin, rays);
                 caster.cast_stream(n, Query::Any, make, take).map_err(failed)

@@ -26,8 +26,8 @@ impl Statistics {
         }
     }
 
-    /// The plural name of the structure's parts: `nodes` or `cells`.
-    pub fn parts(&self) -> &'static str {
+    /// The plural name of the structure's elements: `nodes` or `cells`.
+    pub fn elements(&self) -> &'static str {
         match self {
             Self::KdTree(_) => "nodes",
             Self::Grid(_) => "cells",
@@ -35,7 +35,7 @@ impl Statistics {
     }
 
     /// The number of nodes or cells.
-    pub fn n_parts(&self) -> u64 {
+    pub fn n_elements(&self) -> u64 {
         match self {
             Self::KdTree(tree) => tree.n_nodes,
             Self::Grid(grid) => grid.n_cells,

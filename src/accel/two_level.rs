@@ -95,11 +95,11 @@ impl TwoLevel {
         (options, progress): (&AccelOptions, &Progress),
     ) -> Self {
         let n_built = |(range, given): (&StoredRange, &Option<_>)| if given.is_some() { 0 } else { range.n_triangles };
-        let parts = progress.parts(ranges.iter().zip(&given).map(n_built));
-        let build = |((range, given), part): ((&StoredRange, Option<_>), Progress)| {
-            given.unwrap_or_else(|| Arc::new(BottomLevel::build(range.of(stored), options, &part)))
+        let subtasks = progress.subtasks(ranges.iter().zip(&given).map(n_built));
+        let build = |((range, given), subtask): ((&StoredRange, Option<_>), Progress)| {
+            given.unwrap_or_else(|| Arc::new(BottomLevel::build(range.of(stored), options, &subtask)))
         };
-        let structures = ranges.par_iter().zip(given).zip(parts).map(build).collect();
+        let structures = ranges.par_iter().zip(given).zip(subtasks).map(build).collect();
         Self::of_structures(structures, instances, GeometriesId(Arc::new(())))
     }
 

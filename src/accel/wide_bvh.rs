@@ -8,7 +8,7 @@
 //!
 //! # Why no ray misses a triangle
 //!
-//! The box of a kd-tree's leaf is the part of the leaf's cell that the bounds of the leaf's triangles, grown by their
+//! The box of a kd-tree's leaf is the piece of the leaf's cell that the bounds of the leaf's triangles, grown by their
 //! margins, reach. The builder of the kd-tree could have cut off the rest of the cell as empty by six more splits. So
 //! the proof for the leaves of the kd-tree (bounds.rs) holds for the box, too. If a leaf is halved, the same is true of
 //! each half and its own triangles. All other boxes contain those of their leaves. A ray that enters the box of a leaf
@@ -75,11 +75,11 @@ enum Subtree {
     Inner { bounds: Bounds, children: Box<[Subtree; 2]> },
 }
 
-/// Returns the part of a leaf's cell that the bounds of one of the leaf's triangles, grown by its margin, reach.
-fn part_in(tree: &KdTree, triangle: &Triangle, cell: &Bounds) -> Bounds {
-    let part = Bounds::of(triangle).grown(tree.margin_of(triangle)).intersection(cell);
-    // A triangle of the leaf reaches the cell. If rounding says otherwise, the part is the cell.
-    if (0..3).all(|axis| part.min[axis] <= part.max[axis]) { part } else { *cell }
+/// Returns the piece of a leaf's cell that the bounds of one of the leaf's triangles, grown by its margin, reach.
+fn piece_in(tree: &KdTree, triangle: &Triangle, cell: &Bounds) -> Bounds {
+    let piece = Bounds::of(triangle).grown(tree.margin_of(triangle)).intersection(cell);
+    // A triangle of the leaf reaches the cell. If rounding says otherwise, the piece is the cell.
+    if (0..3).all(|axis| piece.min[axis] <= piece.max[axis]) { piece } else { *cell }
 }
 
 /// Returns half of a box's surface area.
@@ -128,8 +128,8 @@ impl Subtree {
             let (a, b) = triangle_ixs.split_at(triangle_ixs.len() / 2);
             return Self::join(Self::of_leaf(tree, triangles, a, cell), Self::of_leaf(tree, triangles, b, cell));
         }
-        let part_of = |triangle_ix: &u32| part_in(tree, &triangles[*triangle_ix as usize], cell);
-        let Some(bounds) = triangle_ixs.iter().map(part_of).reduce(|a, b| a.union(&b)) else { return Self::Empty };
+        let piece_of = |triangle_ix: &u32| piece_in(tree, &triangles[*triangle_ix as usize], cell);
+        let Some(bounds) = triangle_ixs.iter().map(piece_of).reduce(|a, b| a.union(&b)) else { return Self::Empty };
         let mut triangle_ixs: BlockList = triangle_ixs.iter().copied().collect();
         triangle_ixs.sort_unstable();
         Self::Block { bounds, triangle_ixs }
@@ -332,8 +332,8 @@ mod tests {
         }
     }
 
-    /// For each entry of a leaf, the part of the triangle's bounds in the leaf's cell is in the box of a block that has
-    /// the triangle.
+    /// For each entry of a leaf, the piece of the triangle's bounds in the leaf's cell is in the box of a block that
+    /// has the triangle.
     #[test]
     fn boxes_hold_what_leaves_hold() {
         let triangles = triangles();
@@ -351,8 +351,8 @@ mod tests {
         visit_leaves(&tree, 0, &cell, &mut |triangle_ixs, cell| {
             for &triangle_ix in triangle_ixs {
                 let triangle = &triangles[triangle_ix as usize];
-                let part = Bounds::of(triangle).grown(tree.margin_of(triangle)).intersection(cell);
-                assert!(boxes_of[triangle_ix as usize].iter().any(|around| around.union(&part) == *around));
+                let piece = Bounds::of(triangle).grown(tree.margin_of(triangle)).intersection(cell);
+                assert!(boxes_of[triangle_ix as usize].iter().any(|around| around.union(&piece) == *around));
                 n_entries += 1;
             }
         });

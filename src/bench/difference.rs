@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::rays::RayKind;
+use super::rays::RaySetKind;
 use crate::layout::{Hit, NO_TRIANGLE};
 
 /// Relative difference of two distances to the same triangle that still counts as the same hit. It is large because
@@ -26,7 +26,7 @@ impl Difference {
     ///
     /// # Panics
     /// The numbers of hits differ.
-    pub fn of(kind: RayKind, expected: &[Hit], found: &[Hit]) -> Self {
+    pub fn of(kind: RaySetKind, expected: &[Hit], found: &[Hit]) -> Self {
         assert_eq!(expected.len(), found.len(), "one hit a ray");
         let mut difference = Self::default();
         for (expected, found) in expected.iter().zip(found) {
@@ -71,7 +71,7 @@ impl DriverDifference {
     ///
     /// # Panics
     /// The numbers of hits differ.
-    pub fn of(kind: RayKind, reference: &[Hit], found: &[Hit]) -> Self {
+    pub fn of(kind: RaySetKind, reference: &[Hit], found: &[Hit]) -> Self {
         assert_eq!(reference.len(), found.len(), "one hit a ray");
         let mut apart = Self::default();
         for (reference, found) in reference.iter().zip(found) {
@@ -109,7 +109,7 @@ enum Agreement {
     Different,
 }
 
-fn compare(kind: RayKind, expected: &Hit, found: &Hit) -> Agreement {
+fn compare(kind: RaySetKind, expected: &Hit, found: &Hit) -> Agreement {
     let is_hit = |hit: &Hit| hit.triangle_ix != NO_TRIANGLE;
     let is_same_triangle = expected.triangle_ix == found.triangle_ix;
     let within = |share: f32| (expected.t - found.t).abs() <= share * expected.t.abs();
@@ -132,7 +132,7 @@ mod tests {
     }
 
     /// Returns the numbers of differing and of grazing hits for one wrong hit among right ones.
-    fn counts(kind: RayKind, expected: Hit, found: Hit) -> (u64, u64) {
+    fn counts(kind: RaySetKind, expected: Hit, found: Hit) -> (u64, u64) {
         let right = [hit(1.0, 3), MISS];
         let difference = Difference::of(kind, &[right[0], expected, right[1]], &[right[0], found, right[1]]);
         (difference.n_differing, difference.n_grazing)
@@ -140,7 +140,7 @@ mod tests {
 
     #[test]
     fn a_wrong_hit_is_counted() {
-        for kind in [RayKind::Primary, RayKind::Mirror, RayKind::Diffuse] {
+        for kind in [RaySetKind::Primary, RaySetKind::Mirror, RaySetKind::Diffuse] {
             assert_eq!(counts(kind, hit(2.0, 7), hit(2.0, 7)), (0, 0));
             assert_eq!(counts(kind, hit(2.0, 7), hit(2.0 + 1e-6, 7)), (0, 0));
             assert_eq!(counts(kind, hit(2.0, 7), hit(2.1, 7)), (1, 0));
@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn a_lost_or_invented_hit_is_counted() {
-        for kind in RayKind::ALL {
+        for kind in RaySetKind::ALL {
             assert_eq!(counts(kind, hit(2.0, 7), MISS), (1, 0));
             assert_eq!(counts(kind, MISS, hit(2.0, 7)), (1, 0));
         }
@@ -160,11 +160,11 @@ mod tests {
 
     #[test]
     fn any_hit_is_as_good_as_another() {
-        assert_eq!(counts(RayKind::Shadow, hit(2.0, 7), hit(9.0, 1)), (0, 0));
+        assert_eq!(counts(RaySetKind::Shadow, hit(2.0, 7), hit(9.0, 1)), (0, 0));
     }
 
     /// Returns the numbers of hit-or-miss and of distance differences for one wrong hit among right ones.
-    fn apart(kind: RayKind, reference: Hit, found: Hit) -> (u64, u64) {
+    fn apart(kind: RaySetKind, reference: Hit, found: Hit) -> (u64, u64) {
         let right = [hit(1.0, 3), MISS];
         let apart = DriverDifference::of(kind, &[right[0], reference, right[1]], &[right[0], found, right[1]]);
         assert_eq!(apart.n_differing(), apart.n_hit_or_miss + apart.n_distance);
@@ -173,7 +173,7 @@ mod tests {
 
     #[test]
     fn another_arithmetic_may_find_another_triangle_but_not_another_distance() {
-        for kind in RayKind::ALL {
+        for kind in RaySetKind::ALL {
             let beyond = if kind.is_any_hit() { (0, 0) } else { (0, 1) };
             assert_eq!(apart(kind, hit(2.0, 7), hit(2.0002, 8)), (0, 0));
             assert_eq!(apart(kind, hit(2.0, 7), hit(2.0003, 7)), beyond);

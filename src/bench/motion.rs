@@ -72,9 +72,9 @@ fn frame(renderer: &mut Renderer, animated: &mut AnimatedWorld, moment: f64) -> 
     Ok(FrameTimes { world: animated.work(), upload_ms, profile, wall_ms })
 }
 
-/// A part of a frame, and its times.
+/// A phase of a frame, and its times.
 #[derive(Debug, Serialize)]
-pub struct Part {
+pub struct Phase {
     pub name: &'static str,
     /// None if the device has no timestamps.
     pub ms: Option<Spread>,
@@ -100,9 +100,9 @@ pub struct Report {
     pub fps: f64,
     pub n_frames: usize,
     /// What a frame consists of: pose, build and upload by the host's clock, and all passes by the device's.
-    pub parts: Vec<Part>,
+    pub parts: Vec<Phase>,
     /// The passes, each over all bounces.
-    pub passes: Vec<Part>,
+    pub passes: Vec<Phase>,
     pub wall_ms: Option<Spread>,
     /// Frames per second of the wall clock.
     pub frames_per_s: f64,
@@ -122,12 +122,12 @@ impl Report {
                 names.push(pass.name);
             }
         }
-        let pass = |name| Part { name, ms: of_profiles(&|profile| profile.pass_ms(name)) };
+        let pass = |name| Phase { name, ms: of_profiles(&|profile| profile.pass_ms(name)) };
         let parts = vec![
-            Part { name: "pose", ms: of(|it| it.world.pose_ms) },
-            Part { name: "build", ms: of(|it| it.world.build_ms) },
-            Part { name: "upload", ms: of(|it| it.upload_ms) },
-            Part { name: "passes", ms: of_profiles(&|profile| profile.frame_ms) },
+            Phase { name: "pose", ms: of(|it| it.world.pose_ms) },
+            Phase { name: "build", ms: of(|it| it.world.build_ms) },
+            Phase { name: "upload", ms: of(|it| it.upload_ms) },
+            Phase { name: "passes", ms: of_profiles(&|profile| profile.frame_ms) },
         ];
         let total_ms: f64 = times.iter().map(|it| it.wall_ms).sum();
         let passes = names.into_iter().map(pass).collect();
@@ -146,9 +146,9 @@ impl Report {
         }
     }
 
-    /// Returns a chart of the parts of a frame.
+    /// Returns a chart of the phases of a frame.
     pub fn chart(&self) -> BarChart {
-        let value = |part: &Part| part.ms.map(|ms| ms.median).filter(|ms| *ms > 0.0);
+        let value = |part: &Phase| part.ms.map(|ms| ms.median).filter(|ms| *ms > 0.0);
         BarChart {
             title: format!("A frame of {} on {}", self.scene, self.device),
             unit: "ms".to_owned(),

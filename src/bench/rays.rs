@@ -16,7 +16,7 @@ use crate::{
 /// Purpose of the rays of a set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum RayKind {
+pub enum RaySetKind {
     /// Camera rays through the pixels' centres.
     Primary,
     /// Any-hit rays from each primary hit to the light.
@@ -27,7 +27,7 @@ pub enum RayKind {
     Diffuse,
 }
 
-impl RayKind {
+impl RaySetKind {
     /// All kinds, in the order of decreasing coherence.
     pub const ALL: [Self; 4] = [Self::Primary, Self::Shadow, Self::Mirror, Self::Diffuse];
 
@@ -46,15 +46,15 @@ impl RayKind {
     }
 }
 
-/// Rays of one kind, in the order of the renderer's queue: tile by tile, without gaps. They have no source triangle,
-/// since rays that leave a surface start at a distance from it.
+/// Rays of one kind, in the order of the renderer's queue: square by square, without gaps. They have no source
+/// triangle, since rays that leave a surface start at a distance from it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RaySet {
-    pub kind: RayKind,
+    pub kind: RaySetKind,
     pub rays: Vec<PathRay>,
 }
 
-/// Returns the four sets, in the order of [`RayKind::ALL`]: `width * height` primary rays, and one ray of each other
+/// Returns the four sets, in the order of [`RaySetKind::ALL`]: `width * height` primary rays, and one ray of each other
 /// kind for each of their hits. The same stage gives the same rays.
 pub fn ray_sets(stage: &Stage) -> [RaySet; 4] {
     let bindings = stage.inputs();
@@ -72,7 +72,7 @@ pub fn ray_sets(stage: &Stage) -> [RaySet; 4] {
         leaving(surface, ray, mirrored(ray.direction, surface))
     });
     let diffuse = diffuse_rays(triangle_at, &primary, &hits);
-    let mut sets = RayKind::ALL.into_iter().zip([primary, shadow, mirror, diffuse]);
+    let mut sets = RaySetKind::ALL.into_iter().zip([primary, shadow, mirror, diffuse]);
     std::array::from_fn(|_| sets.next().map(|(kind, rays)| RaySet { kind, rays }).expect("as many sets as kinds"))
 }
 

@@ -10,7 +10,7 @@ use super::{
     Spread,
     chart::{BarChart, Scale, Series},
     difference::Difference,
-    rays::{RayKind, RaySet},
+    rays::{RaySet, RaySetKind},
     stage::Stage,
     traversal::{SetResult, StepsARay, Tracers},
 };
@@ -130,7 +130,7 @@ pub struct Row {
 /// The cost of the rays of a set.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct RayCost {
-    pub rays: RayKind,
+    pub rays: RaySetKind,
     pub n_rays: usize,
     /// Time of the whole set; none where the device has no timestamps.
     pub ms: Option<Spread>,
@@ -193,7 +193,7 @@ pub struct Growth {
 /// Growth of the mean ray of a kind, as ratios.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayGrowth {
-    pub kind: RayKind,
+    pub kind: RaySetKind,
     /// Ratio of its times; none without timestamps.
     pub time: Option<f64>,
     /// Ratio of the numbers of nodes that it visits, which does not depend on caches.
@@ -201,9 +201,9 @@ pub struct RayGrowth {
 }
 
 impl Report {
-    /// Returns the name of the structure's parts: `nodes` or `cells`.
-    pub fn parts(&self) -> &'static str {
-        self.rows.first().map_or("nodes", |row| row.accel.parts())
+    /// Returns the name of the structure's elements: `nodes` or `cells`.
+    pub fn elements(&self) -> &'static str {
+        self.rows.first().map_or("nodes", |row| row.accel.elements())
     }
 
     /// Returns the growth, or `None` if there are fewer than two sizes.

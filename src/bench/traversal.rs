@@ -10,7 +10,7 @@ use super::{
     Spread, WARM_UP,
     chart::{BarChart, Scale, Series},
     difference::Difference,
-    rays::{RayKind, RaySet},
+    rays::{RaySet, RaySetKind},
     stage::Stage,
 };
 use crate::{
@@ -208,7 +208,7 @@ pub(super) fn turns(n_times: u16) -> impl Iterator<Item = u16> {
 /// The results on one set of rays.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SetResult {
-    pub rays: RayKind,
+    pub rays: RaySetKind,
     pub n_rays: usize,
     /// Number of hits that the CPU finds.
     pub n_hits: usize,

@@ -9,7 +9,7 @@ use super::{
     SuspendedRays,
     device_trees::{Arrays, DeviceTrees, Geometries, with_room_for},
     scene_arrays::{Content, Contents, SceneAccess, SceneArrays},
-    surface_kinds::SurfaceKinds,
+    surface_features::SurfaceFeatures,
     texture_words::TextureWords,
     tree_builder::builder_options,
     two_level::{Joined, instance_rows, leaf_triangle},
@@ -66,7 +66,7 @@ pub struct AccelBuffers {
     pub n_triangles: usize,
     /// Whether rays pass through some of the triangles.
     filters: bool,
-    surface_kinds: SurfaceKinds,
+    surface_features: SurfaceFeatures,
     /// The contents of `constants`.
     uploaded: AccelConstants,
     /// Where the trees of geometries are; none unless the device has built some of them.
@@ -94,7 +94,7 @@ impl AccelBuffers {
         let mut made = Self::with_room(context, world.geometry(), words.len())?;
         made.add_materials(context, &scene.triangle_materials)?;
         made.add_words(context, &words)?;
-        made.surface_kinds = SurfaceKinds::of(scene);
+        made.surface_features = SurfaceFeatures::of(scene);
         made.has_emitters = of_paths;
         Ok(made)
     }
@@ -176,23 +176,23 @@ impl AccelBuffers {
         let rows = instance_rows(two, instances, two.node_begins(), &mut constants);
         let (n_nodes, n_entries) = (joined.n_nodes(), joined.n_entries());
         let n_slabs = if context.predicates_branches() { 0 } else { joined.n_slabs() };
-        let write_entries = |first: usize, part: &mut [LeafTriangle]| joined.write_entries(triangles, first, part);
+        let write_entries = |first: usize, chunk: &mut [LeafTriangle]| joined.write_entries(triangles, first, chunk);
         let contents = Contents {
             instance_rows: Content::Elements(&rows),
-            kd_nodes: Content::Written { len: n_nodes, write: &|first, part| joined.write_nodes(first, part) },
+            kd_nodes: Content::Written { len: n_nodes, write: &|first, chunk| joined.write_nodes(first, chunk) },
             kd_parents: match context.loop_limit()? {
                 Some(_) => {
-                    Content::Written { len: n_nodes / 2, write: &|first, part| joined.write_parents(first, part) }
+                    Content::Written { len: n_nodes / 2, write: &|first, chunk| joined.write_parents(first, chunk) }
                 }
                 None => Content::Reserved(n_nodes / 2),
             },
             leaf_triangles: Content::Written { len: n_entries, write: &write_entries },
-            leaf_planes: Content::Written { len: n_entries, write: &|first, part| joined.write_planes(first, part) },
-            kd_slabs: Content::Written { len: n_slabs, write: &|first, part| joined.write_slabs(first, part) },
+            leaf_planes: Content::Written { len: n_entries, write: &|first, chunk| joined.write_planes(first, chunk) },
+            kd_slabs: Content::Written { len: n_slabs, write: &|first, chunk| joined.write_slabs(first, chunk) },
             kd_links: Content::Reserved(6 * n_nodes),
             grid_cells: Content::Written {
                 len: joined.n_cells(),
-                write: &|first, part| joined.write_cells(first, part),
+                write: &|first, chunk| joined.write_cells(first, chunk),
             },
             ..common
         };
@@ -231,7 +231,7 @@ impl AccelBuffers {
     ) -> Result<Self, GpuError> {
         let n_nodes = tree.nodes().len();
         let entries = tree.leaf_triangles();
-        let write_entries = |first: usize, part: &mut [LeafTriangle]| leaf_triangles(triangles, entries, first, part);
+        let write_entries = |first: usize, chunk: &mut [LeafTriangle]| leaf_triangles(triangles, entries, first, chunk);
         let contents = Contents {
             kd_nodes: Content::Elements(tree.nodes()),
             // Suspended rays go back to where they stopped by the parents.
@@ -304,7 +304,7 @@ impl AccelBuffers {
         common: Contents,
     ) -> Result<Self, GpuError> {
         let entries = grid.leaf_triangles();
-        let write_entries = |first: usize, part: &mut [LeafTriangle]| leaf_triangles(triangles, entries, first, part);
+        let write_entries = |first: usize, chunk: &mut [LeafTriangle]| leaf_triangles(triangles, entries, first, chunk);
         let contents = Contents {
             grid_cells: Content::Elements(grid.cells()),
             leaf_triangles: Content::Written { len: entries.len(), write: &write_entries },
@@ -344,7 +344,7 @@ impl AccelBuffers {
             has_emitters: false,
             n_triangles: n_triangles as usize,
             filters: false,
-            surface_kinds: SurfaceKinds::default(),
+            surface_features: SurfaceFeatures::default(),
             structure,
             is_instanced: false,
             uploaded,
@@ -365,9 +365,9 @@ impl AccelBuffers {
         self.upload_constants(context)
     }
 
-    /// Uploads textures and emitters, and notes where their parts begin.
+    /// Uploads textures and emitters, and notes where their arrays begin.
     fn add_words(&mut self, context: &Arc<Context>, words: &TextureWords) -> Result<(), GpuError> {
-        let content = Content::Written { len: words.len(), write: &|first, part| words.write(first, part) };
+        let content = Content::Written { len: words.len(), write: &|first, chunk| words.write(first, chunk) };
         self.arrays.texture_words = content.upload(context, "texture_words", self.access)?;
         words.note_begins(&mut self.uploaded);
         self.upload_constants(context)
@@ -413,9 +413,9 @@ impl AccelBuffers {
         let mut next = self.clone();
         if traversal.needs_parents() && self.arrays.kd_parents.is_empty() {
             let tree = accel.as_kdtree(geometry.triangles());
-            let write = |first: usize, part: &mut [u32]| match (&joined, tree) {
-                (Some(joined), _) => joined.write_parents(first, part),
-                (None, Some(tree)) => part.copy_from_slice(&tree.parents()[first..][..part.len()]),
+            let write = |first: usize, chunk: &mut [u32]| match (&joined, tree) {
+                (Some(joined), _) => joined.write_parents(first, chunk),
+                (None, Some(tree)) => chunk.copy_from_slice(&tree.parents()[first..][..chunk.len()]),
                 (None, None) => unreachable!("a grid has no links"),
             };
             let len = self.arrays.kd_nodes.len() / 2;
@@ -532,7 +532,7 @@ impl AccelBuffers {
             .set(constants::GRID_LEVELS, n_levels)
             .set(constants::INSTANCED, self.is_instanced)
             .set(constants::ITERATION_BUDGET, budget);
-        self.surface_kinds.set(constants, of_paths)
+        self.surface_features.set(constants, of_paths)
     }
 
     /// Uploads the constants, with the arrays' addresses if kernels read by address. They go to a new buffer, since
@@ -553,9 +553,9 @@ impl AccelBuffers {
 }
 
 /// Writes the triangles of the leaves' entries from entry `first` on. `entries`: the index of each entry's triangle.
-pub(super) fn leaf_triangles(triangles: &[Triangle], entries: &[u32], first: usize, part: &mut [LeafTriangle]) {
-    let numbers = &entries[first..][..part.len()];
-    part.par_iter_mut().zip(numbers).for_each(|(entry, &triangle_ix)| *entry = leaf_triangle(triangles, triangle_ix));
+pub(super) fn leaf_triangles(triangles: &[Triangle], entries: &[u32], first: usize, chunk: &mut [LeafTriangle]) {
+    let numbers = &entries[first..][..chunk.len()];
+    chunk.par_iter_mut().zip(numbers).for_each(|(entry, &triangle_ix)| *entry = leaf_triangle(triangles, triangle_ix));
 }
 
 /// Returns for each triangle `TRIANGLE_HIDDEN` if its index is in `hidden`, else 0.

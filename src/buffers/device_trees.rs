@@ -379,7 +379,7 @@ impl DeviceTrees {
             let first = region.nodes.start;
             let TraversalLinks { boxes, mut ropes } = match structure.as_lazy() {
                 Some(tree) => {
-                    let mut nodes = nodes.download_part(first, shown.n_nodes)?;
+                    let mut nodes = nodes.download_range(first, shown.n_nodes)?;
                     let splits = nodes.iter_mut().filter(|node| node.axis_and_child & KD_LEAF == 0);
                     splits.for_each(|node| node.axis_and_child -= (first as u32 / 2) << KD_PAIR_SHIFT);
                     tree.links_of(nodes, traversal)

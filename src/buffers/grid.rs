@@ -250,7 +250,7 @@ fn initial_build(capacities: GridCapacities, options: &GridOptions, regions: &Sc
         columns_begin: regions.columns_begin,
         pairs_begin: regions.pairs_begin,
         cells_begin: regions.cells_begin,
-        tiles_per_group: 1,
+        blocks_per_group: 1,
         cell_groups_z: 1,
         item_groups_z: 1,
         column_groups_z: 1,

@@ -36,7 +36,7 @@ const BINDINGS: [u32; 12] = [
 pub struct TreeBuffers {
     /// What the kernels need to know of the tree: one element.
     pub tree: Buffer<KdSlabTree>,
-    /// The nodes, without slabs. [`Parts::nodes`](crate::accel::kdtree::Parts::nodes) states their order.
+    /// The nodes, without slabs. [`KdArrays::nodes`](crate::accel::kdtree::KdArrays::nodes) states their order.
     pub nodes: Buffer<KdNode>,
     /// The parent of each pair of nodes.
     pub parents: Buffer<u32>,

@@ -8,7 +8,7 @@
 //! raster_queue    large triangles, between the two kernels that rasterize
 //! vertex_indices  the index buffer of the triangles that the graphics pipeline rasterizes
 //! texture_words   textures, and what leads from triangles to them
-//! surface_kinds   which kinds of surfaces a scene has, as specialization constants
+//! surface_features   which features the surfaces of a scene have, as specialization constants
 //! suspended_rays  rays that have spent a dispatch's loop iterations
 //! resources       all of these, with the frame's descriptor set
 //! grid            the build of a grid
@@ -35,7 +35,7 @@ mod queue;
 mod raster_queue;
 mod resources;
 mod scene_arrays;
-mod surface_kinds;
+mod surface_features;
 mod suspended_rays;
 mod texture_words;
 mod tree_builder;

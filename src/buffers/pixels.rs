@@ -23,7 +23,8 @@ pub struct Pixels {
     /// element of `pixel_radiance` (glsl/passes/path_accumulate.comp).
     pub pixel_accumulated: Option<Buffer<[f32; 4]>>,
     /// The radiance after the noise filter. None without a noise filter, in which case later kernels read
-    /// `pixel_radiance`. For the filter `edge`, it has twice as many elements: the second half is between two steps.
+    /// `pixel_radiance`. For the filter `edge`, it has twice as many elements: the second half is between two
+    /// iterations.
     pub pixel_filtered: Option<Buffer<[f32; 4]>>,
     /// The displayed colour, 8 bits each: red in the lowest byte, green, blue, 255.
     pub pixel_display: Buffer<u32>,

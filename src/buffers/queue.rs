@@ -71,7 +71,7 @@ pub struct Queue {
     pub rays: Buffer<PathRay>,
     pub hits: Buffer<Hit>,
     /// Bits that say which rays continue from each hit: a reflected one, a transmitted one (layout.glsl).
-    pub child_kinds: Buffer<u32>,
+    pub child_flags: Buffer<u32>,
     /// The index in `rays` at which a ray's children begin, or would begin if it had any.
     pub first_children: Buffer<u32>,
     pub ray_radiance: Buffer<[f32; 4]>,
@@ -95,7 +95,7 @@ impl Queue {
         Ok(Self {
             rays: Buffer::new(context, "rays", capacity, storage)?,
             hits: Buffer::new(context, "hits", capacity, storage)?,
-            child_kinds: Buffer::new(context, "child_kinds", capacity, storage)?,
+            child_flags: Buffer::new(context, "child_flags", capacity, storage)?,
             first_children: Buffer::new(context, "first_children", capacity, storage)?,
             ray_radiance: Buffer::new(context, "ray_radiance", capacity, storage)?,
             light_visibility: Buffer::new(context, "light_visibility", n_lights * capacity, storage)?,
@@ -114,7 +114,7 @@ impl Queue {
         Ok(Self {
             rays: Buffer::new(context, "rays", capacity, storage)?,
             hits: Buffer::new(context, "hits", capacity, storage)?,
-            child_kinds: Buffer::new(context, "child_kinds", capacity, storage)?,
+            child_flags: Buffer::new(context, "child_flags", capacity, storage)?,
             first_children: Buffer::new(context, "first_children", 0, storage)?,
             ray_radiance: Buffer::new(context, "ray_radiance", 0, storage)?,
             light_visibility: Buffer::new(context, "light_visibility", 0, storage)?,

@@ -412,8 +412,8 @@ impl Resources {
     }
 
     fn layered_dispatch(&self, n_layers: u32) -> Dispatch<'_> {
-        let tile = layout::TILE_SIZE;
-        Dispatch::Threads([self.constants.width, self.constants.height, n_layers], [tile, tile, 1])
+        let side = layout::PIXEL_GROUP_SIZE;
+        Dispatch::Threads([self.constants.width, self.constants.height, n_layers], [side, side, 1])
     }
 
     /// Binds everything that the kernels read and write.

@@ -56,7 +56,7 @@ impl SceneAccess {
 pub enum Content<'a, T> {
     /// Elements that are uploaded.
     Elements(&'a [T]),
-    /// `len` elements, which `write(first, part)` makes in parts: `part` is the elements from `first` on.
+    /// `len` elements, which `write(first, chunk)` makes in chunks: `chunk` is the elements from `first` on.
     Written { len: usize, write: &'a dyn Fn(usize, &mut [T]) },
     /// The elements of a buffer, and what it has been made for: [`SceneAccess::buffer_use`] of the scene.
     OnDevice(Buffer<T>, BufferUse),

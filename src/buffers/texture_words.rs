@@ -1,4 +1,4 @@
-//! The array `texture_words`: everything that textures and emitters need, one part after the other
+//! The array `texture_words`: everything that textures and emitters need, one array after the other
 //! (glsl/shared/shading/texture_words.glsl).
 
 use bytemuck::cast_slice;
@@ -8,14 +8,14 @@ use crate::{
     world::{Emitters, Textures},
 };
 
-const N_PARTS: usize = 11;
+const N_ARRAYS: usize = 11;
 
-/// The parts of the array, in their order: texels, textures, maps of materials, texture coordinates, corners; emitters,
-/// area lights, nodes of the light tree; of the environment's map the alias tables of rows and of texels, and the
-/// texels.
+/// The arrays that are joined, in their order: texels, textures, maps of materials, texture coordinates, corners;
+/// emitters, area lights, nodes of the light tree; of the environment's map the alias tables of rows and of texels, and
+/// the texels.
 pub struct TextureWords<'a> {
-    parts: [&'a [u32]; N_PARTS],
-    /// The constants of the emitters, without the indices at which their parts begin.
+    arrays: [&'a [u32]; N_ARRAYS],
+    /// The constants of the emitters, without the indices at which their arrays begin.
     emitters: AccelConstants,
 }
 
@@ -26,7 +26,7 @@ impl<'a> TextureWords<'a> {
         let [rows, columns, map] = emitters.environment.as_ref().map_or([&[][..]; 3], |environment| {
             [cast_slice(&environment.rows), cast_slice(&environment.columns), cast_slice(&environment.texels)]
         });
-        let parts = [
+        let arrays = [
             &texels[..],
             cast_slice(textures),
             cast_slice(material_maps),
@@ -39,32 +39,32 @@ impl<'a> TextureWords<'a> {
             columns,
             map,
         ];
-        Self { parts, emitters: emitters.constants() }
+        Self { arrays, emitters: emitters.constants() }
     }
 
     /// Returns the number of words.
     pub fn len(&self) -> usize {
-        self.parts.iter().map(|part| part.len()).sum()
+        self.arrays.iter().map(|array| array.len()).sum()
     }
 
     /// Writes the words from index `first` on.
     pub fn write(&self, first: usize, words: &mut [u32]) {
         let (mut begin, end) = (0, first + words.len());
-        for part in self.parts {
-            let (from, to) = (first.max(begin), end.min(begin + part.len()));
+        for array in self.arrays {
+            let (from, to) = (first.max(begin), end.min(begin + array.len()));
             if from < to {
-                words[from - first..to - first].copy_from_slice(&part[from - begin..to - begin]);
+                words[from - first..to - first].copy_from_slice(&array[from - begin..to - begin]);
             }
-            begin += part.len();
+            begin += array.len();
         }
     }
 
-    /// Writes where the parts begin into the constants.
+    /// Writes where the arrays begin into the constants.
     pub fn note_begins(&self, constants: &mut AccelConstants) {
         let mut begin = 0;
-        let begins = self.parts.map(|part| {
-            let here = if part.is_empty() { NO_WORDS } else { begin };
-            begin += part.len() as u32;
+        let begins = self.arrays.map(|array| {
+            let here = if array.is_empty() { NO_WORDS } else { begin };
+            begin += array.len() as u32;
             here
         });
         let [_, textures, maps, uvs, corners, emitters, area_lights, light_nodes, environment, _, _] = begins;
@@ -101,17 +101,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parts_follow_one_another() {
-        let parts: [&[u32]; N_PARTS] = [&[1, 2, 3], &[], &[4], &[5, 6], &[7], &[8], &[], &[9], &[10, 11], &[12], &[13]];
-        let words = TextureWords { parts, emitters: AccelConstants { n_suns: 2, ..AccelConstants::default() } };
+    fn arrays_follow_one_another() {
+        let arrays: [&[u32]; N_ARRAYS] =
+            [&[1, 2, 3], &[], &[4], &[5, 6], &[7], &[8], &[], &[9], &[10, 11], &[12], &[13]];
+        let words = TextureWords { arrays, emitters: AccelConstants { n_suns: 2, ..AccelConstants::default() } };
         let mut whole = [0; 13];
         words.write(0, &mut whole);
         assert_eq!((words.len(), whole), (13, [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13]));
         for first in 0..13 {
             for n in 0..=13 - first {
-                let mut part = vec![0; n];
-                words.write(first, &mut part);
-                assert_eq!(part, whole[first..first + n]);
+                let mut array = vec![0; n];
+                words.write(first, &mut array);
+                assert_eq!(array, whole[first..first + n]);
             }
         }
         let mut constants = AccelConstants::default();

@@ -106,7 +106,7 @@ impl TreeBuilder {
             if n_words > 0 {
                 // The kernels leave the colours as they are.
                 let from = (arrays.arrays.texture_words.any(), bytes(arrays.first_word(first_row)));
-                commands.copy_buffer_part(from, (self.corners.any(), 0), bytes(n_words));
+                commands.copy_buffer_range(from, (self.corners.any(), 0), bytes(n_words));
                 commands.barrier(Access::TransferWrite, Access::ComputeWrite); // corners
             }
             deform.record(commands, mesh, posed.pose());

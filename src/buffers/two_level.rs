@@ -68,11 +68,11 @@ impl<'a> Joined<'a> {
     fn write<T: Pod + Send>(
         begins: &[usize],
         first: usize,
-        part: &mut [T],
+        elements: &mut [T],
         element: impl Fn(usize, usize) -> T + Sync,
     ) {
         const CHUNK: usize = 1 << 14;
-        part.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk_ix, chunk)| {
+        elements.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk_ix, chunk)| {
             let first = first + chunk_ix * CHUNK;
             let mut geometry_ix = begins.partition_point(|begin| *begin <= first) - 1;
             for (ix, written) in (first..).zip(chunk) {
@@ -88,8 +88,8 @@ impl<'a> Joined<'a> {
         &self.two.structures()[geometry_ix]
     }
 
-    pub fn write_nodes(&self, first: usize, part: &mut [KdNode]) {
-        Self::write(self.first_nodes, first, part, |geometry_ix, ix| {
+    pub fn write_nodes(&self, first: usize, chunk: &mut [KdNode]) {
+        Self::write(self.first_nodes, first, chunk, |geometry_ix, ix| {
             let place = KdPlace {
                 first_node: self.first_nodes[geometry_ix] as u32,
                 first_entry: self.first_entries[geometry_ix] as u32,
@@ -99,25 +99,25 @@ impl<'a> Joined<'a> {
         });
     }
 
-    pub fn write_parents(&self, first: usize, part: &mut [u32]) {
+    pub fn write_parents(&self, first: usize, chunk: &mut [u32]) {
         let first_pairs: Vec<_> = self.first_nodes.iter().map(|first| first / 2).collect();
-        Self::write(&first_pairs, first, part, |geometry_ix, ix| {
+        Self::write(&first_pairs, first, chunk, |geometry_ix, ix| {
             self.structure(geometry_ix).parents()[ix] + self.first_nodes[geometry_ix] as u32
         });
     }
 
-    pub fn write_entries(&self, stored: &[Triangle], first: usize, part: &mut [LeafTriangle]) {
-        Self::write(&self.first_entries, first, part, |geometry_ix, ix| {
+    pub fn write_entries(&self, stored: &[Triangle], first: usize, chunk: &mut [LeafTriangle]) {
+        Self::write(&self.first_entries, first, chunk, |geometry_ix, ix| {
             leaf_triangle(stored, self.first_rows[geometry_ix] + self.structure(geometry_ix).leaf_triangles()[ix])
         });
     }
 
-    pub fn write_planes(&self, first: usize, part: &mut [Plane]) {
-        Self::write(&self.first_entries, first, part, |geometry_ix, ix| self.structure(geometry_ix).leaf_planes()[ix]);
+    pub fn write_planes(&self, first: usize, chunk: &mut [Plane]) {
+        Self::write(&self.first_entries, first, chunk, |geometry_ix, ix| self.structure(geometry_ix).leaf_planes()[ix]);
     }
 
-    pub fn write_cells(&self, first: usize, part: &mut [GridCell]) {
-        Self::write(&self.first_cells, first, part, |geometry_ix, ix| {
+    pub fn write_cells(&self, first: usize, chunk: &mut [GridCell]) {
+        Self::write(&self.first_cells, first, chunk, |geometry_ix, ix| {
             let grid = self.structure(geometry_ix).as_grid().expect("only grids have cells");
             let GridCell { first, count } = grid.cells()[ix];
             let is_block = grid.n_levels() == 2 && ix < grid.lattice().n_cubes();
@@ -131,8 +131,8 @@ impl<'a> Joined<'a> {
         if self.two.structures().iter().all(|it| it.slabs().is_empty()) { 0 } else { self.n_nodes() }
     }
 
-    pub fn write_slabs(&self, first: usize, part: &mut [Slab]) {
-        Self::write(self.first_nodes, first, part, |geometry_ix, ix| {
+    pub fn write_slabs(&self, first: usize, chunk: &mut [Slab]) {
+        Self::write(self.first_nodes, first, chunk, |geometry_ix, ix| {
             self.structure(geometry_ix).slabs().get(ix).copied().unwrap_or_default()
         });
     }

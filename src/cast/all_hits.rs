@@ -99,8 +99,8 @@ impl GpuCaster {
                 end += *count as usize;
                 end
             }));
-            for part in parts(&counts, HITS_PER_RAY * self.rays_per_batch as u64) {
-                hits.extend(self.list_part(&kernels, &batch[part.clone()], &counts[part])?);
+            for chunk in chunks(&counts, HITS_PER_RAY * self.rays_per_batch as u64) {
+                hits.extend(self.list_chunk(&kernels, &batch[chunk.clone()], &counts[chunk])?);
             }
         }
         Ok(AllHits::new(ends, hits, most_per_ray.map_or(usize::MAX, |most| most as usize)))
@@ -121,7 +121,7 @@ impl GpuCaster {
     }
 
     /// Returns the hits of rays, as many of each as `counts` says.
-    fn list_part(&self, kernels: &Kernels, rays: &[Ray], counts: &[u32]) -> Result<Vec<Hit>, GpuError> {
+    fn list_chunk(&self, kernels: &Kernels, rays: &[Ray], counts: &[u32]) -> Result<Vec<Hit>, GpuError> {
         let n_hits: u64 = counts.iter().map(|count| u64::from(*count)).sum();
         let limit = (self.context.limits().storage_range / size_of::<Hit>() as u64).min(u64::from(u32::MAX));
         if n_hits > limit {
@@ -175,17 +175,17 @@ fn cursor_at(places: Range<u32>) -> HitCursor {
 const HITS_PER_RAY: u64 = 2;
 
 /// Cuts rays with these counts of hits into ranges that have at most `most` hits each, or a single ray.
-fn parts(counts: &[u32], most: u64) -> Vec<Range<usize>> {
-    let (mut parts, mut first, mut n_hits) = (Vec::new(), 0, 0);
+fn chunks(counts: &[u32], most: u64) -> Vec<Range<usize>> {
+    let (mut chunks, mut first, mut n_hits) = (Vec::new(), 0, 0);
     for (ray_ix, count) in counts.iter().enumerate() {
         n_hits += u64::from(*count);
         if n_hits > most && ray_ix > first {
-            parts.push(first..ray_ix);
+            chunks.push(first..ray_ix);
             (first, n_hits) = (ray_ix, u64::from(*count));
         }
     }
-    parts.push(first..counts.len());
-    parts
+    chunks.push(first..counts.len());
+    chunks
 }
 
 #[cfg(test)]
@@ -193,9 +193,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parts_have_few_hits_or_one_ray() {
-        assert_eq!(parts(&[1, 2, 3, 9, 0, 4], 4), [0..2, 2..3, 3..4, 4..6]);
-        assert_eq!(parts(&[9], 4), vec![0..1]);
-        assert_eq!(parts(&[0, 0], 4), vec![0..2]);
+    fn chunks_have_few_hits_or_one_ray() {
+        assert_eq!(chunks(&[1, 2, 3, 9, 0, 4], 4), [0..2, 2..3, 3..4, 4..6]);
+        assert_eq!(chunks(&[9], 4), vec![0..1]);
+        assert_eq!(chunks(&[0, 0], 4), vec![0..2]);
     }
 }

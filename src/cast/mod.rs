@@ -34,7 +34,9 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 pub(crate) use self::rounds::time_in_turn;
-pub use self::{all_hits::AllHits, closest_point::count_invalid_points, recorded::RecordedCast, stream::RAYS_PER_PART};
+pub use self::{
+    all_hits::AllHits, closest_point::count_invalid_points, recorded::RecordedCast, stream::RAYS_PER_CHUNK,
+};
 #[doc(hidden)]
 pub use self::{kernel::Kernel, rounds::Contender};
 #[cfg(feature = "files")]
@@ -104,7 +106,7 @@ pub struct GpuCaster {
     accel_kind: AccelKind,
     rays_per_batch: usize,
     mask: u8,
-    /// What parts of a stream need, made at its first use.
+    /// What chunks of a stream need, made at its first use.
     lanes: Vec<stream::Lane>,
 }
 

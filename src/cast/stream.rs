@@ -15,13 +15,13 @@ use crate::{
     gpu::GpuError,
 };
 
-/// Number of rays of a part: 16 MiB, and 8 MiB of hits. The device casts them in a fraction of a millisecond.
-pub const RAYS_PER_PART: usize = 1 << 19;
-/// Number of parts that are on their way at the same time. One is cast, one is uploaded or downloaded, and others are
+/// Number of rays of a chunk: 16 MiB, and 8 MiB of hits. The device casts them in a fraction of a millisecond.
+pub const RAYS_PER_CHUNK: usize = 1 << 19;
+/// Number of chunks that are on their way at the same time. One is cast, one is uploaded or downloaded, and others are
 /// made or taken.
 const N_LANES: usize = 4;
 
-/// What a part on its way needs, on the device and on the host.
+/// What a chunk on its way needs, on the device and on the host.
 pub(super) struct Lane {
     tree: AccelBuffers,
     resources: CastResources,
@@ -31,11 +31,11 @@ pub(super) struct Lane {
 
 impl GpuCaster {
     /// Casts `n_rays` rays of which only some are in memory at a time. `make` writes the rays from an index on, at most
-    /// [`RAYS_PER_PART`], and `take` gets their hits. Both are called by several threads of the current rayon pool, in
-    /// any order, and once for each part.
+    /// [`RAYS_PER_CHUNK`], and `take` gets their hits. Both are called by several threads of the current rayon pool, in
+    /// any order, and once for each chunk.
     ///
     /// # Errors
-    /// Memory runs out, or a call fails. Then some parts may have been taken.
+    /// Memory runs out, or a call fails. Then some chunks may have been taken.
     pub fn cast_stream(
         &mut self,
         n_rays: usize,
@@ -44,7 +44,7 @@ impl GpuCaster {
         take: impl Fn(usize, &[Hit]) + Sync,
     ) -> Result<(), GpuError> {
         let kernel = self.prepare_kernel(query)?;
-        let most = RAYS_PER_PART.min(self.rays_per_batch).min(n_rays.max(1));
+        let most = RAYS_PER_CHUNK.min(self.rays_per_batch).min(n_rays.max(1));
         let mut lanes = self.lanes(n_rays.div_ceil(most).min(N_LANES), most)?;
         let (next, caster) = (AtomicUsize::new(0), &*self);
         let run = |lane: &mut Lane| loop {
@@ -79,7 +79,7 @@ impl GpuCaster {
 }
 
 impl CpuCaster<'_> {
-    /// Does what [`GpuCaster::cast_stream`] does, part after part.
+    /// Does what [`GpuCaster::cast_stream`] does, chunk after chunk.
     pub fn cast_stream(
         &self,
         n_rays: usize,
@@ -87,11 +87,11 @@ impl CpuCaster<'_> {
         make: impl Fn(usize, &mut [Ray]),
         take: impl Fn(usize, &[Hit]),
     ) {
-        let mut rays = vec![Ray::zeroed(); RAYS_PER_PART.min(n_rays)];
-        for first in (0..n_rays).step_by(RAYS_PER_PART) {
-            let part = &mut rays[..RAYS_PER_PART.min(n_rays - first)];
-            make(first, part);
-            take(first, &self.cast(part, query));
+        let mut rays = vec![Ray::zeroed(); RAYS_PER_CHUNK.min(n_rays)];
+        for first in (0..n_rays).step_by(RAYS_PER_CHUNK) {
+            let chunk = &mut rays[..RAYS_PER_CHUNK.min(n_rays - first)];
+            make(first, chunk);
+            take(first, &self.cast(chunk, query));
         }
     }
 }

@@ -18,8 +18,8 @@ use kdray::util::text::one_line;
 const PREFIX: &str = "openjd_";
 /// Least time between two lines of progress.
 const PAUSE: Duration = Duration::from_millis(300);
-/// Least step between two lines of progress, percent.
-const STEP: f64 = 0.1;
+/// Least change between two lines of progress, percent.
+const LEAST_CHANGE: f64 = 0.1;
 /// Progress of a stage that is done, if no other stage follows. The last line follows when all files are written.
 const ALMOST: f64 = 0.999;
 
@@ -141,7 +141,7 @@ impl OpenJd {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         state.stages = state.stages.max(stages);
         let percent = self.percent(state.stages);
-        if state.told.is_none_or(|(told, when)| percent >= told + STEP && when.elapsed() >= PAUSE) {
+        if state.told.is_none_or(|(told, when)| percent >= told + LEAST_CHANGE && when.elapsed() >= PAUSE) {
             state.told = Some((percent, Instant::now()));
             say("progress", &format!("{percent:.1}"));
         }

@@ -22,7 +22,7 @@ use super::{
 };
 
 /// Number of the bar's positions per stage.
-const BAR_STEPS: u64 = 1000;
+const BAR_POSITIONS: u64 = 1000;
 
 /// Shows the stages of a command.
 pub struct Progress {
@@ -51,18 +51,18 @@ enum Meter {
 }
 
 impl Meter {
-    /// Returns the position of the bar, in steps of [`BAR_STEPS`] a stage.
+    /// Returns the position of the bar, in units of [`BAR_POSITIONS`] a stage.
     fn position(&self) -> u64 {
         match self {
             Self::Bar(bar) => bar.position(),
-            Self::OpenJd(openjd) => (openjd.stages() * BAR_STEPS as f64).round() as u64,
+            Self::OpenJd(openjd) => (openjd.stages() * BAR_POSITIONS as f64).round() as u64,
         }
     }
 
     fn set_position(&self, position: u64) {
         match self {
             Self::Bar(bar) => bar.set_position(position),
-            Self::OpenJd(openjd) => openjd.set_stages(position as f64 / BAR_STEPS as f64),
+            Self::OpenJd(openjd) => openjd.set_stages(position as f64 / BAR_POSITIONS as f64),
         }
     }
 
@@ -111,7 +111,7 @@ impl Progress {
     /// Notes that the scene of this index begins, whichever stages of the last one were left out.
     pub fn begin_scene(&self, scene_ix: usize) {
         if let Some(meter) = self.meter() {
-            meter.set_position(scene_ix as u64 * self.n_stages * BAR_STEPS);
+            meter.set_position(scene_ix as u64 * self.n_stages * BAR_POSITIONS);
         }
     }
 
@@ -132,7 +132,7 @@ impl Progress {
 
     fn bar(n_stages: u64) -> ProgressBar {
         let style = ProgressStyle::with_template("{bar:20} {msg} {elapsed}").expect("a valid template");
-        let bar = ProgressBar::new(n_stages * BAR_STEPS).with_style(style);
+        let bar = ProgressBar::new(n_stages * BAR_POSITIONS).with_style(style);
         bar.enable_steady_tick(Duration::from_millis(100));
         bar
     }
@@ -154,7 +154,7 @@ impl Progress {
         let begin = self.position();
         let made = work();
         if let Some(meter) = self.meter() {
-            meter.set_position(begin + BAR_STEPS);
+            meter.set_position(begin + BAR_POSITIONS);
         }
         (made, start.elapsed().as_secs_f64() * 1e3)
     }
@@ -229,7 +229,7 @@ impl Observer for StageObserver {
         state.present = Some((ix, begin, share));
         state.shares[ix] = state.shares[ix].max(share);
         let done = state.shares.iter().sum::<f32>() / self.work.len() as f32;
-        self.meter.set_position(self.begin + (done * BAR_STEPS as f32) as u64);
+        self.meter.set_position(self.begin + (done * BAR_POSITIONS as f32) as u64);
         let name = match work {
             Work::Reading | Work::Building => "",
             Work::Images => " images",
@@ -239,18 +239,18 @@ impl Observer for StageObserver {
     }
 }
 
-/// A stage of many equal steps.
-pub struct StepProgress<'a> {
+/// A stage of many equal items.
+pub struct CountedProgress<'a> {
     progress: &'a Progress,
     message: String,
     n_done: u32,
-    n_steps: u32,
-    /// Time after which the stage ends, if it has no number of steps.
+    n_items: u32,
+    /// Time after which the stage ends, if it has no number of items.
     ends_after: Option<Duration>,
-    /// Finished share of the current step, 0 to 1.
-    part: f32,
-    /// Whether the user sees progress within a step.
-    pub shows_parts: bool,
+    /// Finished share of the current item, 0 to 1.
+    item_share: f32,
+    /// Whether the user sees progress within an item.
+    pub shows_item_progress: bool,
     /// Position of the bar when the stage began.
     begin: u64,
     start: Instant,
@@ -258,38 +258,38 @@ pub struct StepProgress<'a> {
 }
 
 impl Progress {
-    /// Returns a counter of steps that shows the stage's progress and the time left. `message` names the stage.
-    pub fn steps(&self, message: &str, n_steps: u32) -> StepProgress<'_> {
+    /// Returns a counter of items that shows the stage's progress and the time left. `message` names the stage.
+    pub fn counted(&self, message: &str, n_items: u32) -> CountedProgress<'_> {
         let (message, start) = (message.to_owned(), Instant::now());
-        let (begin, shows_parts) = (self.position(), matches!(self.shown, Shown::Meter(Meter::Bar(_))));
-        StepProgress {
+        let (begin, shows_item_progress) = (self.position(), matches!(self.shown, Shown::Meter(Meter::Bar(_))));
+        CountedProgress {
             progress: self,
             message,
             n_done: 0,
-            n_steps,
+            n_items,
             ends_after: None,
-            part: 0.0,
-            shows_parts,
+            item_share: 0.0,
+            shows_item_progress,
             begin,
             start,
             last_line: start,
         }
     }
 
-    /// Returns a counter of steps for a stage that ends after a time.
-    pub fn steps_until(&self, message: &str, time: Duration) -> StepProgress<'_> {
-        StepProgress { ends_after: Some(time), ..self.steps(message, u32::MAX) }
+    /// Returns a counter of items for a stage that ends after a time.
+    pub fn counted_until(&self, message: &str, time: Duration) -> CountedProgress<'_> {
+        CountedProgress { ends_after: Some(time), ..self.counted(message, u32::MAX) }
     }
 }
 
-impl StepProgress<'_> {
-    /// Notes that one more step is done.
-    pub fn step(&mut self) {
+impl CountedProgress<'_> {
+    /// Notes that one more item is done.
+    pub fn finish_item(&mut self) {
         /// Least time between two lines if there is no terminal.
         const PAUSE: Duration = Duration::from_secs(5);
         self.n_done += 1;
-        self.part = 0.0;
-        if self.n_done >= self.n_steps {
+        self.item_share = 0.0;
+        if self.n_done >= self.n_items {
             return;
         }
         match &self.progress.shown {
@@ -303,16 +303,16 @@ impl StepProgress<'_> {
         }
     }
 
-    /// Notes that a share of the current step is done, 0 to 1.
-    pub fn part(&mut self, share: f32) {
-        self.part = share.clamp(0.0, 1.0);
+    /// Notes that a share of the current item is done, 0 to 1.
+    pub fn item_progress(&mut self, share: f32) {
+        self.item_share = share.clamp(0.0, 1.0);
         if let Some(meter) = self.progress.meter() {
             self.move_meter(meter);
         }
     }
 
     fn move_meter(&self, meter: &Meter) {
-        meter.set_position(self.begin + (self.share() * BAR_STEPS as f64) as u64);
+        meter.set_position(self.begin + (self.share() * BAR_POSITIONS as f64) as u64);
         meter.set_message(self.text());
     }
 
@@ -321,7 +321,7 @@ impl StepProgress<'_> {
         if let Some(time) = self.ends_after {
             return (self.start.elapsed().as_secs_f64() / time.as_secs_f64()).min(1.0);
         }
-        (f64::from(self.n_done) + f64::from(self.part)) / f64::from(self.n_steps)
+        (f64::from(self.n_done) + f64::from(self.item_share)) / f64::from(self.n_items)
     }
 
     fn text(&self) -> String {
@@ -331,10 +331,10 @@ impl StepProgress<'_> {
             None => time_left(elapsed, self.share()),
         };
         let left = left_text(left);
-        let done = match self.n_steps {
+        let done = match self.n_items {
             _ if self.ends_after.is_some() => format!("{} samples", self.n_done),
             1 => format!("{:.0} %", 100.0 * self.share()),
-            n_steps => format!("{} of {n_steps}", self.n_done),
+            n_items => format!("{} of {n_items}", self.n_done),
         };
         format!("{}: {done}, {left} left", self.message)
     }
@@ -373,61 +373,61 @@ mod tests {
         assert_eq!(time_left(Duration::from_secs(3), 1.0), Duration::ZERO);
         assert_eq!(time_left(Duration::from_secs(3), 0.0), Duration::ZERO);
         let progress = shown(Shown::Nowhere);
-        let mut steps = progress.steps("rendering", 3);
-        steps.step();
-        assert!(steps.text().starts_with("rendering: 1 of 3, ") && steps.text().ends_with(" left"), "{}", steps.text());
-        let mut steps = progress.steps_until("rendering", Duration::from_secs(1000));
-        steps.step();
-        assert_eq!(steps.text(), "rendering: 1 samples, 17 min left");
+        let mut items = progress.counted("rendering", 3);
+        items.finish_item();
+        assert!(items.text().starts_with("rendering: 1 of 3, ") && items.text().ends_with(" left"), "{}", items.text());
+        let mut items = progress.counted_until("rendering", Duration::from_secs(1000));
+        items.finish_item();
+        assert_eq!(items.text(), "rendering: 1 samples, 17 min left");
     }
 
     #[test]
     fn the_bar_moves_while_the_library_works() {
         let bar = ProgressBar::hidden();
-        bar.set_length(3 * BAR_STEPS);
+        bar.set_length(3 * BAR_POSITIONS);
         let progress = shown(Shown::Meter(Meter::Bar(bar.clone())));
         progress.stage("first", || ());
         progress.stage("loading x", || {
             let observer = progress.observer("loading x", &[Work::Reading, Work::Images]);
             let report = |work, share| observer.report(work, share);
             report(Work::Reading, 0.5);
-            assert_eq!(bar.position(), BAR_STEPS + BAR_STEPS / 4);
+            assert_eq!(bar.position(), BAR_POSITIONS + BAR_POSITIONS / 4);
             assert!(bar.message().starts_with("loading x: 50 %, "), "{}", bar.message());
             // These reports come from a late thread, another file, the next work, and work of other stages.
             report(Work::Reading, 0.25);
             assert!(bar.message().starts_with("loading x: 50 %, "), "{}", bar.message());
             report(Work::Reading, 1.0);
             report(Work::Reading, 0.1);
-            assert_eq!(bar.position(), BAR_STEPS + BAR_STEPS / 2);
+            assert_eq!(bar.position(), BAR_POSITIONS + BAR_POSITIONS / 2);
             assert!(bar.message().starts_with("loading x: 10 %, "), "{}", bar.message());
             report(Work::Images, 0.5);
-            assert_eq!(bar.position(), BAR_STEPS + BAR_STEPS * 3 / 4);
+            assert_eq!(bar.position(), BAR_POSITIONS + BAR_POSITIONS * 3 / 4);
             assert!(bar.message().starts_with("loading x: images 50 %, "), "{}", bar.message());
             report(Work::Building, 1.0);
-            assert_eq!(bar.position(), BAR_STEPS + BAR_STEPS * 3 / 4);
+            assert_eq!(bar.position(), BAR_POSITIONS + BAR_POSITIONS * 3 / 4);
         });
-        assert_eq!(bar.position(), 2 * BAR_STEPS);
+        assert_eq!(bar.position(), 2 * BAR_POSITIONS);
         assert_eq!(shown(Shown::Lines).observer("x", &[Work::Reading]), progress::Progress::default());
     }
 
     #[test]
-    fn the_bar_moves_within_a_step() {
+    fn the_bar_moves_within_an_item() {
         let bar = ProgressBar::hidden();
-        bar.set_length(3 * BAR_STEPS);
+        bar.set_length(3 * BAR_POSITIONS);
         let progress = shown(Shown::Meter(Meter::Bar(bar.clone())));
         progress.stage("loading", || ());
         progress.stage("rendering", || {
-            let mut steps = progress.steps("rendering", 2);
-            steps.part(0.5);
-            assert_eq!(bar.position(), BAR_STEPS + BAR_STEPS / 4);
-            steps.step();
-            steps.part(0.5);
-            assert_eq!(bar.position(), BAR_STEPS + BAR_STEPS * 3 / 4);
+            let mut items = progress.counted("rendering", 2);
+            items.item_progress(0.5);
+            assert_eq!(bar.position(), BAR_POSITIONS + BAR_POSITIONS / 4);
+            items.finish_item();
+            items.item_progress(0.5);
+            assert_eq!(bar.position(), BAR_POSITIONS + BAR_POSITIONS * 3 / 4);
             assert!(bar.message().starts_with("rendering: 1 of 2, "), "{}", bar.message());
         });
-        assert_eq!(bar.position(), 2 * BAR_STEPS);
-        let mut alone = progress.steps("rendering", 1);
-        alone.part(0.25);
+        assert_eq!(bar.position(), 2 * BAR_POSITIONS);
+        let mut alone = progress.counted("rendering", 1);
+        alone.item_progress(0.25);
         assert!(bar.message().starts_with("rendering: 25 %, "), "{}", bar.message());
     }
 }

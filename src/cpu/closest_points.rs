@@ -30,7 +30,7 @@ pub fn closest_points(inputs: &KernelInputs, bvh: &WideBvh, points: &[QueryPoint
 /// The search of one thread, with its working memory.
 pub struct WidePointSearch<'a> {
     bvh: &'a WideBvh,
-    level: Level,
+    simd_level: Level,
     stack: Stack,
     /// The triangle that is closest to the point before. It is tested first, since the next point is often near.
     last: u32,
@@ -76,10 +76,10 @@ impl<S: Simd> QueryColumns<S> {
 }
 
 impl<'a> WidePointSearch<'a> {
-    /// Creates a search that uses the instructions of `level`, which the machine must have. The points are the same at
-    /// every level, bit for bit.
-    pub fn new(bvh: &'a WideBvh, level: Level) -> Self {
-        Self { bvh, level, stack: Stack::new(), last: NO_TRIANGLE }
+    /// Creates a search that uses the instructions of `simd_level`, which the machine must have. The points are the
+    /// same at every SIMD level, bit for bit.
+    pub fn new(bvh: &'a WideBvh, simd_level: Level) -> Self {
+        Self { bvh, simd_level, stack: Stack::new(), last: NO_TRIANGLE }
     }
 
     /// Visits all blocks whose boxes may hold the closest point.
@@ -107,7 +107,7 @@ impl PointSearch for WidePointSearch<'_> {
         if self.last != NO_TRIANGLE {
             test(inputs, query, self.last, best);
         }
-        dispatch!(self.level, simd => self.search_by(simd, inputs, query, best));
+        dispatch!(self.simd_level, simd => self.search_by(simd, inputs, query, best));
         self.last = best.triangle_ix;
     }
 }

@@ -87,12 +87,12 @@ fn places<S: Simd>(simd: S, map: &EnvironmentMap, [ux, uy]: [&[f32; LANES]; 2]) 
 
 /// Returns the samples for sixteen pairs of random numbers.
 pub fn environment_samples(
-    level: Level,
+    simd_level: Level,
     emitters: &Emitters,
     map: &EnvironmentMap,
     u: [&[f32; LANES]; 2],
 ) -> [LightSample; LANES] {
-    let Places { right, down, aside, direction: [x, y, z] } = dispatch!(level, simd => places(simd, map, u));
+    let Places { right, down, aside, direction: [x, y, z] } = dispatch!(simd_level, simd => places(simd, map, u));
     std::array::from_fn(|lane| {
         let (place, direction) = (Vec2::new(right[lane], down[lane]), vec3(x[lane], y[lane], z[lane]));
         sample_at_place(emitters, map, direction, place, aside[lane])
@@ -140,8 +140,8 @@ mod tests {
                     let point = random.point();
                     (u[0][lane], u[1][lane]) = (at_bound(point.x, 0), at_bound(point.y, 2));
                 }
-                for level in [Level::new(), Level::baseline()] {
-                    let samples = environment_samples(level, emitters, map, [&u[0], &u[1]]);
+                for simd_level in [Level::new(), Level::baseline()] {
+                    let samples = environment_samples(simd_level, emitters, map, [&u[0], &u[1]]);
                     for (lane, sample) in samples.iter().enumerate() {
                         let at = Vec2::new(u[0][lane], u[1][lane]);
                         assert_eq!(*sample, sample_environment(emitters, at), "{size:?} {at}");

@@ -1,15 +1,15 @@
 //! The fast CPU engine: renders frames and casts rays without Vulkan. The traversal is implemented here, and so are the
-//! steps of path tracing that sixteen paths can take together. All other kernels are those of the
+//! bounces of path tracing that sixteen paths can take together. All other kernels are those of the
 //! [reference](crate::reference). All results equal the reference's, bit for bit.
 //!
 //! ```text
 //! render   the frame, batch by batch, in the order of its plan
 //!   queue    the rays of a batch
 //!   paths    the passes of a batch of paths
-//!     path_begin, path_scatter   the rays of paths, and their steps at hits
+//!     path_begin, path_scatter   the rays of paths, and their scattering at hits
 //!       sampler                  the random numbers of sixteen paths
 //!       environment_samples        the samples of sixteen directions of the environment
-//!       lambertian_surfaces, lambertian_steps, area_lights   the steps of sixteen paths at Lambertian surfaces
+//!       lambertian_surfaces, lambertian_scatter, area_lights   bounces of sixteen paths at Lambertian surfaces
 //!       vec3x16, turns           sixteen vectors; sines and cosines of sixteen angles
 //!   timing   wall-clock times of passes
 //! motion_vectors   where the points that pixels show are in the next frame
@@ -29,7 +29,7 @@ mod area_lights;
 pub mod closest_points;
 pub mod direction_bins;
 mod environment_samples;
-mod lambertian_steps;
+mod lambertian_scatter;
 mod lambertian_surfaces;
 pub mod lanes;
 mod meter;

@@ -24,7 +24,7 @@ use crate::{
 
 /// Traverses packets on one thread, and owns the working memory for that.
 pub struct PacketTraverser {
-    level: Level,
+    simd_level: Level,
     /// The stack for rays that are traced outside a packet.
     single: PendingStack,
     /// The stack of pending subtrees. Its first `size` entries are in use.
@@ -79,9 +79,9 @@ const fn goes_on_alone<S: Simd>() -> bool {
 }
 
 impl PacketTraverser {
-    /// Creates a traverser that uses the instructions of `level`, which the machine must have.
-    pub fn new(level: Level) -> Self {
-        Self { level, single: Pending::new(), entries: [Entry::default(); KD_MAX_DEPTH as usize], size: 0 }
+    /// Creates a traverser that uses the instructions of `simd_level`, which the machine must have.
+    pub fn new(simd_level: Level) -> Self {
+        Self { simd_level, single: Pending::new(), entries: [Entry::default(); KD_MAX_DEPTH as usize], size: 0 }
     }
 
     /// Descends to the first leaf that rays of `cell` enter, and sets `cell` to the rays' t intervals in that leaf.
@@ -205,7 +205,7 @@ impl PacketTraverser {
         search_rays: &RaysSoa,
         n_rays: usize,
     ) -> HitsSoa {
-        dispatch!(self.level, simd => self.traverse_at::<_, ANY_HIT>(simd, inputs, search_rays, n_rays))
+        dispatch!(self.simd_level, simd => self.traverse_at::<_, ANY_HIT>(simd, inputs, search_rays, n_rays))
     }
 
     /// Traces one ray, without a packet. `best` becomes its hit.
@@ -215,6 +215,6 @@ impl PacketTraverser {
         ray: &TraversalRay,
         best: &mut Hit,
     ) {
-        dispatch!(self.level, _simd => search::<_, ANY_HIT>(inputs, ray, &mut self.single, best));
+        dispatch!(self.simd_level, _simd => search::<_, ANY_HIT>(inputs, ray, &mut self.single, best));
     }
 }

@@ -51,7 +51,7 @@ impl PixelOfBatch {
 
 /// Writes the camera ray of each path.
 pub fn path_begin(inputs: &KernelInputs, pixels: &[PixelOfBatch], rays: &mut [PathRay]) {
-    let (level, frame) = (Level::new(), inputs.frame());
+    let (simd_level, frame) = (Level::new(), inputs.frame());
     let pixel_of = |path_ix| &pixels[place_of_path(frame, path_ix) as usize];
     rays.par_chunks_mut(PATHS_PER_TASK).enumerate().for_each(|(task, rays)| {
         for (group, rays) in rays.chunks_mut(LANES).enumerate() {
@@ -60,7 +60,7 @@ pub fn path_begin(inputs: &KernelInputs, pixels: &[PixelOfBatch], rays: &mut [Pa
             for (lane, path_ix) in (first_path..first_path + rays.len() as u32).enumerate() {
                 keys.set(lane, pixel_of(path_ix).key_of_path(frame, path_ix));
             }
-            let [in_pixel, in_lens]: [PairsSoa; 2] = dispatch!(level, simd => random_pairs(simd, &keys, 0));
+            let [in_pixel, in_lens]: [PairsSoa; 2] = dispatch!(simd_level, simd => random_pairs(simd, &keys, 0));
             for (lane, ray) in rays.iter_mut().enumerate() {
                 let [in_pixel, in_lens] = [in_pixel, in_lens].map(|[x, y]| vec2(x[lane], y[lane]));
                 *ray = path_camera_ray(inputs, pixel_of(first_path + lane as u32).at, in_pixel, in_lens);

@@ -1,5 +1,5 @@
 //! Path scatter: the light at the hits of paths, and the rays with which they go on. It does what the reference's pass
-//! does, bit for bit. The random numbers of sixteen paths are computed together, and so are the steps of paths at
+//! does, bit for bit. The random numbers of sixteen paths are computed together, and so are the bounces of paths at
 //! [Lambertian](super::lambertian_surfaces) surfaces.
 
 use arrayvec::ArrayVec;
@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::{
     area_lights::meets_light,
     environment_samples::environment_samples,
-    lambertian_steps::{BounceConstants, Samples, lambertian_steps},
+    lambertian_scatter::{BounceConstants, Samples, lambertian_scatter},
     lambertian_surfaces::{LambertianHits, lambertian_surfaces},
     lanes::{LANES, LaneMask},
     path_begin::PixelOfBatch,
@@ -23,11 +23,11 @@ use crate::{
     reference::{
         emitters::{LightSample, sample_emitter},
         inputs::KernelInputs,
-        live_paths::{Part, parts},
+        live_paths::{PathSlice, path_slices},
         maps::colour_at,
-        path_compact::{counts_of_block, kind_of_path},
+        path_compact::{counts_of_block, flags_of_path},
         path_scatter::PathBuffers,
-        path_vertex::{HitChoices, PAIRS_OF_HIT, first_pair_of, step_past_lights, step_path},
+        path_vertex::{HitChoices, PAIRS_OF_HIT, first_pair_of, scatter_past_lights, scatter_path},
         paths::place_of_path,
         sampler::SampleKey,
         search_ray::SearchRay,
@@ -36,7 +36,7 @@ use crate::{
 };
 
 const BLOCK_SIZE: usize = SCAN_GROUP_SIZE as usize;
-/// The number of paths from which on it is faster to take their steps together.
+/// The number of paths from which on it is faster to scatter them together.
 const LEAST_GROUP: usize = 4;
 
 /// The random decisions at the hits of a group of paths.
@@ -56,7 +56,7 @@ impl GroupChoices {
     }
 }
 
-/// What all steps of a bounce need.
+/// What all paths of a bounce need.
 pub struct BounceOfPaths<'a> {
     pub inputs: &'a KernelInputs<'a>,
     pub batch: &'a Batch,
@@ -66,14 +66,14 @@ pub struct BounceOfPaths<'a> {
     pub are_lambertian: &'a [bool],
     /// The closest hits of paths.
     pub hits: &'a [Hit],
-    pub level: Level,
+    pub simd_level: Level,
 }
 
 /// The paths of a block, one element each.
 struct PathsOfBlock<'a> {
-    rays: Part<'a, PathRay>,
-    states: Part<'a, PathState>,
-    shadow_rays: Part<'a, ShadowRay>,
+    rays: PathSlice<'a, PathRay>,
+    states: PathSlice<'a, PathState>,
+    shadow_rays: PathSlice<'a, ShadowRay>,
 }
 
 /// Does what [`reference::path_scatter`](crate::reference::path_scatter::path_scatter) does.
@@ -81,24 +81,24 @@ pub fn path_scatter(
     bounce: &BounceOfPaths,
     live: &[u32],
     paths: PathBuffers,
-    (child_kinds, scan_blocks): (&mut [u32], &mut [[u32; 2]]),
+    (child_flags, scan_blocks): (&mut [u32], &mut [[u32; 2]]),
 ) {
-    let of_blocks = (live.par_chunks(BLOCK_SIZE), child_kinds.par_chunks_mut(BLOCK_SIZE), scan_blocks.par_iter_mut());
+    let of_blocks = (live.par_chunks(BLOCK_SIZE), child_flags.par_chunks_mut(BLOCK_SIZE), scan_blocks.par_iter_mut());
     let of_paths = (
-        parts(paths.rays, live, BLOCK_SIZE),
-        parts(paths.states, live, BLOCK_SIZE),
-        parts(paths.shadow_rays, live, BLOCK_SIZE),
+        path_slices(paths.rays, live, BLOCK_SIZE),
+        path_slices(paths.states, live, BLOCK_SIZE),
+        path_slices(paths.shadow_rays, live, BLOCK_SIZE),
     );
     of_blocks.into_par_iter().zip(of_paths).for_each(|(of_block, (rays, states, shadow_rays))| {
-        let (live, kinds, counts) = of_block;
-        bounce.step_block(live, kinds, &mut PathsOfBlock { rays, states, shadow_rays });
-        *counts = counts_of_block(kinds);
+        let (live, flags, counts) = of_block;
+        bounce.scatter_block(live, flags, &mut PathsOfBlock { rays, states, shadow_rays });
+        *counts = counts_of_block(flags);
     });
 }
 
 impl BounceOfPaths<'_> {
-    /// Takes the paths of a block one step further. Writes to `kinds` which of them go on and have a shadow ray.
-    fn step_block(&self, live: &[u32], kinds: &mut [u32], paths: &mut PathsOfBlock) {
+    /// Takes the paths of a block one bounce further. Writes to `flags` which of them go on and have a shadow ray.
+    fn scatter_block(&self, live: &[u32], flags: &mut [u32], paths: &mut PathsOfBlock) {
         let mut at_lambertian = ArrayVec::<_, BLOCK_SIZE>::new();
         let (mut at_others, mut missed) = (at_lambertian.clone(), at_lambertian.clone());
         for (place, &path_ix) in live.iter().enumerate() {
@@ -114,18 +114,18 @@ impl BounceOfPaths<'_> {
         }
         for group in at_lambertian.chunks(LANES) {
             if group.len() < LEAST_GROUP {
-                self.step_group(group, &self.choices_of(group), kinds, paths)
+                self.scatter_group(group, &self.choices_of(group), flags, paths)
             } else {
-                self.step_lambertian(group, kinds, paths)
+                self.scatter_lambertian(group, flags, paths)
             }
         }
-        at_others.chunks(LANES).for_each(|group| self.step_group(group, &self.choices_of(group), kinds, paths));
+        at_others.chunks(LANES).for_each(|group| self.scatter_group(group, &self.choices_of(group), flags, paths));
         // Paths that leave the scene need no random numbers.
-        missed.chunks(LANES).for_each(|group| self.step_group(group, &Default::default(), kinds, paths));
+        missed.chunks(LANES).for_each(|group| self.scatter_group(group, &Default::default(), flags, paths));
     }
 
     fn is_lambertian(&self, hit: &Hit) -> bool {
-        // Their steps by sixteen know no instances.
+        // Groups of sixteen know no instances.
         self.inputs.instanced.is_none()
             && self.are_lambertian[self.inputs.triangle_materials[hit.triangle_ix as usize] as usize]
     }
@@ -152,26 +152,26 @@ impl BounceOfPaths<'_> {
             let t_max = if hit.triangle_ix == NO_TRIANGLE { f32::INFINITY } else { hit.t };
             rays.set(lane, &SearchRay { t_max, ..SearchRay::from(&*paths.rays.of_path(path_ix)) });
         }
-        dispatch!(self.level, simd => {
+        dispatch!(self.simd_level, simd => {
             let (origin, direction) = (Vec3x16::load(simd, &rays.origin), Vec3x16::load(simd, &rays.direction));
             let t_max = f32x16::load_array_ref(simd, &rays.t_max);
             meets_light(shapes, origin, direction, t_max).to_bitmask() as LaneMask
         })
     }
 
-    /// Takes a path one step further. Returns its kind: whether it goes on and has a shadow ray.
-    fn step(&self, path_ix: u32, before_light: bool, choices: HitChoices, paths: &mut PathsOfBlock) -> u32 {
+    /// Takes a path one bounce further. Returns its flags: whether it goes on and has a shadow ray.
+    fn scatter(&self, path_ix: u32, before_light: bool, choices: HitChoices, paths: &mut PathsOfBlock) -> u32 {
         let (ray, state) = (paths.rays.of_path(path_ix), paths.states.of_path(path_ix));
         let (inputs, depth, hit) = (self.inputs, self.batch.depth, &self.hits[path_ix as usize]);
         let (goes_on, shadow_ray) = match before_light {
-            true => step_path(inputs, || choices, depth, hit, ray, state),
-            false => step_past_lights(inputs, || choices, depth, hit, ray, state),
+            true => scatter_path(inputs, || choices, depth, hit, ray, state),
+            false => scatter_past_lights(inputs, || choices, depth, hit, ray, state),
         };
         // A path without a shadow ray has none already.
         if shadow_ray.state != SHADOW_RAY_NONE {
             *paths.shadow_rays.of_path(path_ix) = shadow_ray;
         }
-        kind_of_path(goes_on, shadow_ray.state != SHADOW_RAY_NONE)
+        flags_of_path(goes_on, shadow_ray.state != SHADOW_RAY_NONE)
     }
 
     /// Makes the random decisions at the hits of a group of paths. The last ray of a path only meets light, so that no
@@ -183,48 +183,54 @@ impl BounceOfPaths<'_> {
         }
         let depth = self.batch.depth;
         let pairs: [PairsSoa; PAIRS_OF_HIT] =
-            dispatch!(self.level, simd => random_pairs(simd, &keys, first_pair_of(depth)));
+            dispatch!(self.simd_level, simd => random_pairs(simd, &keys, first_pair_of(depth)));
         let emitters = self.inputs.emitters.filter(|_| depth + 1 < self.inputs.frame().max_depth);
         let of_map = |emitters: &Emitters| {
             let u = [&pairs[0][1], &pairs[1][0]];
-            emitters.environment.as_ref().map(|map| environment_samples(self.level, emitters, map, u))
+            emitters.environment.as_ref().map(|map| environment_samples(self.simd_level, emitters, map, u))
         };
         GroupChoices { of_environment: emitters.and_then(of_map), pairs }
     }
 
-    /// Takes a group of paths one step further, one after the other.
-    fn step_group(&self, group: &[(usize, u32)], choices: &GroupChoices, kinds: &mut [u32], paths: &mut PathsOfBlock) {
+    /// Takes a group of paths one bounce further, one after the other.
+    fn scatter_group(
+        &self,
+        group: &[(usize, u32)],
+        choices: &GroupChoices,
+        flags: &mut [u32],
+        paths: &mut PathsOfBlock,
+    ) {
         let before_lights = self.before_lights(group, paths);
         for (lane, &(place, path_ix)) in group.iter().enumerate() {
-            kinds[place] = self.step(path_ix, before_lights >> lane & 1 == 1, choices.of_lane(lane), paths);
+            flags[place] = self.scatter(path_ix, before_lights >> lane & 1 == 1, choices.of_lane(lane), paths);
         }
     }
 
     /// Ends a group of paths at Lambertian surfaces, with the light that their rays meet before.
-    fn end_at_lambertian(&self, group: &[(usize, u32)], kinds: &mut [u32], paths: &mut PathsOfBlock) {
+    fn end_at_lambertian(&self, group: &[(usize, u32)], flags: &mut [u32], paths: &mut PathsOfBlock) {
         let before_lights = self.before_lights(group, paths);
         for (lane, &(place, path_ix)) in group.iter().enumerate() {
-            kinds[place] = 0;
+            flags[place] = 0;
             if before_lights >> lane & 1 == 1 {
-                self.step(path_ix, true, Default::default(), paths);
+                self.scatter(path_ix, true, Default::default(), paths);
             }
         }
     }
 
-    /// Takes a group of paths at Lambertian surfaces one step further. Those that meet a light are stepped as all
+    /// Takes a group of paths at Lambertian surfaces one bounce further. Those that meet a light are taken as all
     /// others.
-    fn step_lambertian(&self, group: &[(usize, u32)], kinds: &mut [u32], paths: &mut PathsOfBlock) {
+    fn scatter_lambertian(&self, group: &[(usize, u32)], flags: &mut [u32], paths: &mut PathsOfBlock) {
         let (inputs, frame, depth) = (self.inputs, self.inputs.frame(), self.batch.depth);
         // The last ray of a path only meets light.
         if depth + 1 >= frame.max_depth {
-            return self.end_at_lambertian(group, kinds, paths);
+            return self.end_at_lambertian(group, flags, paths);
         }
         let mut hits = LambertianHits::default();
         for (lane, &(_, path_ix)) in group.iter().enumerate() {
             let hit = &self.hits[path_ix as usize];
             hits.set(lane, paths.rays.of_path(path_ix), hit, &inputs.triangles[hit.triangle_ix as usize]);
         }
-        let surfaces = dispatch!(self.level, simd => lambertian_surfaces(simd, &hits));
+        let surfaces = dispatch!(self.simd_level, simd => lambertian_surfaces(simd, &hits));
         let choices = self.choices_of(group);
         let mut samples = Samples::default();
         for (lane, &(_, path_ix)) in group.iter().enumerate() {
@@ -236,23 +242,25 @@ impl BounceOfPaths<'_> {
         }
         let bounce = BounceConstants { depth, clamp: frame.clamp, shapes: self.shapes() };
         let samples = (&samples, &choices.pairs);
-        let steps = dispatch!(self.level, simd => lambertian_steps(simd, &bounce, (&hits, &surfaces), samples));
+        let scattered =
+            dispatch!(self.simd_level, simd => lambertian_scatter(simd, &bounce, (&hits, &surfaces), samples));
         let before_lights = self.before_lights(group, paths);
         for (lane, &(place, path_ix)) in group.iter().enumerate() {
             if before_lights >> lane & 1 == 1 {
-                kinds[place] = self.step(path_ix, true, choices.of_lane(lane), paths);
+                flags[place] = self.scatter(path_ix, true, choices.of_lane(lane), paths);
                 continue;
             }
             let triangle_ix = self.hits[path_ix as usize].triangle_ix;
-            let (goes_on, has_shadow_ray) = (steps.go_on >> lane & 1 == 1, steps.have_shadow_ray >> lane & 1 == 1);
-            kinds[place] = kind_of_path(goes_on, has_shadow_ray);
+            let (goes_on, has_shadow_ray) =
+                (scattered.go_on >> lane & 1 == 1, scattered.have_shadow_ray >> lane & 1 == 1);
+            flags[place] = flags_of_path(goes_on, has_shadow_ray);
             if has_shadow_ray {
-                *paths.shadow_rays.of_path(path_ix) = steps.shadow_ray(lane, triangle_ix);
+                *paths.shadow_rays.of_path(path_ix) = scattered.shadow_ray(lane, triangle_ix);
             }
             if goes_on {
                 let ray = paths.rays.of_path(path_ix);
-                *ray = steps.ray(lane, triangle_ix, ray);
-                paths.states.of_path(path_ix).pdf = steps.pdf[lane];
+                *ray = scattered.ray(lane, triangle_ix, ray);
+                paths.states.of_path(path_ix).pdf = scattered.pdf[lane];
             }
         }
     }
@@ -336,7 +344,7 @@ mod tests {
         rays: Vec<PathRay>,
         states: Vec<PathState>,
         shadow_rays: Vec<ShadowRay>,
-        kinds: Vec<u32>,
+        flags: Vec<u32>,
         blocks: Vec<[u32; 2]>,
     }
 
@@ -353,14 +361,14 @@ mod tests {
                 rays: (0..n).map(|_| ray(random)).collect(),
                 states: (0..n).map(|_| PathState { radiance: random.point(), pdf: random.point().x }).collect(),
                 shadow_rays: vec![ShadowRay::zeroed(); n],
-                kinds: vec![9; n],
+                flags: vec![9; n],
                 blocks: vec![[9; 2]; n.div_ceil(BLOCK_SIZE)],
             }
         }
 
         fn buffers(&mut self) -> (PathBuffers<'_>, (&mut [u32], &mut [[u32; 2]])) {
-            let Self { rays, states, shadow_rays, kinds, blocks } = self;
-            (PathBuffers { rays, states, shadow_rays }, (kinds, blocks))
+            let Self { rays, states, shadow_rays, flags, blocks } = self;
+            (PathBuffers { rays, states, shadow_rays }, (flags, blocks))
         }
 
         /// Returns the bits of all floats, of which those of NaN are not told apart.
@@ -368,7 +376,7 @@ mod tests {
             let words = [bytemuck::cast_slice(&self.rays), bytemuck::cast_slice(&self.states)];
             let all =
                 words.concat().into_iter().chain(bytemuck::cast_slice::<_, u32>(&self.shadow_rays).iter().copied());
-            let all = all.chain(self.kinds.clone()).chain(self.blocks.concat());
+            let all = all.chain(self.flags.clone()).chain(self.blocks.concat());
             all.map(|word: u32| if word & 0x7fff_ffff > 0x7f80_0000 { f32::NAN.to_bits() } else { word }).collect()
         }
     }
@@ -382,7 +390,7 @@ mod tests {
     }
 
     #[test]
-    fn steps_are_those_of_the_reference() {
+    fn paths_scatter_as_in_the_reference() {
         const N: usize = 3000;
         let mut random = Uniform(1);
         let (mut n_lambertian, mut n_going_on, mut n_shadow_rays) = (0, 0, 0);
@@ -399,15 +407,15 @@ mod tests {
             let hits: Vec<_> = (0..N).map(|i| hit_at_random(&mut random, i % 9 == 0)).collect();
             let (pixels, are_lambertian) = (&pixels_of_batch(inputs, batch)[..], &lambertian_materials(inputs)[..]);
             let live: Vec<_> = (0..N as u32).filter(|i| i % 7 != 0).collect();
-            expected.kinds.truncate(live.len());
+            expected.flags.truncate(live.len());
             expected.blocks.truncate(live.len().div_ceil(BLOCK_SIZE));
             let begun = expected.clone();
             let (paths, results) = expected.buffers();
             reference::path_scatter::path_scatter(inputs, batch, (&live, &hits), paths, results);
-            for level in [Level::new(), Level::baseline()] {
+            for simd_level in [Level::new(), Level::baseline()] {
                 let mut found = begun.clone();
                 let (paths, results) = found.buffers();
-                let bounce = BounceOfPaths { inputs, batch, pixels, are_lambertian, hits: &hits, level };
+                let bounce = BounceOfPaths { inputs, batch, pixels, are_lambertian, hits: &hits, simd_level };
                 n_lambertian +=
                     hits.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE && bounce.is_lambertian(hit)).count();
                 path_scatter(&bounce, &live, paths, results);

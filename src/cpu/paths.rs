@@ -101,16 +101,16 @@ impl Paths {
     /// Adds the light at the hits, and replaces the rays by those with which the paths go on.
     pub fn scatter(&mut self, inputs: &KernelInputs, batch: &Batch, queue: &mut Queue) {
         let live = &self.live[batch.depth as usize % 2];
-        queue.child_kinds.resize(live.len(), 0);
+        queue.child_flags.resize(live.len(), 0);
         self.scan_blocks.resize(live.len().div_ceil(SCAN_GROUP_SIZE as usize), [0; 2]);
-        let Queue { rays, hits, child_kinds, .. } = queue;
+        let Queue { rays, hits, child_flags, .. } = queue;
         let paths = PathBuffers { rays, states: &mut self.states, shadow_rays: &mut self.shadow_rays };
         if batch.depth == 0 {
             self.are_lambertian = lambertian_materials(inputs);
         }
         let (pixels, are_lambertian) = (&self.pixels, &self.are_lambertian);
-        let bounce = BounceOfPaths { inputs, batch, pixels, are_lambertian, hits, level: Level::new() };
-        path_scatter(&bounce, live, paths, (child_kinds, &mut self.scan_blocks));
+        let bounce = BounceOfPaths { inputs, batch, pixels, are_lambertian, hits, simd_level: Level::new() };
+        path_scatter(&bounce, live, paths, (child_flags, &mut self.scan_blocks));
     }
 
     /// Adds up the layer of light that is complete after the batch's bounce.
@@ -132,6 +132,6 @@ impl Paths {
         let (live, next) = if depth.is_multiple_of(2) { (even, odd) } else { (odd, even) };
         next.resize(queue.bounces[depth as usize + 1].n_rays as usize, 0);
         self.with_shadow_ray.resize(queue.bounces[depth as usize].n_shadow_rays as usize, 0);
-        path_compact::path_compact(live, &queue.child_kinds, &self.scan_blocks, next, &mut self.with_shadow_ray);
+        path_compact::path_compact(live, &queue.child_flags, &self.scan_blocks, next, &mut self.with_shadow_ray);
     }
 }

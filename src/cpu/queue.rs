@@ -11,9 +11,9 @@ pub struct Queue {
     pub bounces: Vec<Bounce>,
     /// The closest hit of each ray.
     pub hits: Vec<Hit>,
-    /// For each ray, the kinds of its child rays, as bits: `CHILD_REFLECTED` and the other constants `CHILD_*`. For
+    /// For each ray, flags of its child rays: `CHILD_REFLECTED` and the other constants `CHILD_*`. For
     /// each path, whether it goes on and has a shadow ray.
-    pub child_kinds: Vec<u32>,
+    pub child_flags: Vec<u32>,
     /// For each ray, the index in `rays` of its first child, or the index that the child would have.
     pub first_children: Vec<u32>,
     /// For each ray, its radiance, weighted by its throughput.

@@ -12,13 +12,13 @@ use super::{
 use crate::{
     accel::kdtree::TraversalLinks,
     frame::{
-        BounceStats, Denoise, FrameKind, FrameRenderer, Integrator, MeanLayers, NoiseTiles, Pass, Picture, Plan,
+        BounceStats, Denoise, FrameProperties, FrameRenderer, Integrator, MeanLayers, NoiseTiles, Pass, Picture, Plan,
         Primary, Profile, RenderOptions, Watcher, opaque, plan::passes,
     },
     gpu::GpuError,
     layout::{
-        Auxiliary, Batch, Bounce, EdgeStep, FILTER_CENTRE, Frame, Hit, LIGHT_LAYERS, Material, PathRay, PixelAovs,
-        SAMPLE_BLOCK_LOG2, SCAN_GROUP_SIZE, SURFACE_LAYERS,
+        AtrousIteration, Auxiliary, Batch, Bounce, FILTER_CENTRE, Frame, Hit, LIGHT_LAYERS, Material, PathRay,
+        PixelAovs, SAMPLE_BLOCK_LOG2, SCAN_GROUP_SIZE, SURFACE_LAYERS,
     },
     reference::{
         accumulate, atrous_filter, auxiliary,
@@ -82,8 +82,8 @@ pub struct CpuRenderer {
     pixel_aovs: Vec<PixelAovs>,
     /// Empty unless the noise filter `edge` runs.
     pixel_aux: Vec<Auxiliary>,
-    /// The next step of that filter.
-    edge_step: u32,
+    /// The next iteration of that filter.
+    atrous_iteration: u32,
     queue: Queue,
     paths: Paths,
     /// The materials of paths. Empty for ray trees.
@@ -130,7 +130,7 @@ impl CpuRenderer {
             pixel_display: vec![[0; 4]; n_pixels],
             pixel_aovs: vec![PixelAovs::default(); if options.pixel_aovs { n_pixels } else { 0 }],
             pixel_aux: vec![Auxiliary::default(); if options.noise_filter() == Denoise::Edge { n_pixels } else { 0 }],
-            edge_step: 0,
+            atrous_iteration: 0,
             queue: Queue::default(),
             paths: Paths::default(),
             path_materials: if options.integrator == Integrator::Path {
@@ -200,7 +200,7 @@ impl CpuRenderer {
             }
             self.pixel_aovs.fill(PixelAovs::default());
         }
-        let plan = Plan::new(&self.frame_kind());
+        let plan = Plan::new(&self.frame_properties());
         if is_new {
             passes(&plan.visibility).for_each(|pass| self.run(pass, 0));
         }
@@ -272,13 +272,13 @@ impl CpuRenderer {
     /// Returns the mean of the samples so far, after the noise filter if there is one.
     pub fn picture(&self) -> Picture {
         let (window, crop) = (self.options.window(), self.options.crop_or_whole());
-        // The filter `edge` has a second half of `pixel_filtered` for its steps.
+        // The filter `edge` has a second half of `pixel_filtered` for its iterations.
         let filtered = if self.filters() { &self.pixel_filtered } else { &self.pixel_radiance };
         Picture {
             width: crop.width(),
             height: crop.height(),
-            radiance: opaque(window.part(&filtered[..self.pixel_radiance.len()], &crop)),
-            display: window.part(&self.pixel_display, &crop),
+            radiance: opaque(window.cut(&filtered[..self.pixel_radiance.len()], &crop)),
+            display: window.cut(&self.pixel_display, &crop),
         }
     }
 
@@ -290,15 +290,15 @@ impl CpuRenderer {
     /// The options do not request AOVs.
     pub fn pixel_aovs(&self) -> Vec<PixelAovs> {
         assert!(self.options.pixel_aovs, "the options ask for AOVs");
-        self.options.window().part(&self.pixel_aovs, &self.options.crop_or_whole())
+        self.options.window().cut(&self.pixel_aovs, &self.options.crop_or_whole())
     }
 
     /// Returns the properties that decide the passes of the next sample. The CPU does not rasterize: for both kinds
     /// of rasterization it runs the pass `visibility` of `Primary::Raster`, which here traces a ray for each pixel.
-    fn frame_kind(&self) -> FrameKind {
-        let kind = FrameKind::new(&self.options, &self.frame);
-        let primary = if kind.primary == Primary::Trace { Primary::Trace } else { Primary::Raster };
-        FrameKind { primary, adds_samples: self.n_samples > 0, ..kind }
+    fn frame_properties(&self) -> FrameProperties {
+        let properties = FrameProperties::new(&self.options, &self.frame);
+        let primary = if properties.primary == Primary::Trace { Primary::Trace } else { Primary::Raster };
+        FrameProperties { primary, adds_samples: self.n_samples > 0, ..properties }
     }
 
     /// Draws a batch of pixels: first all bounces are traced, then their hits are lit. If there are more rays than
@@ -423,14 +423,14 @@ impl CpuRenderer {
         pixel_filtered.resize(2 * pixel_radiance.len(), [0.0; 4]);
         let demodulate = || demodulate::demodulate(frame, pixel_radiance, pixel_aux, pixel_filtered);
         self.clock.time(Pass::Demodulate, None, demodulate);
-        self.edge_step = 0;
+        self.atrous_iteration = 0;
     }
 
     fn atrous_filter(&mut self) {
         let (frame, aux, filtered) = (&self.frame, &self.pixel_aux, &mut self.pixel_filtered);
-        let step = EdgeStep { step_ix: self.edge_step };
-        self.clock.time(Pass::AtrousFilter, None, || atrous_filter::atrous_filter(frame, &step, aux, filtered));
-        self.edge_step += 1;
+        let iteration = AtrousIteration { iteration_ix: self.atrous_iteration };
+        self.clock.time(Pass::AtrousFilter, None, || atrous_filter::atrous_filter(frame, &iteration, aux, filtered));
+        self.atrous_iteration += 1;
     }
 
     fn path_spine(&mut self, depth: u32) {
@@ -545,13 +545,13 @@ impl CpuRenderer {
     /// Determines which rays continue from the bounce's hits, and counts them.
     fn compact_reduce(&mut self, depth: u32) {
         let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
-        let Queue { rays, bounces, hits, child_kinds, scan_blocks, .. } = &mut self.queue;
+        let Queue { rays, bounces, hits, child_flags, scan_blocks, .. } = &mut self.queue;
         let places = bounces[depth as usize].rays();
-        child_kinds.resize(rays.len(), 0);
+        child_flags.resize(rays.len(), 0);
         scan_blocks.resize(places.len().div_ceil(SCAN_GROUP_SIZE as usize), 0);
         let parents = Parents { rays: &rays[places.clone()], hits: &hits[places.clone()] };
-        let kinds = &mut child_kinds[places];
-        self.clock.time(Pass::CompactReduce, Some(depth), || compact::reduce(&inputs, parents, kinds, scan_blocks));
+        let flags = &mut child_flags[places];
+        self.clock.time(Pass::CompactReduce, Some(depth), || compact::reduce(&inputs, parents, flags, scan_blocks));
     }
 
     /// Computes the prefix sums of the counts, and from them the size of the next bounce.
@@ -567,7 +567,7 @@ impl CpuRenderer {
     /// Writes the next bounce's rays behind those of this bounce, unless the queue has no room for them.
     fn compact_scatter(&mut self, depth: u32) {
         let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
-        let Queue { rays, bounces, hits, child_kinds, first_children, scan_blocks, .. } = &mut self.queue;
+        let Queue { rays, bounces, hits, child_flags, first_children, scan_blocks, .. } = &mut self.queue;
         let (this, next) = (bounces[depth as usize], bounces[depth as usize + 1]);
         if next.overflow != 0 {
             return;
@@ -577,9 +577,9 @@ impl CpuRenderer {
         rays.resize(next.rays().end, PathRay::zeroed());
         let (so_far, next_rays) = rays.split_at_mut(next.rays().start);
         let parents = Parents { rays: &so_far[places.clone()], hits: &hits[places.clone()] };
-        let (kinds, first_children) = (&child_kinds[places.clone()], &mut first_children[places]);
+        let (flags, first_children) = (&child_flags[places.clone()], &mut first_children[places]);
         self.clock.time(Pass::CompactScatter, Some(depth), || {
-            compact::scatter(&inputs, parents, kinds, scan_blocks, next.first_ray, first_children, next_rays);
+            compact::scatter(&inputs, parents, flags, scan_blocks, next.first_ray, first_children, next_rays);
         });
     }
 
@@ -677,10 +677,10 @@ impl FrameRenderer for CpuRenderer {
     }
 
     fn draw_frame(&mut self, watcher: &mut impl Watcher) -> Result<Profile, GpuError> {
-        Ok(info_span!("render").in_scope(|| self.draw_sample_with(|share| watcher.part(share))))
+        Ok(info_span!("render").in_scope(|| self.draw_sample_with(|share| watcher.sample_progress(share))))
     }
 
-    fn set_tiles(&mut self, tiles: NoiseTiles) -> Result<(), GpuError> {
+    fn set_noise_tiles(&mut self, tiles: NoiseTiles) -> Result<(), GpuError> {
         let first_sample = tiles.first_sample();
         self.set_window(Some(tiles), first_sample);
         Ok(())
@@ -719,7 +719,7 @@ impl FrameRenderer for CpuRenderer {
         layers.0[self.options.mean_layers()]
             .iter_mut()
             .zip(pixels)
-            .for_each(|(layer, pixels)| *layer = window.part(pixels, &crop));
+            .for_each(|(layer, pixels)| *layer = window.cut(pixels, &crop));
         Ok(layers)
     }
 }

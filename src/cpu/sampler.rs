@@ -101,8 +101,8 @@ mod tests {
             let mut keys = KeysSoa::default();
             (0..LANES).for_each(|lane| keys.set(lane, key(lane)));
             for first_place in [0, 2, 4097] {
-                for level in [Level::new(), Level::baseline()] {
-                    let pairs: [_; 3] = dispatch!(level, simd => random_pairs(simd, &keys, first_place));
+                for simd_level in [Level::new(), Level::baseline()] {
+                    let pairs: [_; 3] = dispatch!(simd_level, simd => random_pairs(simd, &keys, first_place));
                     for (place, [x, y]) in (first_place..).zip(&pairs) {
                         for lane in 0..LANES {
                             assert_eq!(random_pair(key(lane), place).to_array(), [x[lane], y[lane]]);

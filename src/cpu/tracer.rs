@@ -51,16 +51,20 @@ pub enum FastTracer<'a> {
 impl<'a> FastTracer<'a> {
     /// Creates a tracer that uses the best instructions that the machine has.
     pub fn new(inputs: &KernelInputs<impl ReadCounter>, search: impl Into<CpuSearch<'a>>) -> Self {
-        Self::at_level(inputs, search, Level::new())
+        Self::at_simd_level(inputs, search, Level::new())
     }
 
-    /// Creates a tracer that uses the instructions of `level`, which the machine must have. The hits are the same at
-    /// every level, bit for bit.
-    pub fn at_level(inputs: &KernelInputs<impl ReadCounter>, search: impl Into<CpuSearch<'a>>, level: Level) -> Self {
+    /// Creates a tracer that uses the instructions of `simd_level`, which the machine must have. The hits are the same
+    /// at every SIMD level, bit for bit.
+    pub fn at_simd_level(
+        inputs: &KernelInputs<impl ReadCounter>,
+        search: impl Into<CpuSearch<'a>>,
+        simd_level: Level,
+    ) -> Self {
         match search.into() {
-            CpuSearch { wide: Some(bvh), .. } => Self::Wide(WideTraverser::new(bvh, level)),
+            CpuSearch { wide: Some(bvh), .. } => Self::Wide(WideTraverser::new(bvh, simd_level)),
             CpuSearch { traversal: Traversal::Stack, .. } if inputs.n_grid_levels == 0 => {
-                Self::Packets(PacketTraverser::new(level))
+                Self::Packets(PacketTraverser::new(simd_level))
             }
             CpuSearch { traversal, .. } => Self::Single(Traverser::new(inputs, traversal)),
         }

@@ -31,8 +31,8 @@ mod tests {
     fn sines_and_cosines_are_those_of_the_reference() {
         for i in -9000..9000 {
             let turns: [f32; LANES] = std::array::from_fn(|lane| (LANES as i32 * i + lane as i32) as f32 / 44_444.0);
-            for level in [Level::new(), Level::baseline()] {
-                let (sines, cosines) = dispatch!(level, simd => {
+            for simd_level in [Level::new(), Level::baseline()] {
+                let (sines, cosines) = dispatch!(simd_level, simd => {
                     let (sines, cosines) = sin_cos_of_turns(f32x16::load_array_ref(simd, &turns));
                     (sines.to_array(), cosines.to_array())
                 });

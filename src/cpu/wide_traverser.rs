@@ -105,7 +105,7 @@ const RAYS_IN_FLIGHT: usize = 8;
 /// Traces rays through a [`WideBvh`] on one thread, and owns the working memory for that.
 pub struct WideTraverser<'a> {
     bvh: &'a WideBvh,
-    level: Level,
+    simd_level: Level,
     /// One for each ray in flight.
     stacks: Box<[Stack]>,
 }
@@ -330,10 +330,10 @@ impl Flight {
 }
 
 impl<'a> WideTraverser<'a> {
-    /// Creates a traverser that uses the instructions of `level`, which the machine must have. The hits are the same at
-    /// every level, bit for bit.
-    pub fn new(bvh: &'a WideBvh, level: Level) -> Self {
-        Self { bvh, level, stacks: (0..RAYS_IN_FLIGHT).map(|_| Stack::new()).collect() }
+    /// Creates a traverser that uses the instructions of `simd_level`, which the machine must have. The hits are the
+    /// same at every SIMD level, bit for bit.
+    pub fn new(bvh: &'a WideBvh, simd_level: Level) -> Self {
+        Self { bvh, simd_level, stacks: (0..RAYS_IN_FLIGHT).map(|_| Stack::new()).collect() }
     }
 
     /// Takes rays from `search_rays` whenever one has come to its end, until all have.
@@ -390,7 +390,7 @@ impl Tracer for WideTraverser<'_> {
         search_rays: impl Iterator<Item = (Key, SearchRay)>,
         found: impl FnMut(Key, Hit),
     ) {
-        dispatch!(self.level, simd => self.trace::<_, ANY_HIT, Key>(simd, inputs, search_rays, found));
+        dispatch!(self.simd_level, simd => self.trace::<_, ANY_HIT, Key>(simd, inputs, search_rays, found));
     }
 }
 

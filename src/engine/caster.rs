@@ -100,7 +100,7 @@ impl<'a> Caster<'a> {
     /// [`GpuCaster::cast_stream`](cast::GpuCaster::cast_stream) does.
     ///
     /// # Errors
-    /// Memory runs out, or a call fails. Then some parts may have been taken.
+    /// Memory runs out, or a call fails. Then some chunks may have been taken.
     pub fn cast_stream(
         &mut self,
         n_rays: usize,

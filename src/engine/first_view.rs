@@ -75,13 +75,13 @@ fn warn_of_hidden(world: &World, n_bounces: u32, (mut rays, mut hits): (Vec<Ray>
     if !scene.textures.has_blended() {
         return;
     }
-    let mut layers: Vec<u32> = vec![0; n_rays];
+    let mut n_met: Vec<u32> = vec![0; n_rays];
     let (mut n_hidden, mut most) = (0, 0);
     for _ in 0..MOST_SURFACES {
         let mut kept = Vec::new();
         for (ix, hit) in hits.iter().enumerate().filter(|(_, hit)| is_hit(hit)) {
             let Some(is_clear) = clear(scene, hit) else { continue };
-            let n = layers[ix] + u32::from(!is_clear);
+            let n = n_met[ix] + u32::from(!is_clear);
             n_hidden += usize::from(n == n_bounces && !is_clear);
             most = most.max(n);
             kept.push((Ray { t_min: hit.t, ..rays[ix] }, n));
@@ -89,7 +89,7 @@ fn warn_of_hidden(world: &World, n_bounces: u32, (mut rays, mut hits): (Vec<Ray>
         if kept.is_empty() {
             break;
         }
-        (rays, layers) = kept.into_iter().unzip();
+        (rays, n_met) = kept.into_iter().unzip();
         hits = cast(world, &rays);
     }
     if n_hidden > 0 {

@@ -15,8 +15,8 @@ use rayon::prelude::*;
 use crate::{
     cpu,
     frame::{
-        BadOptions, Crop, Drawn, DrawnTiles, MeanLayers, NoiseTiles, Picture, Profile, RenderOptions, SampleRange,
-        TileSamples, check::check,
+        BadOptions, Crop, Drawn, DrawnNoiseTiles, MeanLayers, NoiseTileSamples, NoiseTiles, Picture, Profile,
+        RenderOptions, SampleRange, check::check,
     },
     gpu::GpuError,
     layout::{PixelAovs, SAMPLE_BLOCK_LOG2},
@@ -80,13 +80,13 @@ pub struct NoisePicture {
 }
 
 /// Draws samples of tiles, all of which get equally many.
-pub(super) type DrawTiles<'a> = dyn FnMut(&[TileSamples]) -> Result<DrawnTiles, GpuError> + 'a;
+pub(super) type DrawNoiseTiles<'a> = dyn FnMut(&[NoiseTileSamples]) -> Result<DrawnNoiseTiles, GpuError> + 'a;
 
 /// Number of tiles with which a device has enough to do: 16 samples of each of their pixels are two million paths.
 const ENOUGH_TILES: usize = 512;
 
 /// Returns into how many blocks the samples of each tile are divided, which are drawn together: a power of two.
-fn n_parts(n_tiles: usize, n_devices: usize, samples: SampleRange) -> u32 {
+fn n_ranges(n_tiles: usize, n_devices: usize, samples: SampleRange) -> u32 {
     let wanted = (n_devices * ENOUGH_TILES / n_tiles).max(1).ilog2();
     let most = (samples.len() >> SAMPLE_BLOCK_LOG2).min(NoiseTiles::MOST_BLOCKS);
     most.min(1 << wanted)
@@ -97,34 +97,35 @@ fn n_parts(n_tiles: usize, n_devices: usize, samples: SampleRange) -> u32 {
 pub(super) fn draw_until(
     goal: NoiseGoal,
     options: &RenderOptions,
-    (draw, n_devices): (&mut DrawTiles, usize),
+    (draw, n_devices): (&mut DrawNoiseTiles, usize),
     mut progress: impl FnMut(f32) -> bool,
 ) -> Result<NoisePicture, GpuError> {
-    let mut tiles: Vec<Tile> = NoiseTiles::places_of(&options.crop_or_whole()).into_iter().map(Tile::new).collect();
+    let mut tiles: Vec<NoiseTile> =
+        NoiseTiles::places_of(&options.crop_or_whole()).into_iter().map(NoiseTile::new).collect();
     let mut profile = Profile::default();
     for block in goal.blocks() {
-        let noisy: Vec<&mut Tile> = tiles.iter_mut().filter(|tile| tile.noise > goal.noise).collect();
+        let noisy: Vec<&mut NoiseTile> = tiles.iter_mut().filter(|tile| tile.noise > goal.noise).collect();
         if noisy.is_empty() {
             break;
         }
-        let n_parts = n_parts(noisy.len(), n_devices, block);
-        let len = block.len() / n_parts;
-        let part = |ix: u32| SampleRange { first: block.first + ix * len, end: block.first + (ix + 1) * len };
-        let parts_of = |tile: &&mut Tile| {
+        let n_ranges = n_ranges(noisy.len(), n_devices, block);
+        let len = block.len() / n_ranges;
+        let range = |ix: u32| SampleRange { first: block.first + ix * len, end: block.first + (ix + 1) * len };
+        let ranges_of = |tile: &&mut NoiseTile| {
             let place = tile.place;
-            (0..n_parts).map(move |ix| TileSamples { place, samples: part(ix) })
+            (0..n_ranges).map(move |ix| NoiseTileSamples { place, samples: range(ix) })
         };
-        let DrawnTiles { drawn, means } = draw(&noisy.iter().flat_map(parts_of).collect::<Vec<_>>())?;
+        let DrawnNoiseTiles { drawn, means } = draw(&noisy.iter().flat_map(ranges_of).collect::<Vec<_>>())?;
         profile.add(&drawn.profile);
         let layers = drawn.layers.0.iter().filter(|layer| !layer.is_empty()).map(Vec::as_slice);
         let layers: Vec<&[[f32; 4]]> = [&means[..]].into_iter().chain(layers).collect();
-        let len_of_tile = n_parts as usize * N_PIXELS;
+        let len_of_tile = n_ranges as usize * N_PIXELS;
         noisy.into_par_iter().enumerate().for_each(|(tile_ix, tile)| {
             let pixels = tile_ix * len_of_tile..(tile_ix + 1) * len_of_tile;
             if block.first == 0 && options.pixel_aovs {
                 tile.pixel_aovs = drawn.pixel_aovs[pixels.clone()].to_vec();
             }
-            let sums = layers.iter().flat_map(|layer| sum_of_parts(&layer[pixels.clone()], len as f32)).collect();
+            let sums = layers.iter().flat_map(|layer| sum_of_ranges(&layer[pixels.clone()], len as f32)).collect();
             tile.add(block, sums, options);
         });
         let shares = tiles.iter().map(|tile| tile.share_of(goal)).sum::<f32>();
@@ -136,7 +137,7 @@ pub(super) fn draw_until(
 }
 
 /// A tile and its samples.
-struct Tile {
+struct NoiseTile {
     /// In units of the side of a tile.
     place: UVec2,
     /// Number of samples of each pixel.
@@ -149,7 +150,7 @@ struct Tile {
     noise: f32,
 }
 
-impl Tile {
+impl NoiseTile {
     fn new(place: UVec2) -> Self {
         Self { place, n_samples: 0, sums: Vec::new(), pixel_aovs: Vec::new(), noise: f32::INFINITY }
     }
@@ -200,16 +201,16 @@ fn appearance(light: f64) -> f64 {
     if light < 1.0 { light.max(0.0).sqrt() } else { 1.0 + 0.5 * light.ln() }
 }
 
-/// Returns the sums of a tile's pixels over all blocks of samples, whose means the parts are: 2^n parts of `len`
+/// Returns the sums of a tile's pixels over all blocks of samples, whose means the ranges have: 2^n ranges of `len`
 /// samples. They are added as a binary tree. A power of two multiplies without rounding, so the sums have the bits of
 /// one block.
-fn sum_of_parts(parts: &[[f32; 4]], len: f32) -> Vec<[f32; 4]> {
-    if parts.len() == N_PIXELS {
-        return parts.iter().map(|pixel| pixel.map(|mean| mean * len)).collect();
+fn sum_of_ranges(means: &[[f32; 4]], len: f32) -> Vec<[f32; 4]> {
+    if means.len() == N_PIXELS {
+        return means.iter().map(|pixel| pixel.map(|mean| mean * len)).collect();
     }
-    let (first, second) = parts.split_at(parts.len() / 2);
-    let mut sums = sum_of_parts(first, len);
-    add(&mut sums, &sum_of_parts(second, len));
+    let (first, second) = means.split_at(means.len() / 2);
+    let mut sums = sum_of_ranges(first, len);
+    add(&mut sums, &sum_of_ranges(second, len));
     sums
 }
 
@@ -218,7 +219,7 @@ fn add(sums: &mut [[f32; 4]], others: &[[f32; 4]]) {
 }
 
 /// Joins the tiles to the picture of the options' crop.
-fn joined(tiles: &[Tile], goal: NoiseGoal, options: &RenderOptions, profile: Profile) -> NoisePicture {
+fn joined(tiles: &[NoiseTile], goal: NoiseGoal, options: &RenderOptions, profile: Profile) -> NoisePicture {
     let crop = options.crop_or_whole();
     let n_pixels = crop.width() as usize * crop.height() as usize;
     let mut radiance = vec![[0.0; 4]; n_pixels];

@@ -9,8 +9,8 @@ use super::{
 use crate::{
     cpu::{self, Batching},
     frame::{
-        BadOptions, Denoise, Drawn, DrawnTiles, FrameRenderer, Goal, Integrator, NoiseTiles, PathOptions, Picture,
-        RangeSums, RenderOptions, SampleRange, TileSamples, Unending, Watcher,
+        BadOptions, Denoise, Drawn, DrawnNoiseTiles, FrameRenderer, Goal, Integrator, NoiseTileSamples, NoiseTiles,
+        PathOptions, Picture, RangeSums, RenderOptions, SampleRange, Unending, Watcher,
     },
     gpu::{Context, DeviceInfo, ExternalImage, GpuError, TimelinePoint},
     render::BandedRenderer,
@@ -104,9 +104,9 @@ impl Renderer {
         Ok(())
     }
 
-    /// Draws what a camera sees. The watcher is notified of each sample of each band. If it uses [`Watcher::part`], it
-    /// is also notified of the progress within a sample. It can end the picture with fewer samples than the goal
-    /// ([`Watcher::ends`]).
+    /// Draws what a camera sees. The watcher is notified of each sample of each band. If it uses
+    /// [`Watcher::sample_progress`], it is also notified of the progress within a sample. It can end the picture with
+    /// fewer samples than the goal ([`Watcher::ends`]).
     ///
     /// # Errors
     /// The camera shows no picture, the goal is more than [`SampleRange::MOST`] samples, a call fails, one pixel alone
@@ -201,7 +201,7 @@ impl Renderer {
         self.set_camera(camera)?;
         let mut progress = BandProgress { n_bands: self.n_bands(), n_told: 0, watcher: &mut watcher };
         let n_devices = if let Backend::Group(group) = &self.backend { group.n_devices() } else { 1 };
-        let mut draw = |tiles: &[TileSamples]| self.draw_tiles(tiles);
+        let mut draw = |tiles: &[NoiseTileSamples]| self.draw_noise_tiles(tiles);
         let drawn = noise::draw_until(goal, &options, (&mut draw, n_devices), |share| progress.set(share));
         // Also after an error, what is drawn next are rectangles.
         match &mut self.backend {
@@ -209,7 +209,7 @@ impl Renderer {
                 renderer.set_crop(options.crop_or_whole())?;
                 renderer.set_first_sample(0)?;
             }
-            Backend::Group(group) => group.leave_tiles()?,
+            Backend::Group(group) => group.leave_noise_tiles()?,
             Backend::Cpu(renderer) => renderer.set_window(None, 0),
         }
         progress.end();
@@ -217,11 +217,11 @@ impl Renderer {
     }
 
     /// Draws samples of noise tiles.
-    fn draw_tiles(&mut self, tiles: &[TileSamples]) -> Result<DrawnTiles, GpuError> {
+    fn draw_noise_tiles(&mut self, tiles: &[NoiseTileSamples]) -> Result<DrawnNoiseTiles, GpuError> {
         match &mut self.backend {
-            Backend::Device(renderer) => renderer.draw_tiles(tiles),
-            Backend::Group(group) => group.draw_tiles(tiles),
-            Backend::Cpu(renderer) => renderer.draw_tiles(tiles, NoiseTiles::MOST),
+            Backend::Device(renderer) => renderer.draw_noise_tiles(tiles),
+            Backend::Group(group) => group.draw_noise_tiles(tiles),
+            Backend::Cpu(renderer) => renderer.draw_noise_tiles(tiles, NoiseTiles::MOST),
         }
     }
 
@@ -321,7 +321,7 @@ impl<W: Watcher> BandProgress<'_, W> {
         let n_done = share * self.n_bands as f32;
         // The last band is done when the picture is.
         self.tell_bands((n_done as u32).min(self.n_bands - 1));
-        self.watcher.part((n_done - self.n_told as f32).clamp(0.0, 1.0));
+        self.watcher.sample_progress((n_done - self.n_told as f32).clamp(0.0, 1.0));
         self.watcher.ends()
     }
 

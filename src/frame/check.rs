@@ -16,7 +16,7 @@ impl From<BadOptions> for GpuError {
 impl RenderOptions {
     /// The longest side of a picture, pixels: that of an image on common GPUs.
     pub const MOST_SIDE: u32 = 16_384;
-    /// The most levels of rays.
+    /// The greatest ray depth.
     pub const MOST_DEPTH: u32 = 64;
     /// The greatest threshold of [`Denoise::Paper`].
     pub const MOST_THRESHOLD: f32 = 4.0;
@@ -57,7 +57,7 @@ impl RenderOptions {
         check("seed", seed, seed <= most, || format!("at most {most}"))?;
         let is_right = first_sample <= MOST_FIRST_SAMPLE;
         check("first_sample", first_sample, is_right, || format!("at most {MOST_FIRST_SAMPLE}"))?;
-        self.check_part()
+        self.check_window()
     }
 
     /// Checks that the samples of a picture can be drawn together: they begin with a block of the tree in which samples
@@ -78,7 +78,7 @@ impl RenderOptions {
     }
 
     /// Checks the crop and the noise tiles.
-    fn check_part(&self) -> Result<(), BadOptions> {
+    fn check_window(&self) -> Result<(), BadOptions> {
         let Self { width, height, .. } = *self;
         if let Some(crop) = self.crop {
             let is_inside = crop.x0 < crop.x1 && crop.x1 <= width && crop.y0 < crop.y1 && crop.y1 <= height;
@@ -141,7 +141,7 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
-    use crate::frame::{Crop, TileSamples};
+    use crate::frame::{Crop, NoiseTileSamples};
 
     fn crop(x0: u32, y0: u32, x1: u32, y1: u32) -> Option<Crop> {
         Some(Crop { x0, y0, x1, y1 })
@@ -149,7 +149,7 @@ mod tests {
 
     fn tile(x: u32, y: u32) -> Option<NoiseTiles> {
         let samples = SampleRange { first: 0, end: 16 };
-        Some(NoiseTiles::new(&[TileSamples { place: glam::uvec2(x, y), samples }]).expect("a tile"))
+        Some(NoiseTiles::new(&[NoiseTileSamples { place: glam::uvec2(x, y), samples }]).expect("a tile"))
     }
 
     /// Changes that make one option wrong, and how the error begins.

@@ -5,7 +5,7 @@ use glam::{DMat4, DVec2, DVec3, DVec4, Vec3, dvec2};
 
 use crate::{
     frame::{Crop, Denoise, Integrator, PixelFilter, RenderOptions, sampling::sample_offset},
-    layout::{FILTER_BOX, FILTER_GAUSSIAN, FILTER_TENT, Frame, WINDOW_OF_TILES},
+    layout::{FILTER_BOX, FILTER_GAUSSIAN, FILTER_TENT, Frame, WINDOW_OF_NOISE_TILES},
     scene::{Camera, Projection},
 };
 
@@ -36,7 +36,7 @@ impl Frame {
         (self.window_x, self.window_y) = match options.noise_tiles {
             Some(ref tiles) => {
                 assert!(options.integrator == Integrator::Path && options.noise_filter() == Denoise::Off, "tiles");
-                (WINDOW_OF_TILES, tiles.n_samples())
+                (WINDOW_OF_NOISE_TILES, tiles.n_samples())
             }
             None => {
                 let Crop { x1, y1, .. } = window;

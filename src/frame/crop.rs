@@ -50,7 +50,7 @@ impl Crop {
 
     /// Copies the pixels of `crop` out of those of this rectangle, which must contain it. `pixels`: the pixels of
     /// this rectangle, rows from the top.
-    pub(crate) fn part<'a, T: Pod + Send + Sync + 'a>(&self, pixels: impl Into<Cow<'a, [T]>>, crop: &Crop) -> Vec<T> {
+    pub(crate) fn cut<'a, T: Pod + Send + Sync + 'a>(&self, pixels: impl Into<Cow<'a, [T]>>, crop: &Crop) -> Vec<T> {
         let pixels = pixels.into();
         if self == crop {
             return pixels.into_owned();
@@ -153,9 +153,9 @@ mod tests {
     fn a_part_is_cut_out() {
         let window = Crop { x0: 10, y0: 20, x1: 13, y1: 23 };
         let pixels = [0, 1, 2, 3, 4, 5, 6, 7, 8];
-        assert_eq!(window.part(&pixels, &Crop { x0: 11, y0: 21, x1: 13, y1: 22 }), [4, 5]);
-        assert_eq!(window.part(&pixels, &Crop { x0: 10, y0: 22, x1: 11, y1: 23 }), [6]);
-        assert_eq!(window.part(&pixels, &window), pixels);
+        assert_eq!(window.cut(&pixels, &Crop { x0: 11, y0: 21, x1: 13, y1: 22 }), [4, 5]);
+        assert_eq!(window.cut(&pixels, &Crop { x0: 10, y0: 22, x1: 11, y1: 23 }), [6]);
+        assert_eq!(window.cut(&pixels, &window), pixels);
     }
 
     #[test]

@@ -19,14 +19,14 @@ pub struct Drawn {
 
 /// Samples of noise tiles, tile by tile.
 #[derive(Clone, Debug, Default)]
-pub struct DrawnTiles {
+pub struct DrawnNoiseTiles {
     /// The AOVs and layers of the tiles' pixels, and the sums of times and counts.
     pub drawn: Drawn,
     /// The means of the samples of each pixel. The fourth component is the mean of their squared luminance.
     pub means: Vec<[f32; 4]>,
 }
 
-impl DrawnTiles {
+impl DrawnNoiseTiles {
     /// Appends further tiles.
     pub(crate) fn append(&mut self, mut next: Self) {
         self.drawn.profile.add(&next.drawn.profile);
@@ -38,14 +38,14 @@ impl DrawnTiles {
 
 /// Follows the progress of a drawing.
 pub trait Watcher {
-    /// Whether the watcher makes use of [`Watcher::part`]. If it does not, the renderer saves the time to wait for
-    /// the device several times in a sample.
-    fn sees_parts(&self) -> bool {
+    /// Whether the watcher makes use of [`Watcher::sample_progress`]. If it does not, the renderer saves the time to
+    /// wait for the device several times in a sample.
+    fn sees_sample_progress(&self) -> bool {
         false
     }
 
     /// Is called when the share `_share` of the sample, 0 to 1, has been drawn.
-    fn part(&mut self, _share: f32) {}
+    fn sample_progress(&mut self, _share: f32) {}
 
     /// Is called when a sample of a band has been drawn.
     fn sample(&mut self);
@@ -62,12 +62,12 @@ pub trait Watcher {
 pub(crate) struct Unending<'a, W>(pub &'a mut W);
 
 impl<W: Watcher> Watcher for Unending<'_, W> {
-    fn sees_parts(&self) -> bool {
-        self.0.sees_parts()
+    fn sees_sample_progress(&self) -> bool {
+        self.0.sees_sample_progress()
     }
 
-    fn part(&mut self, share: f32) {
-        self.0.part(share);
+    fn sample_progress(&mut self, share: f32) {
+        self.0.sample_progress(share);
     }
 
     fn sample(&mut self) {

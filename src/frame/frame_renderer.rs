@@ -1,7 +1,8 @@
 //! The frames of a picture, one after the other, as a device and the CPU draw them.
 
 use super::{
-    Drawn, DrawnTiles, Goal, Integrator, MeanLayers, NoiseTiles, Pacer, Profile, RenderOptions, TileSamples, Watcher,
+    Drawn, DrawnNoiseTiles, Goal, Integrator, MeanLayers, NoiseTileSamples, NoiseTiles, Pacer, Profile, RenderOptions,
+    Watcher,
 };
 use crate::{
     gpu::GpuError,
@@ -25,7 +26,7 @@ pub trait FrameRenderer {
     /// The base-2 logarithm of the number of samples that the next frame of paths draws.
     fn samples_log2(&mut self) -> &mut u32;
 
-    /// Draws the next frame. Tells the watcher of its parts, but not of its samples.
+    /// Draws the next frame. Tells the watcher of the progress within it, but not of its samples.
     ///
     /// # Errors
     /// A call fails, or one pixel alone makes more rays than the queue holds.
@@ -35,7 +36,7 @@ pub trait FrameRenderer {
     ///
     /// # Errors
     /// The tiles exceed the device's limits or memory.
-    fn set_tiles(&mut self, tiles: NoiseTiles) -> Result<(), GpuError>;
+    fn set_noise_tiles(&mut self, tiles: NoiseTiles) -> Result<(), GpuError>;
 
     /// Returns the mean of the samples before the noise filter, of the whole window. In frames of paths, the fourth
     /// component is the mean of their squared luminance.
@@ -114,7 +115,7 @@ pub trait FrameRenderer {
         }
         if pixel_aovs && integrator == Integrator::Path {
             let options = self.options();
-            let means = options.window().part(self.window_mean()?, &options.crop_or_whole());
+            let means = options.window().cut(self.window_mean()?, &options.crop_or_whole());
             drawn.pixel_aovs.iter_mut().zip(means).for_each(|(aovs, mean)| aovs.set_noise(mean, drawn.n_samples));
         }
         drawn.layers = self.mean_layers()?;
@@ -124,16 +125,16 @@ pub trait FrameRenderer {
     /// Draws samples of noise tiles, up to `most` tiles together. All tiles get equally many.
     ///
     /// # Errors
-    /// Fails as [`FrameRenderer::draw_frame`] and [`FrameRenderer::set_tiles`] do.
-    fn draw_tiles(&mut self, tiles: &[TileSamples], most: usize) -> Result<DrawnTiles, GpuError> {
-        let mut all = DrawnTiles::default();
+    /// Fails as [`FrameRenderer::draw_frame`] and [`FrameRenderer::set_noise_tiles`] do.
+    fn draw_noise_tiles(&mut self, tiles: &[NoiseTileSamples], most: usize) -> Result<DrawnNoiseTiles, GpuError> {
+        let mut all = DrawnNoiseTiles::default();
         let n_chunks = tiles.len().div_ceil(most).max(1);
         for together in tiles.chunks(tiles.len().div_ceil(n_chunks).max(1)) {
             let tiles = NoiseTiles::new(together)?;
             let goal = Goal::Samples(tiles.n_samples());
-            self.set_tiles(tiles)?;
+            self.set_noise_tiles(tiles)?;
             let drawn = self.draw_window(goal, &mut || ())?;
-            all.append(DrawnTiles { drawn, means: self.window_mean()? });
+            all.append(DrawnNoiseTiles { drawn, means: self.window_mean()? });
         }
         Ok(all)
     }

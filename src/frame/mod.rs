@@ -41,12 +41,12 @@ pub use self::frame_renderer::FrameRenderer;
 pub use self::{
     aov::{Aov, Channel, Samples},
     crop::Crop,
-    drawn::{Drawn, DrawnTiles, Watcher},
+    drawn::{Drawn, DrawnNoiseTiles, Watcher},
     goal::{Goal, Pacer},
     mean_layers::{MeanLayers, RangeSums},
-    noise_tiles::{NoiseTiles, TileSamples},
+    noise_tiles::{NoiseTileSamples, NoiseTiles},
     pass::{Pass, Role, Scope},
-    plan::{Access, FrameKind, Plan, Section, Step},
+    plan::{Access, FrameProperties, PassSequence, Plan, PlanEntry},
     profile::{BounceStats, PassTime, Profile},
     resource::Resource,
     sample_range::{BlockSum, SampleRange, SampleSums, variance_of_joined},
@@ -75,7 +75,7 @@ pub struct RenderOptions {
     /// How light is computed.
     pub integrator: Integrator,
     /// Levels of rays, the primary rays included, 1 to [`RenderOptions::MOST_DEPTH`]: 1 is ray casting with shadows
-    /// (Algorithm 1's `maximumDepth`). To pass straight through an alpha-blended surface takes no level.
+    /// (Algorithm 1's `maximumDepth`). To pass straight through an alpha-blended surface makes a ray no deeper.
     pub max_depth: u32,
     /// Factor by which radiance is multiplied before it is encoded for display, finite and above 0.
     pub exposure: f32,
@@ -111,7 +111,7 @@ pub struct BadOptions(pub(crate) String);
 
 impl RenderOptions {
     /// The bounces that a scene with alpha-blended surfaces adds to those of `max_depth`, in frames of
-    /// [`Integrator::Whitted`]. A ray that passes straight through such a surface uses a bounce, but no level of rays.
+    /// [`Integrator::Whitted`]. A ray that passes straight through such a surface uses a bounce, but gets no deeper.
     pub const EXTRA_BOUNCES: u32 = 32;
 
     /// Returns the number of bounces of a frame, without [`RenderOptions::EXTRA_BOUNCES`]. Paths have one more than

@@ -10,7 +10,7 @@ use crate::layout::{MOST_NOISE_TILES, NOISE_TILE_SIZE};
 
 /// A tile, and samples that each of its pixels gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TileSamples {
+pub struct NoiseTileSamples {
     /// The place of the tile in the picture, in units of its side.
     pub place: UVec2,
     /// The samples: an aligned block.
@@ -42,7 +42,7 @@ impl NoiseTiles {
     /// # Errors
     /// There are none or more than [`NoiseTiles::MOST`]; a coordinate has more than 12 bits; the tiles get different
     /// numbers of samples, or samples of more than [`NoiseTiles::MOST_BLOCKS`] blocks.
-    pub fn new(tiles: &[TileSamples]) -> Result<Self, BadOptions> {
+    pub fn new(tiles: &[NoiseTileSamples]) -> Result<Self, BadOptions> {
         let first_sample = tiles.iter().map(|tile| tile.samples.first).min().unwrap_or(0);
         let n_samples = tiles.first().map_or(0, |tile| tile.samples.len());
         let is_block = n_samples.is_power_of_two() && first_sample.is_multiple_of(n_samples);
@@ -50,8 +50,8 @@ impl NoiseTiles {
             let n = tiles.len();
             return Err(BadOptions(format!("noise_tiles: {n} tiles of {n_samples} samples from {first_sample} on")));
         }
-        let word = |tile: &TileSamples| {
-            let TileSamples { place, samples } = *tile;
+        let word = |tile: &NoiseTileSamples| {
+            let NoiseTileSamples { place, samples } = *tile;
             let block = (samples.first - first_sample) / n_samples;
             let fits = place.max_element() <= 0xfff && samples.len() == n_samples && block < Self::MOST_BLOCKS;
             let is_right = fits && samples.first.is_multiple_of(n_samples);

@@ -3,7 +3,7 @@
 use super::resource::{
     Resource,
     Resource::{
-        Bounces, ChildKinds, Counters, FirstChildren, Hits, LightVisibility, LivePaths, PathSnapshots, PathStates,
+        Bounces, ChildFlags, Counters, FirstChildren, Hits, LightVisibility, LivePaths, PathSnapshots, PathStates,
         PixelAccumulated, PixelAovs, PixelAux, PixelDisplay, PixelFiltered, PixelNearest, PixelRadiance, RasterGroups,
         RayRadiance, Rays, ScanBlocks, ShadowRays, SuspendedRays, TriangleIds,
     },
@@ -29,7 +29,7 @@ pub enum Role {
 /// How often a frame runs a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scope {
-    /// Once, or for a filter of several steps, once for each step.
+    /// Once, or for a filter of several iterations, once for each.
     Frame,
     /// Once for each batch, for the rays of all its bounces together.
     Batch,
@@ -95,7 +95,7 @@ pub enum Pass {
     Auxiliary,
     /// Divides the light of each pixel by the albedo of what it shows, and estimates its variance.
     Demodulate,
-    /// Blurs the light within surfaces: one step of the noise filter `edge`.
+    /// Blurs the light within surfaces: one iteration of the noise filter `edge`.
     AtrousFilter,
 }
 
@@ -191,7 +191,7 @@ const TABLE: [Info; 27] = [
         scope: Scope::Bounce,
         color: [200, 90, 110],
         reads: &[Rays, Hits, Bounces],
-        writes: &[ChildKinds, ScanBlocks],
+        writes: &[ChildFlags, ScanBlocks],
         indirect: Some(Bounces),
     },
     Info {
@@ -210,7 +210,7 @@ const TABLE: [Info; 27] = [
         role: Role::Compaction,
         scope: Scope::Bounce,
         color: [245, 160, 165],
-        reads: &[Rays, Hits, ChildKinds, ScanBlocks, Bounces],
+        reads: &[Rays, Hits, ChildFlags, ScanBlocks, Bounces],
         writes: &[Rays, FirstChildren],
         indirect: Some(Bounces),
     },
@@ -311,7 +311,7 @@ const TABLE: [Info; 27] = [
         scope: Scope::Bounce,
         color: [240, 200, 70],
         reads: &[Rays, Hits, LivePaths, Bounces, PathStates],
-        writes: &[Rays, PathStates, ShadowRays, ChildKinds, ScanBlocks],
+        writes: &[Rays, PathStates, ShadowRays, ChildFlags, ScanBlocks],
         indirect: Some(Bounces),
     },
     Info {
@@ -320,7 +320,7 @@ const TABLE: [Info; 27] = [
         role: Role::Compaction,
         scope: Scope::Bounce,
         color: [250, 150, 150],
-        reads: &[ChildKinds, ScanBlocks, Bounces, LivePaths],
+        reads: &[ChildFlags, ScanBlocks, Bounces, LivePaths],
         writes: &[LivePaths],
         indirect: Some(Bounces),
     },

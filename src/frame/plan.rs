@@ -1,21 +1,21 @@
 //! The plan of a frame: the order of its passes and every barrier between them. GPU and CPU follow it.
 //!
-//! A section is a sequence of passes and barriers. The renderer records a section once for each time that it runs, in
-//! one or two command buffers.
+//! A pass sequence lists passes and barriers in the order of execution. The renderer records a sequence once for each
+//! time that it runs, in one or two command buffers.
 
 use super::{
     pass::Pass,
     resource::{
         Resource,
         Resource::{
-            Bounces, ChildKinds, Counters, FirstChildren, Hits, LightVisibility, LivePaths, PathSnapshots, PathStates,
+            Bounces, ChildFlags, Counters, FirstChildren, Hits, LightVisibility, LivePaths, PathSnapshots, PathStates,
             PixelAccumulated, PixelAovs, PixelAux, PixelFiltered, PixelNearest, PixelRadiance, RasterGroups,
             RayRadiance, Rays, ScanBlocks, ShadowRays,
         },
     },
     {Denoise, Integrator, Primary, RenderOptions},
 };
-use crate::layout::{EDGE_STEPS, Frame, LIGHT_LAYERS};
+use crate::layout::{Frame, LIGHT_LAYERS, N_ATROUS_ITERATIONS};
 
 /// How the passes before or after a barrier access its resources.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,9 +30,9 @@ pub enum Access {
     Indirect,
 }
 
-/// An entry of a section.
+/// An entry of a sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Step {
+pub enum PlanEntry {
     /// A pass runs.
     Run(Pass),
     /// The accesses of later passes to the resources wait for those of earlier passes.
@@ -42,17 +42,17 @@ pub enum Step {
         /// The accesses of later passes.
         after: Access,
         /// The resources for which the plan needs the barrier. The Vulkan barrier itself is not limited to them: it
-        /// orders accesses of these kinds to all memory.
+        /// orders accesses of these types to all memory.
         of: &'static [Resource],
     },
 }
 
 /// Passes and barriers in the order of execution.
-pub type Section = Vec<Step>;
+pub type PassSequence = Vec<PlanEntry>;
 
 /// The properties of a frame that decide which passes it has.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FrameKind {
+pub struct FrameProperties {
     /// How light is computed.
     pub integrator: Integrator,
     /// How primary rays find their triangles. Those of paths are always traced.
@@ -78,9 +78,9 @@ pub struct FrameKind {
     pub shows_aovs: bool,
 }
 
-impl FrameKind {
-    /// Returns the kind of a frame with the most passes that frames of these options can have: the frame is lit, and
-    /// its sample is added to earlier ones. It displays the picture. To display an AOV takes no more passes.
+impl FrameProperties {
+    /// Returns the properties of the frame with the most passes that frames of these options can have: the frame is
+    /// lit, and its sample is added to earlier ones. It displays the picture. To display an AOV takes no more passes.
     pub fn new(options: &RenderOptions, constants: &Frame) -> Self {
         Self {
             integrator: options.integrator,
@@ -106,47 +106,47 @@ impl FrameKind {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Plan {
     /// Finds the triangles that the pixels show, once a frame.
-    pub visibility: Section,
-    /// Finds the closest hits of a bounce and makes the next bounce's rays. One section a bounce, run for each batch.
-    pub bounces: Vec<Section>,
+    pub visibility: PassSequence,
+    /// Finds the closest hits of a bounce and makes the next bounce's rays. One sequence a bounce, run for each batch.
+    pub bounces: Vec<PassSequence>,
     /// Lights the hits of all bounces and adds up the light in the pixels, once a batch.
-    pub light: Section,
+    pub light: PassSequence,
     /// Turns the samples into the displayed picture, once a frame.
-    pub image: Section,
+    pub image: PassSequence,
 }
 
 impl Plan {
-    /// Returns the passes of a frame of this kind.
-    pub fn new(kind: &FrameKind) -> Self {
-        match kind.integrator {
-            Integrator::Whitted => Self::of_ray_trees(kind),
-            Integrator::Path => Self::of_paths(kind),
+    /// Returns the passes of a frame with these properties.
+    pub fn new(frame: &FrameProperties) -> Self {
+        match frame.integrator {
+            Integrator::Whitted => Self::of_ray_trees(frame),
+            Integrator::Path => Self::of_paths(frame),
         }
     }
 
     /// Returns the passes of a frame that traces paths.
-    fn of_paths(kind: &FrameKind) -> Self {
-        let mut light = if kind.light_layers { layer().to_vec() } else { Section::new() };
-        light.extend([Step::Run(Pass::PathResolve), barrier(Access::Write, Access::Update, &[PixelRadiance])]);
+    fn of_paths(frame: &FrameProperties) -> Self {
+        let mut light = if frame.light_layers { layer().to_vec() } else { PassSequence::new() };
+        light.extend([PlanEntry::Run(Pass::PathResolve), barrier(Access::Write, Access::Update, &[PixelRadiance])]);
         let sums = vec![
-            Step::Run(Pass::PathAccumulate),
+            PlanEntry::Run(Pass::PathAccumulate),
             barrier(Access::Write, Access::Read, &[PixelAccumulated, PixelRadiance]),
         ];
         Self {
-            visibility: Section::new(),
-            bounces: (0..kind.n_bounces).map(|depth| bounce_of_paths(kind, depth)).collect(),
-            light: if kind.is_lit { light } else { Section::new() },
-            image: [if kind.is_lit { sums } else { Section::new() }, display(kind)].concat(),
+            visibility: PassSequence::new(),
+            bounces: (0..frame.n_bounces).map(|depth| bounce_of_paths(frame, depth)).collect(),
+            light: if frame.is_lit { light } else { PassSequence::new() },
+            image: [if frame.is_lit { sums } else { PassSequence::new() }, display(frame)].concat(),
         }
     }
 
     /// Returns the passes of a frame that traces the paper's trees of reflected and refracted rays.
-    fn of_ray_trees(kind: &FrameKind) -> Self {
+    fn of_ray_trees(frame: &FrameProperties) -> Self {
         Self {
-            visibility: visibility(kind.primary),
-            bounces: (0..kind.n_bounces).map(|depth| bounce(kind, depth)).collect(),
-            light: if kind.is_lit { light(kind.has_lights) } else { Section::new() },
-            image: [samples(kind), display(kind)].concat(),
+            visibility: visibility(frame.primary),
+            bounces: (0..frame.n_bounces).map(|depth| bounce(frame, depth)).collect(),
+            light: if frame.is_lit { light(frame.has_lights) } else { PassSequence::new() },
+            image: [samples(frame), display(frame)].concat(),
         }
     }
 
@@ -158,136 +158,140 @@ impl Plan {
     }
 }
 
-/// Returns the passes of a section, without its barriers.
-pub fn passes(section: &[Step]) -> impl Iterator<Item = Pass> {
-    section.iter().filter_map(|step| match step {
-        Step::Run(pass) => Some(*pass),
-        Step::Barrier { .. } => None,
+/// Returns the passes of a sequence, without its barriers.
+pub fn passes(sequence: &[PlanEntry]) -> impl Iterator<Item = Pass> {
+    sequence.iter().filter_map(|entry| match entry {
+        PlanEntry::Run(pass) => Some(*pass),
+        PlanEntry::Barrier { .. } => None,
     })
 }
 
-/// Returns the section that rasterizes the triangle of each pixel. It is empty if primary rays are traced.
-pub fn visibility(primary: Primary) -> Section {
+/// Returns the sequence that rasterizes the triangle of each pixel. It is empty if primary rays are traced.
+pub fn visibility(primary: Primary) -> PassSequence {
     match primary {
-        Primary::Trace => Section::new(),
-        Primary::Raster => vec![Step::Run(Pass::Visibility)], // the pass itself makes triangle_ids visible to kernels
+        Primary::Trace => PassSequence::new(),
+        // The pass itself makes triangle_ids visible to kernels.
+        Primary::Raster => vec![PlanEntry::Run(Pass::Visibility)],
         Primary::SoftwareRaster => vec![
-            Step::Run(Pass::RasterizeTriangles),
+            PlanEntry::Run(Pass::RasterizeTriangles),
             barrier(Access::Write, Access::Update, &[PixelNearest, RasterGroups]),
             barrier(Access::Write, Access::Indirect, &[RasterGroups]),
-            Step::Run(Pass::RasterizeBlocks),
+            PlanEntry::Run(Pass::RasterizeBlocks),
             barrier(Access::Write, Access::Read, &[PixelNearest]),
         ],
     }
 }
 
-/// Returns the section of one bounce of paths: closest hits, then the light that the paths meet and the way on.
-fn bounce_of_paths(kind: &FrameKind, depth: u32) -> Section {
-    let mut bounce = Section::new();
+/// Returns the sequence of one bounce of paths: closest hits, then the light that the paths meet and the way on.
+fn bounce_of_paths(frame: &FrameProperties, depth: u32) -> PassSequence {
+    let mut bounce = PassSequence::new();
     if depth == 0 {
         bounce.extend([
-            Step::Run(Pass::PathBegin),
+            PlanEntry::Run(Pass::PathBegin),
             barrier(Access::Write, Access::Update, &[Rays, PathStates, ShadowRays, LivePaths]),
         ]);
     }
     bounce.extend([
-        Step::Run(Pass::PathTrace),
+        PlanEntry::Run(Pass::PathTrace),
         barrier(Access::Write, Access::Update, &[Hits, PathStates, ShadowRays, Counters, PixelAovs]),
     ]);
-    if depth == 0 && kind.pixel_aovs {
-        bounce.extend([Step::Run(Pass::PixelAovs), barrier(Access::Write, Access::Update, &[PixelAovs])]);
+    if depth == 0 && frame.pixel_aovs {
+        bounce.extend([PlanEntry::Run(Pass::PixelAovs), barrier(Access::Write, Access::Update, &[PixelAovs])]);
     }
-    bounce.extend(surface_layers(kind, depth));
-    if kind.is_lit {
+    bounce.extend(surface_layers(frame, depth));
+    if frame.is_lit {
         bounce.extend([
-            Step::Run(Pass::PathScatter),
-            barrier(Access::Write, Access::Update, &[Rays, PathStates, ShadowRays, ChildKinds, ScanBlocks]),
+            PlanEntry::Run(Pass::PathScatter),
+            barrier(Access::Write, Access::Update, &[Rays, PathStates, ShadowRays, ChildFlags, ScanBlocks]),
         ]);
     }
-    if depth == 0 && kind.is_lit && kind.denoise == Denoise::Edge {
-        bounce.extend([Step::Run(Pass::Auxiliary), barrier(Access::Write, Access::Update, &[PixelAux])]);
+    if depth == 0 && frame.is_lit && frame.denoise == Denoise::Edge {
+        bounce.extend([PlanEntry::Run(Pass::Auxiliary), barrier(Access::Write, Access::Update, &[PixelAux])]);
     }
     // The last layer is complete after the last bounce.
-    if depth + 1 < LIGHT_LAYERS && kind.is_lit && kind.light_layers {
+    if depth + 1 < LIGHT_LAYERS && frame.is_lit && frame.light_layers {
         bounce.extend(layer());
     }
-    if depth + 1 < kind.n_bounces {
+    if depth + 1 < frame.n_bounces {
         bounce.extend([
             barrier(Access::Indirect, Access::Write, &[Bounces]),
-            Step::Run(Pass::CompactSpine),
+            PlanEntry::Run(Pass::CompactSpine),
             barrier(Access::Write, Access::Read, &[ScanBlocks, Bounces]),
             barrier(Access::Write, Access::Indirect, &[Bounces]),
-            Step::Run(Pass::PathCompact),
+            PlanEntry::Run(Pass::PathCompact),
             barrier(Access::Write, Access::Update, &[LivePaths]),
         ]);
     }
     bounce
 }
 
-/// Returns the steps that add up what camera rays hit, if the frame has them and `depth` is the bounce of these rays.
-fn surface_layers(kind: &FrameKind, depth: u32) -> Section {
-    if depth > 0 || !kind.is_lit || !kind.surface_layers {
-        return Section::new();
+/// Returns the entries that add up what camera rays hit, if the frame has them and `depth` is the bounce of these rays.
+fn surface_layers(frame: &FrameProperties, depth: u32) -> PassSequence {
+    if depth > 0 || !frame.is_lit || !frame.surface_layers {
+        return PassSequence::new();
     }
-    vec![Step::Run(Pass::SurfaceLayers), barrier(Access::Write, Access::Update, &[PixelRadiance])]
+    vec![PlanEntry::Run(Pass::SurfaceLayers), barrier(Access::Write, Access::Update, &[PixelRadiance])]
 }
 
-/// Returns the steps that add up a layer of light.
-fn layer() -> [Step; 2] {
-    [Step::Run(Pass::PathLayers), barrier(Access::Write, Access::Update, &[PathSnapshots, PixelRadiance])]
+/// Returns the entries that add up a layer of light.
+fn layer() -> [PlanEntry; 2] {
+    [PlanEntry::Run(Pass::PathLayers), barrier(Access::Write, Access::Update, &[PathSnapshots, PixelRadiance])]
 }
 
-/// Returns the section that finds the closest hits of one bounce's rays and, from these, makes the next bounce's
+/// Returns the sequence that finds the closest hits of one bounce's rays and, from these, makes the next bounce's
 /// rays.
-fn bounce(kind: &FrameKind, depth: u32) -> Section {
-    let mut bounce = closest_hits(kind, depth);
-    if depth == 0 && kind.pixel_aovs {
-        bounce.extend([Step::Run(Pass::PixelAovs), barrier(Access::Write, Access::Update, &[PixelAovs])]);
+fn bounce(frame: &FrameProperties, depth: u32) -> PassSequence {
+    let mut bounce = closest_hits(frame, depth);
+    if depth == 0 && frame.pixel_aovs {
+        bounce.extend([PlanEntry::Run(Pass::PixelAovs), barrier(Access::Write, Access::Update, &[PixelAovs])]);
     }
-    bounce.extend(surface_layers(kind, depth));
-    if depth + 1 < kind.n_bounces {
+    bounce.extend(surface_layers(frame, depth));
+    if depth + 1 < frame.n_bounces {
         bounce.extend(next_rays());
     }
     bounce
 }
 
-/// Returns the steps that find the closest hits of one bounce's rays. If the frame rasterizes triangles, primary rays
+/// Returns the entries that find the closest hits of one bounce's rays. If the frame rasterizes triangles, primary rays
 /// are intersected with these. All other rays are traced through the acceleration structure.
-fn closest_hits(kind: &FrameKind, depth: u32) -> Section {
-    let is_rasterized = depth == 0 && kind.primary != Primary::Trace;
+fn closest_hits(frame: &FrameProperties, depth: u32) -> PassSequence {
+    let is_rasterized = depth == 0 && frame.primary != Primary::Trace;
     vec![
-        Step::Run(if is_rasterized { Pass::PrimaryHit } else { Pass::Trace }),
+        PlanEntry::Run(if is_rasterized { Pass::PrimaryHit } else { Pass::Trace }),
         barrier(Access::Write, Access::Update, &[Hits, Counters, PixelAovs]),
     ]
 }
 
-/// Returns the steps of compaction (the paper's section 2.1), which writes the rays that go on from the hits to the
+/// Returns the entries of compaction (the paper's section 2.1), which writes the rays that go on from the hits to the
 /// ray queue, without gaps, by a prefix sum.
-pub fn next_rays() -> Section {
+pub fn next_rays() -> PassSequence {
     vec![
-        Step::Run(Pass::CompactReduce),
-        barrier(Access::Write, Access::Update, &[ChildKinds, ScanBlocks]),
+        PlanEntry::Run(Pass::CompactReduce),
+        barrier(Access::Write, Access::Update, &[ChildFlags, ScanBlocks]),
         barrier(Access::Indirect, Access::Write, &[Bounces]),
-        Step::Run(Pass::CompactSpine),
+        PlanEntry::Run(Pass::CompactSpine),
         barrier(Access::Write, Access::Read, &[ScanBlocks, Bounces]),
         barrier(Access::Write, Access::Indirect, &[Bounces]),
-        Step::Run(Pass::CompactScatter),
+        PlanEntry::Run(Pass::CompactScatter),
         barrier(Access::Write, Access::Update, &[Rays, FirstChildren]),
     ]
 }
 
-/// Returns the section that lights the hits of all bounces, and adds up the light in the pixels. A dispatch lasts as
+/// Returns the sequence that lights the hits of all bounces, and adds up the light in the pixels. A dispatch lasts as
 /// long as its longest ray: one dispatch for the shadow rays of all bounces waits for such a ray once, not once a
 /// bounce.
-fn light(has_lights: bool) -> Section {
-    let mut light = Section::new();
+fn light(has_lights: bool) -> PassSequence {
+    let mut light = PassSequence::new();
     if has_lights {
-        light.extend([Step::Run(Pass::Shadow), barrier(Access::Write, Access::Update, &[LightVisibility, PixelAovs])]);
+        light.extend([
+            PlanEntry::Run(Pass::Shadow),
+            barrier(Access::Write, Access::Update, &[LightVisibility, PixelAovs]),
+        ]);
     }
     light.extend([
-        Step::Run(Pass::Shade),
+        PlanEntry::Run(Pass::Shade),
         barrier(Access::Write, Access::Update, &[RayRadiance, Counters]),
-        Step::Run(Pass::Resolve),
+        PlanEntry::Run(Pass::Resolve),
         // The next batch overwrites the ray queue. This barrier makes it wait until the passes of this batch have
         // read the queue.
         barrier(Access::Write, Access::Update, &[PixelRadiance]),
@@ -295,40 +299,42 @@ fn light(has_lights: bool) -> Section {
     light
 }
 
-/// Returns the steps that turn the frame's sample into the mean of all samples. There are none for a picture's first
+/// Returns the entries that turn the frame's sample into the mean of all samples. There are none for a picture's first
 /// sample and for a frame that is not lit.
-fn samples(kind: &FrameKind) -> Section {
-    if !kind.is_lit || !kind.adds_samples {
-        return Section::new();
+fn samples(frame: &FrameProperties) -> PassSequence {
+    if !frame.is_lit || !frame.adds_samples {
+        return PassSequence::new();
     }
-    vec![Step::Run(Pass::Accumulate), barrier(Access::Write, Access::Read, &[PixelAccumulated, PixelRadiance])]
+    vec![PlanEntry::Run(Pass::Accumulate), barrier(Access::Write, Access::Read, &[PixelAccumulated, PixelRadiance])]
 }
 
-/// Returns the steps that turn the mean of all samples into the displayed picture, or display an AOV in its place.
-pub fn display(kind: &FrameKind) -> Section {
-    let mut display = Section::new();
-    if kind.is_lit {
-        display.extend(noise_filter(kind.denoise));
+/// Returns the entries that turn the mean of all samples into the displayed picture, or display an AOV in its place.
+pub fn display(frame: &FrameProperties) -> PassSequence {
+    let mut display = PassSequence::new();
+    if frame.is_lit {
+        display.extend(noise_filter(frame.denoise));
     }
-    display.push(Step::Run(if kind.shows_aovs { Pass::FalseColor } else { Pass::Tonemap }));
+    display.push(PlanEntry::Run(if frame.shows_aovs { Pass::FalseColor } else { Pass::Tonemap }));
     display
 }
 
-/// Returns the steps of a noise filter.
-fn noise_filter(denoise: Denoise) -> Section {
+/// Returns the entries of a noise filter.
+fn noise_filter(denoise: Denoise) -> PassSequence {
     match denoise {
-        Denoise::Off => Section::new(),
-        Denoise::Paper { .. } => vec![Step::Run(Pass::Denoise), barrier(Access::Write, Access::Read, &[PixelFiltered])],
+        Denoise::Off => PassSequence::new(),
+        Denoise::Paper { .. } => {
+            vec![PlanEntry::Run(Pass::Denoise), barrier(Access::Write, Access::Read, &[PixelFiltered])]
+        }
         Denoise::Edge => {
-            let steps = std::iter::repeat_n(Pass::AtrousFilter, EDGE_STEPS as usize);
-            let passes = std::iter::once(Pass::Demodulate).chain(steps);
+            let entries = std::iter::repeat_n(Pass::AtrousFilter, N_ATROUS_ITERATIONS as usize);
+            let passes = std::iter::once(Pass::Demodulate).chain(entries);
             passes
-                .flat_map(|pass| [Step::Run(pass), barrier(Access::Write, Access::Update, &[PixelFiltered])])
+                .flat_map(|pass| [PlanEntry::Run(pass), barrier(Access::Write, Access::Update, &[PixelFiltered])])
                 .collect()
         }
     }
 }
 
-fn barrier(before: Access, after: Access, of: &'static [Resource]) -> Step {
-    Step::Barrier { before, after, of }
+fn barrier(before: Access, after: Access, of: &'static [Resource]) -> PlanEntry {
+    PlanEntry::Barrier { before, after, of }
 }

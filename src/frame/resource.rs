@@ -14,9 +14,9 @@ macro_rules! for_resources {
                 Rays(BIND_RAYS, queue.rays),
                 /// The closest hit of each ray.
                 Hits(BIND_HITS, queue.hits),
-                /// The kinds of each ray's children, the rays that go on from its hit: reflected, refracted, both or
+                /// Flags of each ray's children, the rays that go on from its hit: reflected, refracted, both or
                 /// none. In frames of paths: whether each path goes on, and whether it has a shadow ray.
-                ChildKinds(BIND_CHILD_KINDS, queue.child_kinds),
+                ChildFlags(BIND_CHILD_FLAGS, queue.child_flags),
                 /// The number of children of each block of rays, then the exclusive prefix sums of these numbers. In
                 /// frames of paths, two numbers for each block: of paths that go on, and of shadow rays.
                 ScanBlocks(BIND_SCAN_BLOCKS, queue.scan_blocks),

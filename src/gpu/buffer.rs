@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::{Access, Binding, Context, GpuError, memory::Object, raw_device::RawDevice};
 
-/// Greatest size of one part of an upload or download, bytes. Staging buffers of this size are cut from a block of
+/// Greatest size of one chunk of an upload or download, bytes. Staging buffers of this size are cut from a block of
 /// memory that the allocator keeps. Memory for larger ones would be mapped and pinned for each copy, which takes longer
 /// than the copy itself.
 const MOST_STAGING_BYTES: usize = 8 << 20;
@@ -119,8 +119,8 @@ impl<T: Pod> Buffer<T> {
         Ok(buffer)
     }
 
-    /// Creates a buffer of `len` elements and fills it part by part. Each call of `write(first, part)` has to set
-    /// `part` to the elements from index `first` on. At most 8 MiB of the elements are in the host's memory at a
+    /// Creates a buffer of `len` elements and fills it chunk by chunk. Each call of `write(first, chunk)` has to set
+    /// `chunk` to the elements from index `first` on. At most 8 MiB of the elements are in the host's memory at a
     /// time.
     ///
     /// # Errors
@@ -153,9 +153,9 @@ impl<T: Pod> Buffer<T> {
     /// The buffer has fewer elements.
     pub fn upload(&self, data: &[T]) -> Result<(), GpuError> {
         assert!(data.len() <= self.len, "`{}` holds {} elements, not {}", self.any.name, self.len, data.len());
-        self.upload_by(data.len(), |first, part| {
-            let from = &data[first..][..part.len()];
-            copy_by_threads(bytemuck::cast_slice_mut(part), bytemuck::cast_slice(from));
+        self.upload_by(data.len(), |first, chunk| {
+            let from = &data[first..][..chunk.len()];
+            copy_by_threads(bytemuck::cast_slice_mut(chunk), bytemuck::cast_slice(from));
         })
     }
 
@@ -167,13 +167,13 @@ impl<T: Pod> Buffer<T> {
     pub fn upload_at(&self, first: usize, data: &[T]) -> Result<(), GpuError> {
         let end = first + data.len();
         assert!(end <= self.len, "`{}` holds {} elements, not {end}", self.any.name, self.len);
-        self.upload_from((first, true), data.len(), |first, part| {
-            let from = &data[first..][..part.len()];
-            copy_by_threads(bytemuck::cast_slice_mut(part), bytemuck::cast_slice(from));
+        self.upload_from((first, true), data.len(), |first, chunk| {
+            let from = &data[first..][..chunk.len()];
+            copy_by_threads(bytemuck::cast_slice_mut(chunk), bytemuck::cast_slice(from));
         })
     }
 
-    /// Overwrites the first `len` elements, part by part, and waits for the device. `write` is that of
+    /// Overwrites the first `len` elements, chunk by chunk, and waits for the device. `write` is that of
     /// [`Buffer::written_by`].
     fn upload_by(&self, len: usize, write: impl FnMut(usize, &mut [T])) -> Result<(), GpuError> {
         self.upload_from((0, false), len, write)
@@ -219,14 +219,14 @@ impl<T: Pod> Buffer<T> {
     /// # Panics
     /// The buffer has fewer elements.
     pub fn download_first(&self, len: usize) -> Result<Vec<T>, GpuError> {
-        self.download_part(0, len)
+        self.download_range(0, len)
     }
 
     /// Downloads `len` elements from index `first` on and waits for the device.
     ///
     /// # Panics
     /// The buffer has fewer elements.
-    pub fn download_part(&self, first: usize, len: usize) -> Result<Vec<T>, GpuError> {
+    pub fn download_range(&self, first: usize, len: usize) -> Result<Vec<T>, GpuError> {
         let end = first + len;
         assert!(end <= self.len, "`{}` holds {} elements, not {end}", self.any.name, self.len);
         let mut data = vec![T::zeroed(); len];
@@ -248,16 +248,16 @@ impl<T: Pod> Buffer<T> {
         let location = MemoryLocation::GpuToCpu;
         let mut staging = Staging::new(context, &self.any.name, staging_bytes as u64, location)?;
         let mut begin = first as u64;
-        for part in to.chunks_mut(staging_bytes) {
-            let n_bytes = part.len() as u64;
+        for chunk in to.chunks_mut(staging_bytes) {
+            let n_bytes = chunk.len() as u64;
             context.run("download", |commands| {
                 commands.barrier(Access::ComputeWrite, Access::TransferRead); // the buffer
-                commands.copy_buffer_part((&self.any, begin), (&staging.buffer, 0), n_bytes);
+                commands.copy_buffer_range((&self.any, begin), (&staging.buffer, 0), n_bytes);
                 commands.barrier(Access::TransferWrite, Access::HostRead); // staging
             })?;
             begin += n_bytes;
-            let from = &staging.bytes()[..part.len()];
-            copy_by_threads(part, from);
+            let from = &staging.bytes()[..chunk.len()];
+            copy_by_threads(chunk, from);
         }
         Ok(())
     }
@@ -377,8 +377,8 @@ impl Drop for AnyBuffer {
 /// Copies bytes by several threads. One alone does not use the memory's whole bandwidth, and fresh pages are mapped one
 /// by one when they are first written.
 fn copy_by_threads(to: &mut [u8], from: &[u8]) {
-    let parts = to.par_chunks_mut(COPIED_BYTES).zip(from.par_chunks(COPIED_BYTES));
-    parts.for_each(|(to, from)| to.copy_from_slice(from));
+    let chunks = to.par_chunks_mut(COPIED_BYTES).zip(from.par_chunks(COPIED_BYTES));
+    chunks.for_each(|(to, from)| to.copy_from_slice(from));
 }
 
 /// A host-visible buffer for an upload or a download.

@@ -427,14 +427,14 @@ impl Commands<'_> {
 
     /// Copies the source's first `bytes` bytes to the destination, from its byte `begin` on.
     pub fn copy_buffer_to(&self, destination: (&Arc<AnyBuffer>, u64), source: &Arc<AnyBuffer>, bytes: u64) {
-        self.copy_buffer_part((source, 0), destination, bytes);
+        self.copy_buffer_range((source, 0), destination, bytes);
     }
 
     /// Copies `bytes` bytes. Both buffers come with the byte at which the copy begins.
     ///
     /// # Panics
     /// A buffer does not hold the bytes.
-    pub fn copy_buffer_part(
+    pub fn copy_buffer_range(
         &self,
         (source, source_begin): (&Arc<AnyBuffer>, u64),
         (destination, begin): (&Arc<AnyBuffer>, u64),

@@ -275,8 +275,9 @@ impl Context {
         let infos: Vec<_> = (buffers.iter())
             .map(|buffer| [vk::CommandBufferSubmitInfo::default().command_buffer(buffer.raw())])
             .collect();
-        let batches: Vec<_> = infos.iter().map(|info| vk::SubmitInfo2::default().command_buffer_infos(info)).collect();
-        self.queue.submit(&batches, buffers)
+        let submit_infos: Vec<_> =
+            infos.iter().map(|info| vk::SubmitInfo2::default().command_buffer_infos(info)).collect();
+        self.queue.submit(&submit_infos, buffers)
     }
 
     /// Submits a command buffer of copies. The copies wait for the point `after` and signal the point `then`.
@@ -298,11 +299,11 @@ impl Context {
         let (waits, signals) = (after.map(semaphore), then.map(semaphore));
         let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(buffer.raw())];
         // Whoever made the points has guaranteed that their semaphores are valid.
-        let batches = [vk::SubmitInfo2::default()
+        let submit_infos = [vk::SubmitInfo2::default()
             .wait_semaphore_infos(waits.as_slice())
             .command_buffer_infos(&commands)
             .signal_semaphore_infos(signals.as_slice())];
-        self.queue.submit(&batches, vec![buffer])
+        self.queue.submit(&submit_infos, vec![buffer])
     }
 
     /// Waits until the device has ended a submission.

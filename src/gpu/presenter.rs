@@ -186,11 +186,11 @@ impl Slot {
         let acquired = [vk::SemaphoreSubmitInfo::default()
             .semaphore(self.acquired)
             .stage_mask(vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT)];
-        let batch = [vk::SubmitInfo2::default()
+        let submit_info = [vk::SubmitInfo2::default()
             .wait_semaphore_infos(&acquired)
             .command_buffer_infos(buffers)
             .signal_semaphore_infos(drawn)];
-        self.drawing = Some(self.context.queue.submit(&batch, commands)?);
+        self.drawing = Some(self.context.queue.submit(&submit_info, commands)?);
         self.has_acquired = false;
         Ok(())
     }

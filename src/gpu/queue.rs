@@ -67,9 +67,13 @@ impl Queue {
         Self { state: Mutex::new(state), external_lock, is_lost, most_in_flight, device }
     }
 
-    /// Submits batches, and keeps their command buffers until the device has ended them. The semaphores and command
-    /// buffers that `batches` name must belong to the device, and the command buffers to `commands`.
-    pub fn submit(&self, batches: &[vk::SubmitInfo2], commands: Vec<CommandBuffer>) -> Result<Submission, GpuError> {
+    /// Submits command buffers, and keeps them until the device has ended them. The semaphores and
+    /// command buffers that `submit_infos` name must belong to the device, and the command buffers to `commands`.
+    pub fn submit(
+        &self,
+        submit_infos: &[vk::SubmitInfo2],
+        commands: Vec<CommandBuffer>,
+    ) -> Result<Submission, GpuError> {
         let names = || commands.iter().map(CommandBuffer::name).collect::<Vec<_>>().join(", ");
         if self.is_lost.load(Ordering::Relaxed) {
             return Err(GpuError::call("vkQueueSubmit2", &names())(vk::Result::ERROR_DEVICE_LOST));
@@ -83,7 +87,7 @@ impl Queue {
             let _external = self.lock_external();
             // SAFETY: the locks are held, nothing waits for the fence, and the commands stay in `in_flight` until the
             // fence is signalled.
-            unsafe { self.device.raw.queue_submit2(state.raw, batches, fence.raw) }
+            unsafe { self.device.raw.queue_submit2(state.raw, submit_infos, fence.raw) }
         };
         if let Err(result) = self.note(submitted) {
             // The fence of a submission that failed is as it was, but for a lost device.

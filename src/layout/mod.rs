@@ -86,7 +86,7 @@ mod tests {
             "kdtree_relocate.comp" => "KdPlace",
             kdtree if kdtree.starts_with("kdtree_") => "KdStage",
             "driver.rgen" => "DriverCast",
-            "atrous_filter.comp" => "EdgeStep",
+            "atrous_filter.comp" => "AtrousIteration",
             "deform_vertices.comp" | "deform_triangles.comp" => "DeformMesh",
             "false_color.comp" => "FalseColor",
             "present.frag" => "Present",

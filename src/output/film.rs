@@ -216,10 +216,10 @@ mod tests {
     /// Decodes planes as the standard does, and compares.
     #[test]
     fn planes_are_decoded_to_the_same_colours() {
-        let levels = [0_u8, 1, 17, 64, 128, 200, 254, 255];
-        let pixels: Vec<[u8; 4]> = levels
+        let values = [0_u8, 1, 17, 64, 128, 200, 254, 255];
+        let pixels: Vec<[u8; 4]> = values
             .into_iter()
-            .flat_map(|r| levels.into_iter().flat_map(move |g| levels.into_iter().map(move |b| [r, g, b, 255])))
+            .flat_map(|r| values.into_iter().flat_map(move |g| values.into_iter().map(move |b| [r, g, b, 255])))
             .collect();
         let planes = planes(&pixels);
         let n = pixels.len();

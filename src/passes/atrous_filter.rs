@@ -1,4 +1,4 @@
-//! Edge filter: blurs the light within surfaces, in several steps.
+//! Edge filter: blurs the light within surfaces, in several iterations.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use super::{kernel, spirv};
 use crate::{
     buffers::Resources,
     gpu::{BindingLayout, Commands, ComputePipeline, Constants, Context, GpuError},
-    layout::EdgeStep,
+    layout::AtrousIteration,
 };
 
 /// The pipeline of the pass.
@@ -21,9 +21,9 @@ impl AtrousFilter {
         })
     }
 
-    /// Needs `pixel_aux`, and the half of `pixel_filtered` that the step before has left: the second half for
-    /// even steps. Leaves the other half.
-    pub fn record(&self, commands: &Commands, resources: &Resources, step_ix: u32) {
-        commands.dispatch(&self.kernel, None, &EdgeStep { step_ix }, resources.pixel_dispatch());
+    /// Needs `pixel_aux`, and the half of `pixel_filtered` that the iteration before has left: the second half for
+    /// even iterations. Leaves the other half.
+    pub fn record(&self, commands: &Commands, resources: &Resources, iteration_ix: u32) {
+        commands.dispatch(&self.kernel, None, &AtrousIteration { iteration_ix }, resources.pixel_dispatch());
     }
 }

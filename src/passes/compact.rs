@@ -33,13 +33,13 @@ impl Compact {
         })
     }
 
-    /// Needs `rays` and `hits` of the bounce. Leaves the kinds of each ray's children in `child_kinds`, and the
+    /// Needs `rays` and `hits` of the bounce. Leaves the flags of each ray's children in `child_flags`, and the
     /// number of each block's children in `scan_blocks`.
     pub fn reduce(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         commands.dispatch(&self.reduce, Some(batch.depth), batch, resources.scan_dispatch(batch));
     }
 
-    /// Needs `rays` and `hits` of the bounce, `child_kinds`, `scan_blocks` and the next bounce's row of `bounces`.
+    /// Needs `rays` and `hits` of the bounce, `child_flags`, `scan_blocks` and the next bounce's row of `bounces`.
     /// Leaves `first_children` and the next bounce's `rays`.
     pub fn scatter(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         commands.dispatch(&self.scatter, Some(batch.depth), batch, resources.scan_dispatch(batch));

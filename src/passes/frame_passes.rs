@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use super::{
     AtrousFilter, Auxiliary, Demodulate, Denoise, FalseColor, Inputs, Passes, PathAccumulate, PathBegin, PathCompact,
-    PathLayers, PathResolve, PathScatter, PathTrace, PixelAovs, SurfaceLayers, Tonemap, record::record_steps,
+    PathLayers, PathResolve, PathScatter, PathTrace, PixelAovs, SurfaceLayers, Tonemap, record::record_entries,
 };
 use crate::{
     buffers::Resources,
-    frame::{Integrator, Pass, RenderOptions, Step},
+    frame::{Integrator, Pass, PlanEntry, RenderOptions},
     gpu::{BindingLayout, Commands, Context, GpuError},
 };
 
@@ -56,10 +56,10 @@ impl FramePasses {
     }
 
     /// Records passes and the barriers between them. The resources must be bound.
-    pub fn record_section(&self, commands: &Commands, resources: &Resources, section: &[Step], inputs: &Inputs) {
+    pub fn record_sequence(&self, commands: &Commands, resources: &Resources, sequence: &[PlanEntry], inputs: &Inputs) {
         match self {
-            Self::Whitted(passes) => passes.record_section(commands, resources, section, inputs),
-            Self::Path(passes) => passes.record_section(commands, resources, section, inputs),
+            Self::Whitted(passes) => passes.record_sequence(commands, resources, sequence, inputs),
+            Self::Path(passes) => passes.record_sequence(commands, resources, sequence, inputs),
         }
     }
 }
@@ -153,11 +153,11 @@ impl PathPasses {
     }
 
     /// Records passes and the barriers between them. The resources must be bound.
-    pub fn record_section(&self, commands: &Commands, resources: &Resources, section: &[Step], inputs: &Inputs) {
-        record_steps(commands, section, |pass, nth| self.record(commands, resources, (pass, nth), inputs));
+    pub fn record_sequence(&self, commands: &Commands, resources: &Resources, sequence: &[PlanEntry], inputs: &Inputs) {
+        record_entries(commands, sequence, |pass, nth| self.record(commands, resources, (pass, nth), inputs));
     }
 
-    /// Records one pass. `nth`: how often the section has run the pass before. The resources must be bound.
+    /// Records one pass. `nth`: how often the sequence has run the pass before. The resources must be bound.
     ///
     /// # Panics
     /// Frames of paths do not have `pass`, or `inputs` lacks the AOVs that it displays.

@@ -25,7 +25,7 @@ impl PathCompact {
         Ok(Self { spine: Spine::new(context, bindings)?, list: kernel("path_compact", spirv!("path_compact.comp"))? })
     }
 
-    /// Needs `child_kinds`, `scan_blocks` and the list of this bounce in `live_paths`. Leaves that of the next bounce
+    /// Needs `child_flags`, `scan_blocks` and the list of this bounce in `live_paths`. Leaves that of the next bounce
     /// and that of the shadow rays.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         commands.dispatch(&self.list, Some(batch.depth), batch, resources.scan_dispatch(batch));

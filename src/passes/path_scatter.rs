@@ -22,7 +22,7 @@ impl PathScatter {
     }
 
     /// Needs `hits` and `live_paths` of the bounce. Updates `rays` and `path_states`. Leaves `shadow_rays`,
-    /// `child_kinds` and in `scan_blocks` the numbers of each block's paths that go on and that have a shadow ray.
+    /// `child_flags` and in `scan_blocks` the numbers of each block's paths that go on and that have a shadow ray.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         commands.dispatch(&self.kernel, Some(batch.depth), batch, resources.scan_dispatch(batch));
     }

@@ -1,10 +1,10 @@
-//! Records a section of the frame's plan. The functions in a pass's file record the pass. A barrier is recorded by
+//! Records a sequence of the frame's plan. The functions in a pass's file record the pass. A barrier is recorded by
 //! its accesses alone, without its resources.
 
 use super::Passes;
 use crate::{
     buffers::Resources,
-    frame::{self, Pass, Step},
+    frame::{self, Pass, PlanEntry},
     gpu::{Access, Commands},
     layout::{Batch, FalseColor},
 };
@@ -30,8 +30,8 @@ impl Inputs {
 
 impl Passes {
     /// Records passes and the barriers between them. The resources must be bound.
-    pub fn record_section(&self, commands: &Commands, resources: &Resources, section: &[Step], inputs: &Inputs) {
-        record_steps(commands, section, |pass, _| self.record(commands, resources, pass, inputs));
+    pub fn record_sequence(&self, commands: &Commands, resources: &Resources, sequence: &[PlanEntry], inputs: &Inputs) {
+        record_entries(commands, sequence, |pass, _| self.record(commands, resources, pass, inputs));
     }
 
     /// Records one pass. The resources must be bound.
@@ -65,13 +65,13 @@ impl Passes {
     }
 }
 
-/// Records the steps of a section: passes by `record`, and barriers. `record` also receives how often the section has
-/// run the pass before.
-pub(super) fn record_steps(commands: &Commands, section: &[Step], record: impl Fn(Pass, u32)) {
-    for (i, step) in section.iter().enumerate() {
-        match *step {
-            Step::Run(pass) => record(pass, section[..i].iter().filter(|before| *before == step).count() as u32),
-            Step::Barrier { before, after, .. } => commands.barrier(access(before), access(after)),
+/// Records the entries of a sequence: passes by `record`, and barriers. `record` also receives how often the sequence
+/// has run the pass before.
+pub(super) fn record_entries(commands: &Commands, sequence: &[PlanEntry], record: impl Fn(Pass, u32)) {
+    for (i, entry) in sequence.iter().enumerate() {
+        match *entry {
+            PlanEntry::Run(pass) => record(pass, sequence[..i].iter().filter(|before| *before == entry).count() as u32),
+            PlanEntry::Barrier { before, after, .. } => commands.barrier(access(before), access(after)),
         }
     }
 }

@@ -1,11 +1,11 @@
-//! Edge filter: one step of the noise filter `edge`, an edge-avoiding à-trous wavelet transform that is guided by
+//! Edge filter: one iteration of the noise filter `edge`, an edge-avoiding à-trous wavelet transform that is guided by
 //! variance. Twin of `atrous_filter.comp`, which names the papers.
 
 use glam::{Vec4, Vec4Swizzles};
 use rayon::prelude::*;
 
 use super::{edge::surface_weight, noise::luminance_of};
-use crate::layout::{Auxiliary, EDGE_STEPS, EdgeStep, Frame};
+use crate::layout::{AtrousIteration, Auxiliary, Frame, N_ATROUS_ITERATIONS};
 
 /// How many standard deviations of noise the luminances of two pixels of one sample may differ until the weight has
 /// fallen to 1 / e.
@@ -22,26 +22,31 @@ const LEAST_VARIANCE: f32 = 1e-16;
 /// The weights of the five pixels in a row: a B-spline.
 const SPLINE: [f32; 3] = [0.375, 0.25, 0.0625];
 
-/// The pixels that a step reads.
+/// The pixels that an iteration reads.
 struct Source<'a> {
     size: [i32; 2],
     /// Standard deviations of noise that the luminances of two pixels may differ.
     deviations: f32,
-    step_ix: u32,
+    iteration_ix: u32,
     aux: &'a [Auxiliary],
     light: &'a [[f32; 4]],
 }
 
-/// Takes a step. `pixel_filtered`: two halves, each as long as the window has pixels. Even steps read the second half
-/// and write the first one.
-pub fn atrous_filter(frame: &Frame, step: &EdgeStep, pixel_aux: &[Auxiliary], pixel_filtered: &mut [[f32; 4]]) {
+/// Takes an iteration. `pixel_filtered`: two halves, each as long as the window has pixels. Even iterations read the
+/// second half and write the first one.
+pub fn atrous_filter(
+    frame: &Frame,
+    iteration: &AtrousIteration,
+    pixel_aux: &[Auxiliary],
+    pixel_filtered: &mut [[f32; 4]],
+) {
     let width = frame.width as usize;
     let n_pixels = width * frame.height as usize;
     let (first, second) = pixel_filtered[..2 * n_pixels].split_at_mut(n_pixels);
-    let (from, to) = if step.step_ix.is_multiple_of(2) { (second, first) } else { (first, second) };
+    let (from, to) = if iteration.iteration_ix.is_multiple_of(2) { (second, first) } else { (first, second) };
     let size = [frame.width as i32, frame.height as i32];
     let deviations = DEVIATIONS * (frame.n_samples as f32).powf(DEVIATIONS_POWER);
-    let source = Source { size, deviations, step_ix: step.step_ix, aux: pixel_aux, light: from };
+    let source = Source { size, deviations, iteration_ix: iteration.iteration_ix, aux: pixel_aux, light: from };
     to.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
         for (x, light) in row.iter_mut().enumerate() {
             *light = source.filtered(x as i32, y as i32).to_array();
@@ -57,7 +62,7 @@ fn mix(a: f32, b: f32, weight: f32) -> f32 {
 impl Source<'_> {
     fn filtered(&self, x: i32, y: i32) -> Vec4 {
         let light = self.mean_around(x, y);
-        if self.step_ix + 1 < EDGE_STEPS {
+        if self.iteration_ix + 1 < N_ATROUS_ITERATIONS {
             return light;
         }
         let aux = &self.aux[self.index_of(x, y).expect("a pixel of the window")];
@@ -94,7 +99,9 @@ impl Source<'_> {
         let luminance = luminance_of(light.xyz());
         let (mut weights, mut sum) = (0.0, Vec4::ZERO);
         for (dx, dy) in (-2..=2_i32).flat_map(|dy| (-2..=2_i32).map(move |dx| (dx, dy))) {
-            let Some(other_ix) = self.index_of(x + (dx << self.step_ix), y + (dy << self.step_ix)) else { continue };
+            let Some(other_ix) = self.index_of(x + (dx << self.iteration_ix), y + (dy << self.iteration_ix)) else {
+                continue;
+            };
             let found = Vec4::from(self.light[other_ix]);
             let spline = SPLINE[dx.unsigned_abs() as usize] * SPLINE[dy.unsigned_abs() as usize];
             let mut weight = spline * surface_weight(aux, &self.aux[other_ix]);

@@ -3,38 +3,38 @@
 
 use glam::{UVec2, Vec2, Vec3, uvec2, vec2};
 
-use crate::layout::{Frame, TILE_SIZE};
+use crate::layout::{Frame, PIXEL_GROUP_SIZE};
 
 /// Moves bits 0, 2 and 4 of a number below 64 to bits 0, 1 and 2.
 fn every_second_bit(n: u32) -> u32 {
     n & 1 | n >> 1 & 2 | n >> 2 & 4
 }
 
-/// The index from the top of the `k`-th of `n` bands, which are rows of tiles. `k` counts from 0, from the middle
+/// The index from the top of the `k`-th of `n` bands, which are rows of squares. `k` counts from 0, from the middle
 /// outward, alternately above and below. The last band is the bottom one, which the picture's border may cut.
 fn band_outward(k: u32, n: u32) -> u32 {
     let n_left = n - 1 - k;
     if n_left.is_multiple_of(2) { n - 1 - n_left / 2 } else { n_left / 2 }
 }
 
-/// The pixel at index `order` of the queue, from 0 to `width * height - 1`. Pixels are ordered tile by tile, and in
-/// each tile along a Z-curve, so that neighbours in the queue are blocks of the image. In tiles that the border cuts,
-/// pixels are ordered row by row. The bands of tiles come from the middle outward.
+/// The pixel at index `order` of the queue, from 0 to `width * height - 1`. Pixels are ordered square by square, and in
+/// each square along a Z-curve, so that neighbours in the queue are blocks of the image. In squares that the border
+/// cuts, pixels are ordered row by row. The bands of squares come from the middle outward.
 pub fn pixel_of(order: u32, width: u32, height: u32) -> UVec2 {
-    let nth_band = order / (TILE_SIZE * width);
-    let in_band = order - nth_band * TILE_SIZE * width;
-    let band = band_outward(nth_band, height.div_ceil(TILE_SIZE));
-    let rows = TILE_SIZE.min(height - band * TILE_SIZE);
-    let tile = in_band / (TILE_SIZE * rows);
-    let in_tile = in_band - tile * TILE_SIZE * rows;
-    let columns = TILE_SIZE.min(width - tile * TILE_SIZE);
-    let is_whole = rows == TILE_SIZE && columns == TILE_SIZE;
+    let nth_band = order / (PIXEL_GROUP_SIZE * width);
+    let in_band = order - nth_band * PIXEL_GROUP_SIZE * width;
+    let band = band_outward(nth_band, height.div_ceil(PIXEL_GROUP_SIZE));
+    let rows = PIXEL_GROUP_SIZE.min(height - band * PIXEL_GROUP_SIZE);
+    let square = in_band / (PIXEL_GROUP_SIZE * rows);
+    let in_square = in_band - square * PIXEL_GROUP_SIZE * rows;
+    let columns = PIXEL_GROUP_SIZE.min(width - square * PIXEL_GROUP_SIZE);
+    let is_whole = rows == PIXEL_GROUP_SIZE && columns == PIXEL_GROUP_SIZE;
     let at = if is_whole {
-        uvec2(every_second_bit(in_tile), every_second_bit(in_tile >> 1))
+        uvec2(every_second_bit(in_square), every_second_bit(in_square >> 1))
     } else {
-        uvec2(in_tile % columns, in_tile / columns)
+        uvec2(in_square % columns, in_square / columns)
     };
-    TILE_SIZE * uvec2(tile, band) + at
+    PIXEL_GROUP_SIZE * uvec2(square, band) + at
 }
 
 /// The pixel's index in buffers of the window's pixels, which hold rows from the top.

@@ -17,10 +17,9 @@ fn kept_weight(ray: &PathRay, material: &Material, weight: Vec3) -> Vec3 {
     if (ray.throughput * weight).cmpgt(Vec3::splat(least)).any() { weight } else { Vec3::ZERO }
 }
 
-/// Whether the ray is on the last level of rays, and has no children that use a further one. In frames with bounces
-/// beside the levels, the `t_max` of a ray says how many levels the ray has used: as many floats lie between it and
-/// infinity.
-fn is_on_last_level(frame: &Frame, ray: &PathRay) -> bool {
+/// Whether the ray is at the last depth, and has no children that are deeper. In frames with more bounces than depths,
+/// the `t_max` of a ray says the ray's depth: as many floats lie between it and infinity.
+fn is_at_last_depth(frame: &Frame, ray: &PathRay) -> bool {
     let n_used = || f32::INFINITY.to_bits() - ray.t_max.to_bits();
     frame.extra_bounces > 0 && n_used() + 1 >= frame.max_depth - frame.extra_bounces
 }
@@ -31,7 +30,7 @@ fn scattering_at(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> (Surface, S
     let transmitted = transmittance(&material, &surface, hit.t);
     next.reflected_weight = kept_weight(ray, &material, next.reflected_weight * transmitted);
     next.transmitted_weight = kept_weight(ray, &material, next.transmitted_weight * transmitted);
-    if is_on_last_level(inputs.frame(), ray) {
+    if is_at_last_depth(inputs.frame(), ray) {
         next.reflected_weight = Vec3::ZERO;
         next.transmitted_weight = if next.passes_straight { next.transmitted_weight } else { Vec3::ZERO };
     }
@@ -39,7 +38,7 @@ fn scattering_at(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> (Surface, S
 }
 
 /// The ray's children that carry light, as bits `CHILD_*`.
-pub fn child_kinds_of(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> u32 {
+pub fn child_flags_of(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> u32 {
     if hit.triangle_ix == NO_TRIANGLE {
         return 0;
     }
@@ -53,19 +52,19 @@ pub fn child_kinds_of(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> u32 {
     reflected | transmitted
 }
 
-/// The ray's children of these kinds (bits `CHILD_*`), the reflected one first.
-pub fn children_of(inputs: &KernelInputs, ray: &PathRay, hit: &Hit, kinds: u32) -> impl Iterator<Item = PathRay> {
-    let scattering = (kinds != 0).then(|| scattering_at(inputs, ray, hit));
+/// The ray's children of these flags (bits `CHILD_*`), the reflected one first.
+pub fn children_of(inputs: &KernelInputs, ray: &PathRay, hit: &Hit, flags: u32) -> impl Iterator<Item = PathRay> {
+    let scattering = (flags != 0).then(|| scattering_at(inputs, ray, hit));
     let children = scattering.map(|(surface, next)| {
         [
             (CHILD_REFLECTED, next.reflected, next.reflected_weight, true),
             (CHILD_TRANSMITTED, next.transmitted, next.transmitted_weight, !next.passes_straight),
         ]
-        .map(|(kind, direction, weight, uses_level)| {
-            (kinds & kind != 0).then(|| {
+        .map(|(flag, direction, weight, is_deeper)| {
+            (flags & flag != 0).then(|| {
                 let child = surface.ray_from(direction, hit.triangle_ix, ray, ray.throughput * weight);
-                let uses_level = uses_level && inputs.frame().extra_bounces > 0;
-                PathRay { t_max: if uses_level { ray.t_max.next_down() } else { ray.t_max }, ..child }
+                let is_deeper = is_deeper && inputs.frame().extra_bounces > 0;
+                PathRay { t_max: if is_deeper { ray.t_max.next_down() } else { ray.t_max }, ..child }
             })
         })
     });

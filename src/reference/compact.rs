@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::{
     RAYS_PER_TASK,
-    children::{child_kinds_of, children_of},
+    children::{child_flags_of, children_of},
     inputs::KernelInputs,
 };
 use crate::layout::{Bounce, Frame, Hit, PathRay, SCAN_GROUP_SIZE};
@@ -21,17 +21,17 @@ pub struct Parents<'a> {
     pub hits: &'a [Hit],
 }
 
-/// Writes which child rays start at each hit (`child_kinds`, bits `CHILD_*`), and how many start at the hits of each
+/// Writes which child rays start at each hit (`child_flags`, bits `CHILD_*`), and how many start at the hits of each
 /// block of `SCAN_GROUP_SIZE` rays (`scan_blocks`).
-pub fn reduce(inputs: &KernelInputs, parents: Parents, child_kinds: &mut [u32], scan_blocks: &mut [u32]) {
+pub fn reduce(inputs: &KernelInputs, parents: Parents, child_flags: &mut [u32], scan_blocks: &mut [u32]) {
     (parents.rays.par_chunks(BLOCK).zip(parents.hits.par_chunks(BLOCK)))
-        .zip(child_kinds.par_chunks_mut(BLOCK).zip(scan_blocks))
+        .zip(child_flags.par_chunks_mut(BLOCK).zip(scan_blocks))
         .with_min_len(BLOCKS_PER_TASK)
-        .for_each(|((rays, hits), (kinds, sum))| {
-            for ((ray, hit), kinds) in rays.iter().zip(hits).zip(&mut *kinds) {
-                *kinds = child_kinds_of(inputs, ray, hit);
+        .for_each(|((rays, hits), (flags, sum))| {
+            for ((ray, hit), flags) in rays.iter().zip(hits).zip(&mut *flags) {
+                *flags = child_flags_of(inputs, ray, hit);
             }
-            *sum = kinds.iter().map(|kinds| kinds.count_ones()).sum();
+            *sum = flags.iter().map(|flags| flags.count_ones()).sum();
         });
 }
 
@@ -81,21 +81,21 @@ fn size_next_bounce(n_wanted: u32, constants: &Frame, this: &Bounce, next: &mut 
 pub fn scatter(
     inputs: &KernelInputs,
     parents: Parents,
-    child_kinds: &[u32],
+    child_flags: &[u32],
     scan_blocks: &[u32],
     first_ray: u32,
     first_children: &mut [u32],
     next_rays: &mut [PathRay],
 ) {
     let places = places_of_blocks(scan_blocks, |begin| *begin, next_rays);
-    (parents.rays.par_chunks(BLOCK).zip(parents.hits.par_chunks(BLOCK)).zip(child_kinds.par_chunks(BLOCK)))
+    (parents.rays.par_chunks(BLOCK).zip(parents.hits.par_chunks(BLOCK)).zip(child_flags.par_chunks(BLOCK)))
         .zip(first_children.par_chunks_mut(BLOCK).zip(scan_blocks).zip(places))
         .with_min_len(BLOCKS_PER_TASK)
-        .for_each(|(((rays, hits), kinds), ((first_children, &begin), place))| {
+        .for_each(|(((rays, hits), flags), ((first_children, &begin), place))| {
             let mut n_made = 0;
-            for (((ray, hit), &kinds), first_child) in rays.iter().zip(hits).zip(kinds).zip(first_children) {
+            for (((ray, hit), &flags), first_child) in rays.iter().zip(hits).zip(flags).zip(first_children) {
                 *first_child = first_ray + begin + n_made as u32;
-                for child in children_of(inputs, ray, hit, kinds) {
+                for child in children_of(inputs, ray, hit, flags) {
                     place[n_made] = child;
                     n_made += 1;
                 }

@@ -77,7 +77,7 @@ impl<'a> Builder<'a> {
     }
 
     fn slabs(&self) -> Vec<Slab> {
-        let areas: Vec<Vec3> = (0..self.entry_leaves.len()).map(|entry| area_of(&self.part_of(entry).0)).collect();
+        let areas: Vec<Vec3> = (0..self.entry_leaves.len()).map(|entry| area_of(&self.piece_of(entry).0)).collect();
         let slab_of = |node_ix: usize| {
             let (share, range) = (self.thickest_share(node_ix), self.ranges[node_ix]);
             if share == 0.0 {
@@ -117,8 +117,8 @@ impl<'a> Builder<'a> {
         0.5 * (self.world_scale() * min + self.world_scale() * max)
     }
 
-    /// Returns the corners of an entry's part from the centre of its leaf's cell, D, and the scale of its triangle.
-    fn part_of(&self, entry_ix: usize) -> (Vec<Vec3>, f32, u32) {
+    /// Returns the corners of an entry's piece from the centre of its leaf's cell, D, and the scale of its triangle.
+    fn piece_of(&self, entry_ix: usize) -> (Vec<Vec3>, f32, u32) {
         let triangle = &self.triangles[self.tree.leaf_triangles()[entry_ix] as usize];
         let cell = self.cells[self.entry_leaves[entry_ix]];
         let (world_scale, centre) = (self.world_scale(), self.scaled_centre(cell));
@@ -130,12 +130,12 @@ impl<'a> Builder<'a> {
         let scale = self.scale_of_length(corners.into_iter().fold(0.0, |most, v| v.abs().max_element().max(most)));
         let margin = world_scale * self.constants.margin * length_of(scale) + SLACK * reach;
         let [low, high] = [snapped(low - margin), snapped(high + margin)];
-        let mut part = Some(local.to_vec());
+        let mut piece = Some(local.to_vec());
         for axis in 0..3 {
-            part = part.and_then(|part| clipped(part, axis, -1.0, low[axis]));
-            part = part.and_then(|part| clipped(part, axis, 1.0, high[axis]));
+            piece = piece.and_then(|piece| clipped(piece, axis, -1.0, low[axis]));
+            piece = piece.and_then(|piece| clipped(piece, axis, 1.0, high[axis]));
         }
-        (part.unwrap_or(local.to_vec()), reach, scale)
+        (piece.unwrap_or(local.to_vec()), reach, scale)
     }
 
     fn scale_of_length(&self, extent: f32) -> u32 {
@@ -147,11 +147,11 @@ impl<'a> Builder<'a> {
         let (first, count) = self.ranges[node_ix];
         let mut extent = Extent { low: f32::INFINITY, high: f32::NEG_INFINITY, scale: u32::MAX };
         for entry_ix in first..first + count {
-            let (part, reach, scale) = self.part_of(entry_ix);
+            let (piece, reach, scale) = self.piece_of(entry_ix);
             let leaf_cell = self.cells[self.entry_leaves[entry_ix]];
             let shift = self.scaled_centre(leaf_cell) - self.scaled_centre(self.cells[node_ix]);
             let slack = SLACK * reach.max(shift.abs().max_element());
-            for corner in part {
+            for corner in piece {
                 let height = normal.dot(corner + shift);
                 extent.low = extent.low.min(height - slack);
                 extent.high = extent.high.max(height + slack);
@@ -192,14 +192,14 @@ fn snapped(v: Vec3) -> Vec3 {
 }
 
 /// Cuts off what is above a position on an axis (`side` 1) or below it (-1). Returns none if there is no room.
-fn clipped(part: Vec<Vec3>, axis: usize, side: f32, position: f32) -> Option<Vec<Vec3>> {
+fn clipped(piece: Vec<Vec3>, axis: usize, side: f32, position: f32) -> Option<Vec<Vec3>> {
     let height = |v: &Vec3| side * (v[axis] - position);
-    if !part.iter().any(|corner| height(corner) > 0.0) {
-        return Some(part);
+    if !piece.iter().any(|corner| height(corner) > 0.0) {
+        return Some(piece);
     }
     let mut kept = Vec::new();
-    let before = part.last().into_iter().chain(&part);
-    for (a, b) in before.zip(&part) {
+    let before = piece.last().into_iter().chain(&piece);
+    for (a, b) in before.zip(&piece) {
         let (height_a, height_b) = (height(a), height(b));
         if (height_a > 0.0 && height_b < 0.0) || (height_a < 0.0 && height_b > 0.0) {
             kept.push(snapped(a + height_a / (height_a - height_b) * (b - a)));
@@ -211,8 +211,8 @@ fn clipped(part: Vec<Vec3>, axis: usize, side: f32, position: f32) -> Option<Vec
     (kept.len() <= MAX_CORNERS).then_some(kept)
 }
 
-fn area_of(part: &[Vec3]) -> Vec3 {
-    let Some((apex, rest)) = part.split_first() else { return Vec3::ZERO };
+fn area_of(piece: &[Vec3]) -> Vec3 {
+    let Some((apex, rest)) = piece.split_first() else { return Vec3::ZERO };
     rest.windows(2).fold(Vec3::ZERO, |area, edge| area + (edge[0] - apex).cross(edge[1] - apex))
 }
 

@@ -12,7 +12,7 @@ use crate::{
 /// Bounds of a reference and its triangle.
 type Reference = (Bounds, u32);
 
-/// Arrays of a tree ([`Parts`](crate::accel::kdtree::Parts)), without planes.
+/// Arrays of a tree ([`KdArrays`](crate::accel::kdtree::KdArrays)), without planes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tree {
     pub nodes: Vec<KdNode>,
@@ -57,9 +57,9 @@ fn node(input: &Input, tree: &mut Tree, (node_ix, level): (usize, u32), cell: &B
     tree.parents.push(node_ix as u32);
     let (mut below, mut above) = (Vec::new(), Vec::new());
     for reference in &references {
-        let parts = sort_out(input, cell, (axis, position), reference);
-        below.extend(parts[0]);
-        above.extend(parts[1]);
+        let pieces = sort_out(input, cell, (axis, position), reference);
+        below.extend(pieces[0]);
+        above.extend(pieces[1]);
     }
     let children = cell.split(axis, position);
     node(input, tree, (2 * pair_ix, level + 1), &children[0], below);
@@ -185,7 +185,7 @@ fn consider_bins(best: &mut Best, areas: &Areas, references: &[Reference]) {
     }
 }
 
-/// Twin of kdtree_sort_out.comp: a reference's parts below and above a plane.
+/// Twin of kdtree_sort_out.comp: a reference's pieces below and above a plane.
 fn sort_out(
     input: &Input,
     cell: &Bounds,
@@ -198,9 +198,9 @@ fn sort_out(
     if bounds.min[axis] >= position {
         return [None, Some((bounds, triangle_ix))];
     }
-    let parts = bounds.split(axis, position);
+    let pieces = bounds.split(axis, position);
     if !(f32::from_bits((127 - 90) << 23)..=f32::from_bits((127 + 110) << 23)).contains(&input.margin) {
-        return parts.map(|part| Some((part, triangle_ix)));
+        return pieces.map(|piece| Some((piece, triangle_ix)));
     }
     let triangle = &input.triangles[triangle_ix as usize];
     let reach = input.margin + slack_of(triangle);
@@ -209,17 +209,17 @@ fn sort_out(
         for (is_above, limit) in [(false, cell.min[face] - reach), (true, cell.max[face] + reach)] {
             polygon = cut(&polygon, face, is_above, limit);
             if polygon.len() > MAX_CORNERS {
-                return parts.map(|part| Some((part, triangle_ix)));
+                return pieces.map(|piece| Some((piece, triangle_ix)));
             }
         }
     }
-    let part = |limits: &Bounds, is_below, limit| {
+    let piece = |limits: &Bounds, is_below, limit| {
         let corners = cut(&polygon, axis, is_below, limit);
         let point = |p: &[f32; 3]| Bounds { min: p.map(|x| x - reach), max: p.map(|x| x + reach) };
         let bounds = corners.iter().map(point).reduce(|a, b| a.union(&b))?.intersection(limits);
         (0..3).all(|k| bounds.min[k] <= bounds.max[k]).then_some((bounds, triangle_ix))
     };
-    [part(&parts[0], true, position + reach), part(&parts[1], false, position - reach)]
+    [piece(&pieces[0], true, position + reach), piece(&pieces[1], false, position - reach)]
 }
 
 /// Room for the rounding of clipping, whose proof is in kd_clip.glsl.

@@ -7,7 +7,7 @@ use super::{
     RAYS_PER_TASK,
     alpha_test::alpha_seed_of,
     inputs::KernelInputs,
-    live_paths::{Part, parts},
+    live_paths::{PathSlice, path_slices},
     paths::{key_of_path, pixel_of_path},
     search_ray::SearchRay,
     traverser::{Tracer, Traverser},
@@ -55,7 +55,7 @@ pub fn closest_hits_by<T: Tracer>(
     hits: &mut [Hit],
 ) -> u32 {
     let inputs = &inputs.with_stochastic_alpha();
-    let trace = |tracer: &mut T, live: &[u32], mut hits: Part<Hit>| {
+    let trace = |tracer: &mut T, live: &[u32], mut hits: PathSlice<Hit>| {
         let mut n_hits = 0;
         let search_ray = |path_ix| search_ray_of(inputs, batch, path_ix, &rays[path_ix as usize], false);
         let search_rays = live.iter().map(|&path_ix| (path_ix, search_ray(path_ix)));
@@ -65,7 +65,7 @@ pub fn closest_hits_by<T: Tracer>(
         });
         n_hits
     };
-    let chunks = live.par_chunks(RAYS_PER_TASK).zip(parts(hits, live, RAYS_PER_TASK));
+    let chunks = live.par_chunks(RAYS_PER_TASK).zip(path_slices(hits, live, RAYS_PER_TASK));
     chunks.map_init(new_tracer, |tracer, (live, hits)| trace(tracer, live, hits)).sum()
 }
 
@@ -90,21 +90,23 @@ pub fn shadow_rays_by<T: Tracer>(
     (shadow_rays, states): (&mut [ShadowRay], &mut [PathState]),
 ) {
     let inputs = &inputs.with_stochastic_alpha();
-    let test = |tracer: &mut T, list: &[u32], mut shadow_rays: Part<ShadowRay>, mut states: Part<PathState>| {
-        let search_ray = |&path_ix: &u32| {
-            let ray = ray_of(shadow_rays.of_path(path_ix));
-            (path_ix, search_ray_of(inputs, batch, path_ix, &ray, true))
+    let test =
+        |tracer: &mut T, list: &[u32], mut shadow_rays: PathSlice<ShadowRay>, mut states: PathSlice<PathState>| {
+            let search_ray = |&path_ix: &u32| {
+                let ray = ray_of(shadow_rays.of_path(path_ix));
+                (path_ix, search_ray_of(inputs, batch, path_ix, &ray, true))
+            };
+            let search_rays: Vec<_> = list.iter().map(search_ray).collect();
+            tracer.trace_all::<true, _>(inputs, search_rays.into_iter(), |path_ix, hit| {
+                let shadow_ray = shadow_rays.of_path(path_ix);
+                shadow_ray.state = SHADOW_RAY_NONE;
+                if hit.triangle_ix == NO_TRIANGLE {
+                    states.of_path(path_ix).radiance += shadow_ray.light;
+                }
+            });
         };
-        let search_rays: Vec<_> = list.iter().map(search_ray).collect();
-        tracer.trace_all::<true, _>(inputs, search_rays.into_iter(), |path_ix, hit| {
-            let shadow_ray = shadow_rays.of_path(path_ix);
-            shadow_ray.state = SHADOW_RAY_NONE;
-            if hit.triangle_ix == NO_TRIANGLE {
-                states.of_path(path_ix).radiance += shadow_ray.light;
-            }
-        });
-    };
-    let of_paths = (parts(shadow_rays, with_shadow_ray, RAYS_PER_TASK), parts(states, with_shadow_ray, RAYS_PER_TASK));
+    let of_paths =
+        (path_slices(shadow_rays, with_shadow_ray, RAYS_PER_TASK), path_slices(states, with_shadow_ray, RAYS_PER_TASK));
     let chunks = with_shadow_ray.par_chunks(RAYS_PER_TASK).zip(of_paths);
     let test_chunk = |tracer: &mut T, (list, (shadow_rays, states))| test(tracer, list, shadow_rays, states);
     chunks.for_each_init(new_tracer, test_chunk);

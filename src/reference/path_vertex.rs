@@ -1,4 +1,4 @@
-//! One step of a path: the light at its hit, and the way on. Twin of `shading/path_vertex.glsl`.
+//! One vertex of a path: the light at its hit, and the way on. Twin of `shading/path_vertex.glsl`.
 
 use glam::{Vec2, Vec3, vec3};
 
@@ -160,7 +160,7 @@ fn survives(depth: u32, u: f32, throughput: &mut Vec3) -> bool {
 /// Adds the light that the path's ray meets to its state, samples a light at the hit, and replaces the ray by the one
 /// with which the path goes on. Returns whether it does, and the shadow ray to the light. `choices` is called if the
 /// path makes random decisions.
-pub fn step_path(
+pub fn scatter_path(
     inputs: &KernelInputs,
     choices: impl FnOnce() -> HitChoices,
     depth: u32,
@@ -175,11 +175,11 @@ pub fn step_path(
         state.radiance += added_light(inputs, ray.throughput * light, depth);
         return (false, NO_SHADOW_RAY);
     }
-    step_past_lights(inputs, choices, depth, hit, ray, state)
+    scatter_past_lights(inputs, choices, depth, hit, ray, state)
 }
 
-/// Does what [`step_path`] does, for a ray that meets no rectangle, disk or sphere which shines.
-pub fn step_past_lights(
+/// Does what [`scatter_path`] does, for a ray that meets no rectangle, disk or sphere which shines.
+pub fn scatter_past_lights(
     inputs: &KernelInputs,
     choices: impl FnOnce() -> HitChoices,
     depth: u32,

@@ -8,8 +8,8 @@ use super::{GpuRenderer, JoinedPicture};
 use crate::{
     buffers::Pixels,
     frame::{
-        Crop, Drawn, DrawnTiles, FrameRenderer, Goal, NoiseTiles, PathOptions, Picture, Profile, RenderOptions,
-        TileSamples, Unending, Watcher,
+        Crop, Drawn, DrawnNoiseTiles, FrameRenderer, Goal, NoiseTileSamples, NoiseTiles, PathOptions, Picture, Profile,
+        RenderOptions, Unending, Watcher,
     },
     gpu::{Context, DeviceInfo, ExternalImage, GpuError, Limits, TimelinePoint},
     scene::Camera,
@@ -204,12 +204,12 @@ impl BandedRenderer {
     ///
     /// # Errors
     /// Fails as [`BandedRenderer::draw`] does.
-    pub fn draw_tiles(&mut self, tiles: &[TileSamples]) -> Result<DrawnTiles, GpuError> {
+    pub fn draw_noise_tiles(&mut self, tiles: &[NoiseTileSamples]) -> Result<DrawnNoiseTiles, GpuError> {
         let n_pixels = self.renderer.context.limits().storage_range / Pixels::bytes_per_pixel(self.renderer.options());
         let most = (n_pixels as usize / NoiseTiles::N_PIXELS).clamp(1, NoiseTiles::MOST);
         // One band that no crop equals, so that `set_crop` sets the next one.
         (self.bands, self.joined) = (vec![Crop::whole(0, 0)], None);
-        self.renderer.draw_tiles(tiles, most)
+        self.renderer.draw_noise_tiles(tiles, most)
     }
 
     /// Returns the part of the picture that all bands are together.
@@ -305,7 +305,7 @@ mod tests {
             let window = RenderOptions { crop: Some(*band), ..options.clone() }.window();
             let n_pixels = u64::from(window.width()) * u64::from(window.height());
             assert!(n_pixels * Pixels::bytes_per_pixel(options) <= range, "{range}: {band}");
-            let mut n_before = asked.part(&n_bands_of, band);
+            let mut n_before = asked.cut(&n_bands_of, band);
             n_before.iter_mut().for_each(|n| *n += 1);
             asked.place(&mut n_bands_of, band, &n_before);
         }

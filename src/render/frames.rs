@@ -9,9 +9,10 @@ use crate::{
     layout::{FILTER_CENTRE, Frame, PixelAovs},
 };
 
-/// Duration above which a sample is slow. The sample after a slow one is drawn part by part (`incremental.rs`), if
-/// the watcher sees parts. The wait for the device after each part takes about 0.1 ms. All these waits take less than
-/// a hundredth of a slow sample, but on a fast GPU a wait takes as long as a whole part.
+/// Duration above which a sample is slow. The sample after a slow one is drawn recording by recording
+/// (`incremental.rs`), if the watcher sees the progress of samples. The wait for the device after each recording takes
+/// about 0.1 ms. All these waits take less than a hundredth of a slow sample, but on a fast GPU a wait takes as long as
+/// a whole recording.
 const SLOW_SAMPLE: Duration = Duration::from_millis(500);
 
 impl FrameRenderer for GpuRenderer {
@@ -38,21 +39,21 @@ impl FrameRenderer for GpuRenderer {
         &mut self.samples_log2
     }
 
-    /// Draws part by part if the frame is expected to be slow and the watcher sees parts.
+    /// Draws recording by recording if the frame is expected to be slow and the watcher sees the progress of samples.
     fn draw_frame(&mut self, watcher: &mut impl Watcher) -> Result<Profile, GpuError> {
         let begin = Instant::now();
-        let until = if self.is_slow && watcher.sees_parts() { Until::Part } else { Until::End };
+        let until = if self.is_slow && watcher.sees_sample_progress() { Until::Recording } else { Until::End };
         let profile = loop {
             match self.go_on(until)? {
                 Some(profile) => break profile,
-                None => watcher.part(self.progress()),
+                None => watcher.sample_progress(self.progress()),
             }
         };
         self.is_slow = begin.elapsed() > SLOW_SAMPLE;
         Ok(profile)
     }
 
-    fn set_tiles(&mut self, tiles: NoiseTiles) -> Result<(), GpuError> {
+    fn set_noise_tiles(&mut self, tiles: NoiseTiles) -> Result<(), GpuError> {
         let paths = PathOptions { first_sample: tiles.first_sample(), ..self.options.paths };
         self.set_options(&RenderOptions { noise_tiles: Some(tiles), paths, ..self.options.clone() })
     }
@@ -86,7 +87,7 @@ impl FrameRenderer for GpuRenderer {
         let (n_pixels, radiance) = (self.resources.n_pixels(), &self.resources.pixels.pixel_radiance);
         let (window, crop) = (self.in_use.window(), self.in_use.crop_or_whole());
         for (layer_ix, layer) in (1..).zip(&mut layers.0[self.in_use.mean_layers()]) {
-            *layer = window.part(radiance.download_part(layer_ix * n_pixels, n_pixels)?, &crop);
+            *layer = window.cut(radiance.download_range(layer_ix * n_pixels, n_pixels)?, &crop);
         }
         Ok(layers)
     }

@@ -1,7 +1,7 @@
-//! Draws a sample in parts, so that the caller can do something else in between.
+//! Draws a sample step by step, so that the caller can do something else in between.
 //!
-//! A part is a command buffer of the frame. A batch has several parts: one or two for each bounce, and for the light.
-//! A sample is pending while some of its parts have run and others have not.
+//! A recording is a command buffer of the frame. A batch has several recordings: one or two for each bounce, and for
+//! the light. A sample is pending while some of its recordings have run and others have not.
 
 use std::{collections::VecDeque, mem, time::Instant};
 
@@ -19,27 +19,28 @@ use crate::{
 };
 
 /// A command buffer of a frame.
-pub(super) struct Part {
+pub(super) struct Recording {
     commands: CommandBuffer,
-    /// The part's rays that can be suspended, if there are any. All of them must end before the next part begins.
+    /// The recording's rays that can be suspended, if there are any. All of them must end before the next recording
+    /// begins.
     traced: Option<Traced>,
-    /// Whether it is the last part of its batch.
+    /// Whether it is the last recording of its batch.
     pub ends_batch: bool,
 }
 
-/// Rays that a part traces through the acceleration structure: those of a pass, in a batch.
+/// Rays that a recording traces through the acceleration structure: those of a pass, in a batch.
 pub(super) struct Traced {
     pub pass: Pass,
     pub batch: Batch,
 }
 
-impl Part {
-    /// Creates a part without rays that can be suspended.
+impl Recording {
+    /// Creates a recording without rays that can be suspended.
     pub fn plain(commands: CommandBuffer) -> Self {
         Self { commands, traced: None, ends_batch: false }
     }
 
-    /// Creates a part whose rays can be suspended.
+    /// Creates a recording whose rays can be suspended.
     pub fn traced(commands: CommandBuffer, traced: Traced) -> Self {
         Self { commands, traced: Some(traced), ends_batch: false }
     }
@@ -48,38 +49,39 @@ impl Part {
 /// The point up to which a sample is drawn.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Until {
-    /// The end of the next part.
-    Part,
+    /// The end of the next recording.
+    Recording,
     /// The end of the batch that has begun or is next, or the frame's end if that is the last batch.
     Batch,
     /// The frame's end.
     End,
 }
 
-/// A sample of which some parts have run and others have not. The device has finished the parts that were submitted.
-pub(super) struct PartialSample {
-    /// The parts that have not run.
-    parts: VecDeque<Part>,
-    /// Number of parts that have run.
+/// A sample of which some recordings have run and others have not. The device has finished the recordings that were
+/// submitted.
+pub(super) struct PendingSample {
+    /// The recordings that have not run.
+    recordings: VecDeque<Recording>,
+    /// Number of recordings that have run.
     n_done: usize,
     sample_ix: u32,
     /// When its first commands were submitted; None before.
     begun_at: Option<Instant>,
 }
 
-impl PartialSample {
-    /// Takes the parts that are to run until the sample is drawn up to `until`.
-    fn take(&mut self, until: Until) -> Vec<Part> {
-        let ends_batch = |part: &Part| part.ends_batch;
+impl PendingSample {
+    /// Takes the recordings that are to run until the sample is drawn up to `until`.
+    fn take(&mut self, until: Until) -> Vec<Recording> {
+        let ends_batch = |recording: &Recording| recording.ends_batch;
         let n_taken = match until {
-            Until::Part => 1,
-            Until::Batch if self.parts.iter().filter(|part| part.ends_batch).count() > 1 => {
-                self.parts.iter().position(ends_batch).map_or(0, |place| place + 1)
+            Until::Recording => 1,
+            Until::Batch if self.recordings.iter().filter(|recording| recording.ends_batch).count() > 1 => {
+                self.recordings.iter().position(ends_batch).map_or(0, |place| place + 1)
             }
-            Until::Batch | Until::End => self.parts.len(),
+            Until::Batch | Until::End => self.recordings.len(),
         };
         self.n_done += n_taken;
-        self.parts.drain(..n_taken).collect()
+        self.recordings.drain(..n_taken).collect()
     }
 }
 
@@ -103,14 +105,14 @@ impl GpuRenderer {
         self.go_on(Until::Batch)
     }
 
-    /// Draws one part of the pending sample, or of the next sample if none is pending: mostly a bounce or the light
-    /// of a batch. Returns the whole sample's profile after its last part, and None before that. Only the last part
-    /// changes the displayed picture.
+    /// Draws one recording of the pending sample, or of the next sample if none is pending: mostly a bounce or the
+    /// light of a batch. Returns the whole sample's profile after its last recording, and None before that. Only the
+    /// last recording changes the displayed picture.
     ///
     /// # Errors
     /// Fails as [`GpuRenderer::draw_sample`] does.
-    pub fn draw_part(&mut self) -> Result<Option<Profile>, GpuError> {
-        self.go_on(Until::Part)
+    pub fn draw_next(&mut self) -> Result<Option<Profile>, GpuError> {
+        self.go_on(Until::Recording)
     }
 
     /// Whether a sample consists of the hits of primary rays only, without light.
@@ -123,9 +125,10 @@ impl GpuRenderer {
         self.pending.is_some()
     }
 
-    /// Share of the pending sample's parts that have run, 0 to 1; 0 if no sample is pending.
+    /// Share of the pending sample's recordings that have run, 0 to 1; 0 if no sample is pending.
     pub fn progress(&self) -> f32 {
-        let share = |pending: &PartialSample| pending.n_done as f32 / (pending.n_done + pending.parts.len()) as f32;
+        let share =
+            |pending: &PendingSample| pending.n_done as f32 / (pending.n_done + pending.recordings.len()) as f32;
         self.pending.as_ref().map_or(0.0, share)
     }
 
@@ -158,9 +161,9 @@ impl GpuRenderer {
         Ok(())
     }
 
-    /// Runs the next parts of the pending sample, or of the next sample if none is pending. Returns the sample's
-    /// profile when all parts have run, and None while parts are left. If the ray queue has overflowed, the whole
-    /// sample is drawn again, in smaller batches, before the call returns.
+    /// Runs the next recordings of the pending sample, or of the next sample if none is pending. Returns the sample's
+    /// profile when all recordings have run, and None while recordings are left. If the ray queue has overflowed, the
+    /// whole sample is drawn again, in smaller batches, before the call returns.
     pub(super) fn go_on(&mut self, until: Until) -> Result<Option<Profile>, GpuError> {
         // If the sample cannot begin, the complete samples are kept. An error after that drops them.
         let pending = self.pending.take().map_or_else(|| self.begin_sample(), Ok)?;
@@ -171,12 +174,12 @@ impl GpuRenderer {
         gone_on
     }
 
-    fn try_to_go_on(&mut self, mut pending: PartialSample, until: Until) -> Result<Option<Profile>, GpuError> {
+    fn try_to_go_on(&mut self, mut pending: PendingSample, until: Until) -> Result<Option<Profile>, GpuError> {
         let running = info_span!("submit and wait").entered();
         let begun_at = *pending.begun_at.get_or_insert_with(Instant::now);
-        self.run_parts(pending.take(until))?;
+        self.run_recordings(pending.take(until))?;
         drop(running);
-        if !pending.parts.is_empty() {
+        if !pending.recordings.is_empty() {
             self.pending = Some(pending);
             return Ok(None);
         }
@@ -195,11 +198,11 @@ impl GpuRenderer {
         self.profile(&bounces, begun_at).map(Some)
     }
 
-    /// Runs parts and waits for their end. They are submitted together, except that a part whose rays can be suspended
-    /// ends a submission, since its rays must end before the next part begins.
-    fn run_parts(&self, parts: Vec<Part>) -> Result<(), GpuError> {
+    /// Runs recordings and waits for their end. They are submitted together, except that a recording whose rays can be
+    /// suspended ends a submission, since its rays must end before the next recording begins.
+    fn run_recordings(&self, recordings: Vec<Recording>) -> Result<(), GpuError> {
         let mut together = Vec::new();
-        for Part { commands, traced, .. } in parts {
+        for Recording { commands, traced, .. } in recordings {
             together.push(commands);
             if let Some(traced) = traced {
                 self.context.wait_for(self.context.submit(mem::take(&mut together))?)?;
@@ -209,7 +212,7 @@ impl GpuRenderer {
         if together.is_empty() { Ok(()) } else { self.context.wait_for(self.context.submit(together)?) }
     }
 
-    fn begin_sample(&mut self) -> Result<PartialSample, GpuError> {
+    fn begin_sample(&mut self) -> Result<PendingSample, GpuError> {
         let sample_ix = self.n_samples;
         match self.in_use.integrator {
             Integrator::Path => self.begin_paths()?,
@@ -257,9 +260,9 @@ impl GpuRenderer {
         Ok(())
     }
 
-    fn recorded(&self, sample_ix: u32) -> Result<PartialSample, GpuError> {
-        let parts = info_span!("record").in_scope(|| self.record())?;
-        Ok(PartialSample { parts: parts.into(), n_done: 0, sample_ix, begun_at: None })
+    fn recorded(&self, sample_ix: u32) -> Result<PendingSample, GpuError> {
+        let recordings = info_span!("record").in_scope(|| self.record())?;
+        Ok(PendingSample { recordings: recordings.into(), n_done: 0, sample_ix, begun_at: None })
     }
 
     /// Sets the view that the next sample and [`GpuRenderer::show`] display: the picture, or an AOV in its place. An
@@ -310,7 +313,7 @@ impl GpuRenderer {
     }
 
     /// Downloads what the primary ray of a pixel hit in the last sample, and what the pixel's rays cost. Returns None
-    /// if the options do not ask for AOVs, or while a sample is drawn in parts.
+    /// if the options do not ask for AOVs, or while a sample is drawn step by step.
     ///
     /// # Panics
     /// The picture does not have the pixel.
@@ -324,7 +327,7 @@ impl GpuRenderer {
         let Frame { width, height, .. } = *self.resources.constants();
         assert!(pixel.x < width && pixel.y < height, "a pixel of the picture");
         let pixel_ix = pixel.y as usize * width as usize + pixel.x as usize;
-        Ok(self.resources.pixels.pixel_aovs.download_part(pixel_ix, 1)?.first().copied())
+        Ok(self.resources.pixels.pixel_aovs.download_range(pixel_ix, 1)?.first().copied())
     }
 
     /// Notes that `pixel_display` holds a complete picture.

@@ -29,14 +29,14 @@ use tracing::info_span;
 
 pub use self::{bands::BandedRenderer, incremental::Displayed, joined::JoinedPicture};
 use self::{
-    incremental::{Part, PartialSample, Traced, Until},
+    incremental::{PendingSample, Recording, Traced, Until},
     schedule::{QueueSizing, Schedule},
 };
 use crate::{
     buffers::{Needs, Resources},
     frame::{
-        Denoise, FrameKind, FrameRenderer, Integrator, Pass, Picture, Plan, Primary, Profile, RenderOptions, Step,
-        opaque, plan,
+        Denoise, FrameProperties, FrameRenderer, Integrator, Pass, Picture, Plan, PlanEntry, Primary, Profile,
+        RenderOptions, opaque, plan,
     },
     gpu::{Access, AnyBuffer, CommandBuffer, Commands, Context, GpuError},
     layout::{Batch, FalseColor, MATERIAL_REFLECT, MATERIAL_REFRACT, PixelAovs},
@@ -72,7 +72,7 @@ pub struct GpuRenderer {
     /// Whether `pixel_accumulated`, to which samples are added, contains the first sample.
     has_sums: bool,
     /// The sample of which only some command buffers have run, if there is one.
-    pending: Option<PartialSample>,
+    pending: Option<PendingSample>,
     /// The most pixels of a batch, if the caller has set a limit.
     most_pixels: Option<u32>,
     /// The picture in `pixel_display`; None before there is one.
@@ -213,7 +213,7 @@ impl GpuRenderer {
         self.context.run("show", |commands| {
             self.resources.bind(commands);
             self.update_constants(commands);
-            self.record_section(commands, &plan::display(&self.frame_kind()), &Batch::default());
+            self.record_sequence(commands, &plan::display(&self.frame_properties()), &Batch::default());
         })?;
         self.note_displayed();
         Ok(())
@@ -267,8 +267,8 @@ impl GpuRenderer {
         Picture {
             width: crop.width(),
             height: crop.height(),
-            radiance: opaque(window.part(radiance, &crop)),
-            display: window.part(display, &crop),
+            radiance: opaque(window.cut(radiance, &crop)),
+            display: window.cut(display, &crop),
         }
     }
 
@@ -282,7 +282,7 @@ impl GpuRenderer {
     pub fn pixel_aovs(&self) -> Result<Vec<PixelAovs>, GpuError> {
         assert!(self.in_use.pixel_aovs, "the options ask for AOVs");
         let pixel_aovs = self.resources.pixels.pixel_aovs.download_first(self.resources.n_pixels())?;
-        Ok(self.in_use.window().part(pixel_aovs, &self.in_use.crop_or_whole()))
+        Ok(self.in_use.window().cut(pixel_aovs, &self.in_use.crop_or_whole()))
     }
 
     /// Returns the frame's buffers, with the contents that the last frame left.
@@ -291,91 +291,92 @@ impl GpuRenderer {
     }
 
     /// Records the plan, in the command buffers that this file's first lines list.
-    fn record(&self) -> Result<Vec<Part>, GpuError> {
-        let plan = Plan::new(&self.frame_kind());
+    fn record(&self) -> Result<Vec<Recording>, GpuError> {
+        let plan = Plan::new(&self.frame_properties());
         let begin = self.command_buffer("begin frame", |commands| self.begin_frame(commands, &plan.visibility))?;
-        let mut frame = vec![Part::plain(begin)];
+        let mut frame = vec![Recording::plain(begin)];
         for &batch in &self.schedule.batches {
             // The closest hits of each bounce decide the rays of the next one.
             for (depth, bounce) in (0..).zip(&plan.bounces) {
                 let batch = Batch { bounce_ix: batch.bounce_ix + depth, depth, ..batch };
-                frame.extend(self.parts(&format!("bounce {depth}"), bounce, &batch)?);
+                frame.extend(self.recordings(&format!("bounce {depth}"), bounce, &batch)?);
             }
             // Light is computed for the hits of all bounces together.
             if !plan.light.is_empty() {
                 let after_bounces = Batch { depth: plan.bounces.len() as u32, ..batch };
-                frame.extend(self.parts("light", &plan.light, &after_bounces)?);
+                frame.extend(self.recordings("light", &plan.light, &after_bounces)?);
             }
-            frame.last_mut().expect("the parts of the batch").ends_batch = true;
+            frame.last_mut().expect("the recordings of the batch").ends_batch = true;
         }
         let end = self.command_buffer("end frame", |commands| {
             self.resources.bind(commands);
-            self.record_section(commands, &plan.image, &Batch::default());
+            self.record_sequence(commands, &plan.image, &Batch::default());
         })?;
-        frame.push(Part::plain(end));
+        frame.push(Recording::plain(end));
         Ok(frame)
     }
 
     /// Returns the properties of the next sample's frame that decide which passes it has.
-    fn frame_kind(&self) -> FrameKind {
+    fn frame_properties(&self) -> FrameProperties {
         let only_primary_rays = self.draws_primary_rays_only();
         let constants = self.resources.constants();
-        FrameKind {
+        FrameProperties {
             n_bounces: if only_primary_rays { 1 } else { constants.max_depth },
             is_lit: !only_primary_rays,
             adds_samples: constants.n_samples > 1,
             shows_aovs: self.in_use.pixel_aovs && self.false_color.is_some(),
-            ..FrameKind::new(&self.in_use, constants)
+            ..FrameProperties::new(&self.in_use, constants)
         }
     }
 
-    /// Records a section of a batch in one command buffer, or in two if rays of the section can be suspended: the host
-    /// submits the second when all rays of the first have ended.
-    fn parts(&self, name: &str, section: &[Step], batch: &Batch) -> Result<Vec<Part>, GpuError> {
-        let traced = self.traced(section, batch).filter(|_| self.resources.accel.suspended_rays.can_occur());
+    /// Records a sequence of a batch in one command buffer, or in two if rays of the sequence can be suspended: the
+    /// host submits the second when all rays of the first have ended.
+    fn recordings(&self, name: &str, sequence: &[PlanEntry], batch: &Batch) -> Result<Vec<Recording>, GpuError> {
+        let traced = self.traced(sequence, batch).filter(|_| self.resources.accel.suspended_rays.can_occur());
         let Some(traced) = traced else {
             let all = |commands: &Commands| {
                 self.resources.bind(commands);
-                self.record_section(commands, section, batch);
+                self.record_sequence(commands, sequence, batch);
             };
-            return Ok(vec![Part::plain(self.command_buffer(name, all)?)]);
+            return Ok(vec![Recording::plain(self.command_buffer(name, all)?)]);
         };
         // `trace` ends with the pass that traces the rays, and the barrier after it.
-        let is_tracing = |step: &Step| matches!(step, Step::Run(Pass::Trace | Pass::Shadow | Pass::PathTrace));
-        let tracing_ix = section.iter().position(is_tracing).expect("a pass that traces rays");
-        let (trace, rest) = section.split_at(tracing_ix + 2);
+        let is_tracing =
+            |entry: &PlanEntry| matches!(entry, PlanEntry::Run(Pass::Trace | Pass::Shadow | Pass::PathTrace));
+        let tracing_ix = sequence.iter().position(is_tracing).expect("a pass that traces rays");
+        let (trace, rest) = sequence.split_at(tracing_ix + 2);
         let tracing = |commands: &Commands| {
             self.resources.bind(commands);
             self.resources.accel.suspended_rays.reset(commands);
-            self.record_section(commands, trace, batch);
+            self.record_sequence(commands, trace, batch);
         };
         let resting = |commands: &Commands| {
             self.resources.bind(commands);
-            self.record_section(commands, rest, batch);
+            self.record_sequence(commands, rest, batch);
         };
         Ok(vec![
-            Part::traced(self.command_buffer(name, tracing)?, traced),
-            Part::plain(self.command_buffer(name, resting)?),
+            Recording::traced(self.command_buffer(name, tracing)?, traced),
+            Recording::plain(self.command_buffer(name, resting)?),
         ])
     }
 
-    /// Returns the rays that a section traces through the acceleration structure, if it does. A section has one such
+    /// Returns the rays that a sequence traces through the acceleration structure, if it does. A sequence has one such
     /// pass at most.
-    fn traced(&self, section: &[Step], batch: &Batch) -> Option<Traced> {
-        section.iter().find_map(|step| match step {
-            Step::Run(pass @ (Pass::Trace | Pass::Shadow | Pass::PathTrace)) => {
+    fn traced(&self, sequence: &[PlanEntry], batch: &Batch) -> Option<Traced> {
+        sequence.iter().find_map(|entry| match entry {
+            PlanEntry::Run(pass @ (Pass::Trace | Pass::Shadow | Pass::PathTrace)) => {
                 Some(Traced { pass: *pass, batch: *batch })
             }
             _ => None,
         })
     }
 
-    /// Repeats the tracing pass of a part, whose commands have run once, until none of its rays is suspended.
+    /// Repeats the tracing pass of a recording, whose commands have run once, until none of its rays is suspended.
     fn finish_rays(&self, traced: &Traced) -> Result<(), GpuError> {
         self.resources.accel.suspended_rays.finish(&self.context, |commands, resume_pass| {
             self.resources.bind(commands);
             let batch = Batch { resume_pass: resume_pass.constant(), ..traced.batch };
-            self.record_section(commands, &[Step::Run(traced.pass)], &batch);
+            self.record_sequence(commands, &[PlanEntry::Run(traced.pass)], &batch);
         })?;
         Ok(())
     }
@@ -386,7 +387,7 @@ impl GpuRenderer {
 
     /// Records the transfers that set the constants and the initial rows of `bounces` and clear the counters, then
     /// the passes of primary visibility.
-    fn begin_frame(&self, commands: &Commands, visibility: &[Step]) {
+    fn begin_frame(&self, commands: &Commands, visibility: &[PlanEntry]) {
         commands.reset_timer();
         self.resources.bind(commands);
         self.update_constants(commands);
@@ -400,7 +401,7 @@ impl GpuRenderer {
         }
         // bounces, counters, pixel_aovs, raster_groups
         commands.barrier(Access::TransferWrite, Access::AnyUse);
-        self.record_section(commands, visibility, &Batch::default());
+        self.record_sequence(commands, visibility, &Batch::default());
     }
 
     fn update_constants(&self, commands: &Commands) {
@@ -412,9 +413,9 @@ impl GpuRenderer {
         commands.barrier(Access::TransferWrite, Access::AnyUse); // frame, noise_tiles
     }
 
-    fn record_section(&self, commands: &Commands, section: &[Step], batch: &Batch) {
+    fn record_sequence(&self, commands: &Commands, sequence: &[PlanEntry], batch: &Batch) {
         let inputs = Inputs { batch: *batch, false_color: self.false_color };
-        self.passes.record_section(commands, &self.resources, section, &inputs);
+        self.passes.record_sequence(commands, &self.resources, sequence, &inputs);
     }
 }
 

@@ -5,7 +5,7 @@ use std::{mem, sync::Arc};
 
 use crate::{
     buffers::PathQueue,
-    frame::{FrameKind, Integrator, Plan, RenderOptions},
+    frame::{FrameProperties, Integrator, Plan, RenderOptions},
     gpu::{Buffer, BufferUse, Context, DeviceInfo, GpuError, Limits, Timer},
     layout::{Batch, Bounce, Frame, MOST_SAMPLES_LOG2, PASS_BEGIN, PathRay, RAY_GROUP_SIZE, SAMPLE_BLOCK_LOG2},
 };
@@ -64,7 +64,7 @@ impl Schedule {
                 Integrator::Path => Bounce::of_paths(n_rays << constants.samples_log2, constants),
             })
             .collect();
-        let n_passes = Plan::new(&FrameKind::new(options, constants)).n_passes(batches.len()) as u32;
+        let n_passes = Plan::new(&FrameProperties::new(options, constants)).n_passes(batches.len()) as u32;
         Ok(Self {
             first_bounces: Buffer::with(context, "first_bounces", &rows, BufferUse::Storage)?,
             timer: options.profile.then(|| Timer::new(context, n_passes)).transpose()?,

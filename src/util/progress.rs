@@ -43,17 +43,17 @@ impl Progress {
         }
     }
 
-    /// Returns what reports of parts of the work go to. A part counts by its size.
-    pub(crate) fn parts(&self, sizes: impl Iterator<Item = u32>) -> Vec<Self> {
+    /// Returns what reports of subtasks go to. A subtask counts by its size.
+    pub(crate) fn subtasks(&self, sizes: impl Iterator<Item = u32>) -> Vec<Self> {
         let Some(observer) = &self.0 else { return sizes.map(|_| Self::default()).collect() };
         let sizes: Vec<u32> = sizes.collect();
         let total = sizes.iter().map(|size| f64::from(*size)).sum::<f64>().max(1.0);
         let done = Arc::new(Mutex::new(0.0));
-        let part = |size: u32| {
+        let subtask = |size: u32| {
             let (observer, done) = (Arc::clone(observer), Arc::clone(&done));
-            Self::to(Arc::new(Part { observer, weight: f64::from(size) / total, done, told: Mutex::new(0.0) }))
+            Self::to(Arc::new(Subtask { observer, weight: f64::from(size) / total, done, told: Mutex::new(0.0) }))
         };
-        sizes.into_iter().map(part).collect()
+        sizes.into_iter().map(subtask).collect()
     }
 
     /// Begins work of `total` units.
@@ -79,18 +79,18 @@ impl PartialEq for Progress {
     }
 }
 
-/// The observer of a part of some work.
-struct Part {
+/// The observer of a subtask.
+struct Subtask {
     /// That of the whole work.
     observer: Arc<dyn Observer>,
     weight: f64,
     /// The share of the whole work that is done.
     done: Arc<Mutex<f64>>,
-    /// The share of the part that is done.
+    /// The share of the subtask that is done.
     told: Mutex<f32>,
 }
 
-impl Observer for Part {
+impl Observer for Subtask {
     fn progress(&self, work: Work, share: f32) {
         let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
         let greater = told.max(share);
@@ -134,14 +134,14 @@ mod tests {
     }
 
     #[test]
-    fn parts_count_by_their_sizes() {
+    fn subtasks_count_by_their_sizes() {
         let shares = Arc::new(Shares::default());
         let progress = Progress::to(Arc::clone(&shares) as Arc<dyn Observer>);
-        let parts = progress.parts([3, 0, 1].into_iter());
-        for (part, share) in [(2, 1.0), (0, 0.5), (1, 1.0), (0, 0.25), (0, 1.0)] {
-            parts[part].report(Work::Building, share);
+        let subtasks = progress.subtasks([3, 0, 1].into_iter());
+        for (subtask, share) in [(2, 1.0), (0, 0.5), (1, 1.0), (0, 0.25), (0, 1.0)] {
+            subtasks[subtask].report(Work::Building, share);
         }
         assert_eq!(*shares.0.lock().unwrap(), [0.25, 0.625, 0.625, 0.625, 1.0]);
-        assert!(Progress::default().parts([1].into_iter())[0] == Progress::default());
+        assert!(Progress::default().subtasks([1].into_iter())[0] == Progress::default());
     }
 }

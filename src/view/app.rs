@@ -23,7 +23,7 @@ use super::{
     input::{Action, Input},
     message::Topic,
     overlay::OverlayFrame,
-    panel::Layers,
+    panel::Overlays,
     reload::{Reloader, Wake},
     screen::Screen,
     script::Script,
@@ -51,7 +51,7 @@ pub(super) struct App {
     shown: Option<Shown>,
     /// Choices made when the window was opened; none before.
     choices: Option<Choices>,
-    layers: Layers,
+    overlays: Overlays,
     is_occluded: bool,
     /// Whether the device was lost and opened again, and no frame has been shown since.
     is_reopened: bool,
@@ -77,7 +77,7 @@ impl App {
             home: Some(Box::new(Home { session, gpu: None })),
             away: None,
             proxy,
-            layers: Layers {
+            overlays: Overlays {
                 panel: options.overlay,
                 keys: false,
                 hint: options.overlay && script.is_none(),
@@ -236,12 +236,12 @@ impl App {
         }
     }
 
-    /// Returns the layers that show something now.
-    fn seen_layers(&self, session: &Session) -> Layers {
+    /// Returns the overlays that show something now.
+    fn shown_overlays(&self, session: &Session) -> Overlays {
         if !session.loaded.is_open() {
-            return Layers { start: true, panel: false, messages: false, ..self.layers };
+            return Overlays { start: true, panel: false, messages: false, ..self.overlays };
         }
-        Layers { messages: self.layers.messages && session.message.is_some(), ..self.layers }
+        Overlays { messages: self.overlays.messages && session.message.is_some(), ..self.overlays }
     }
 
     /// Opens a file that the user has dropped on the window. A tour goes on with its own scene.
@@ -284,7 +284,7 @@ impl App {
     #[expect(clippy::type_complexity, reason = "the tuple is taken apart at once")]
     fn lay_out(&mut self) -> Result<Option<((u32, u32), (u32, u32), Option<OverlayFrame>)>, ViewError> {
         let Some(Home { session, .. }) = self.home.as_deref() else { return Ok(None) };
-        let layers = self.seen_layers(session);
+        let overlays = self.shown_overlays(session);
         let (Some(home), Some(Shown { screen, ui, window })) = (self.home.as_deref_mut(), &mut self.shown) else {
             return Ok(None);
         };
@@ -302,10 +302,10 @@ impl App {
             }
             None => size,
         };
-        if layers.panel {
+        if overlays.panel {
             session.point_at(gpu, size, self.input.pointer())?;
         }
-        let layout = layers.any().then(|| lay_out(session, gpu, (ui, window, layers), self.input.is_flying()));
+        let layout = overlays.any().then(|| lay_out(session, gpu, (ui, window, overlays), self.input.is_flying()));
         screen.presenter.set_vsync(session.settings.vsync);
         let overlay = match layout {
             Some(Layout { frame, textures }) => {
@@ -320,7 +320,7 @@ impl App {
     /// Shows the last picture, and what the window waits for, while a thread works on the session.
     fn show_waiting(&mut self) {
         let (Some(away), Some(Shown { screen, ui, window })) = (&mut self.away, &mut self.shown) else { return };
-        let says = away.says(Instant::now()).filter(|_| self.layers.messages);
+        let says = away.says(Instant::now()).filter(|_| self.overlays.messages);
         let size = window.inner_size();
         if size.width == 0 || size.height == 0 || away.error.is_some() {
             return;
@@ -356,11 +356,11 @@ impl App {
         let (Some(home), Some(Shown { window, .. })) = (self.home.as_deref_mut(), &self.shown) else { return };
         let size = window.inner_size();
         match action {
-            Action::Quit if self.layers.keys => self.layers.keys = false,
+            Action::Quit if self.overlays.keys => self.overlays.keys = false,
             Action::Quit => self.quit(event_loop),
-            Action::ToggleKeys => self.layers.keys = !self.layers.keys,
+            Action::ToggleKeys => self.overlays.keys = !self.overlays.keys,
             _ if !home.session.loaded.is_open() => {}
-            Action::TogglePanel => self.layers.panel = !self.layers.panel,
+            Action::TogglePanel => self.overlays.panel = !self.overlays.panel,
             action => {
                 if let Some(gpu) = &home.gpu {
                     home.session.act(action, gpu, (size.width.max(1), size.height.max(1)));
@@ -388,10 +388,10 @@ impl App {
     /// an action.
     fn handle_input(&mut self, event_loop: &ActiveEventLoop, event: &WindowEvent) {
         let Some(Home { session, .. }) = self.home.as_deref() else { return };
-        let layers = self.seen_layers(session);
+        let overlays = self.shown_overlays(session);
         let (Some(home), Some(Shown { ui, window, .. })) = (self.home.as_deref_mut(), &mut self.shown) else { return };
-        let is_overlays = layers.any() && !is_tab(event) && ui.take_event(window, event);
-        self.layers.hint &= !is_press(event);
+        let is_overlays = overlays.any() && !is_tab(event) && ui.take_event(window, event);
+        self.overlays.hint &= !is_press(event);
         window.request_redraw();
         if is_overlays || self.script.is_some() {
             return;
@@ -485,7 +485,7 @@ impl App {
     /// Returns whether an event quits the viewer while a thread works on the session. In a tour Escape does nothing,
     /// and it closes the list of keys or what the panel has opened first.
     fn is_quit(&self, event: &WindowEvent) -> bool {
-        let has_keys = self.layers.keys || self.shown.as_ref().is_some_and(|shown| shown.ui.has_keyboard());
+        let has_keys = self.overlays.keys || self.shown.as_ref().is_some_and(|shown| shown.ui.has_keyboard());
         is_press_of(event, &[KeyCode::Escape]) && self.script.is_none() && !has_keys
     }
 
@@ -562,7 +562,7 @@ impl ApplicationHandler<Wake> for App {
         let Some(Home { session, gpu: Some(gpu) }) = self.home.as_deref() else { return };
         let size = window.inner_size();
         let is_busy = self.script.is_some() || session.is_busy(gpu, now, (size.width, size.height));
-        let wait = if is_busy || !self.seen_layers(session).any() { Duration::MAX } else { ui.repaint_after() };
+        let wait = if is_busy || !self.shown_overlays(session).any() { Duration::MAX } else { ui.repaint_after() };
         let has_area = size.width > 0 && size.height > 0;
         if !is_seen || !has_area {
             event_loop.set_control_flow(ControlFlow::Wait);

@@ -8,9 +8,9 @@ const N_STEPS: u32 = 16;
 const LEAST_STEP: u32 = 2;
 /// The picture grows by a step if it is then expected to take no more than this share of the budget.
 const ROOM: f64 = 0.85;
-/// Intended time, in milliseconds, of each of the parts in which a picture is drawn while the camera rests. Input
-/// waits for the end of a part.
-pub const PART_MS: f64 = 100.0;
+/// Intended time, in milliseconds, of each of the batches in which a picture is drawn while the camera rests. Input
+/// waits for the end of a batch.
+pub const BATCH_MS: f64 = 100.0;
 /// Weight of the newest frame in the mean cost.
 const NEWEST: f64 = 0.4;
 
@@ -66,13 +66,13 @@ impl Budget {
         self.full_ms
     }
 
-    /// Returns the number of pixels that are drawn in about [`PART_MS`], for a picture of a window's size. Returns
+    /// Returns the number of pixels that are drawn in about [`BATCH_MS`], for a picture of a window's size. Returns
     /// none if the whole picture is drawn in that time, or if the time is unknown.
-    pub fn part_pixels(&self, (width, height): (u32, u32)) -> Option<u32> {
-        let n_parts = (self.full_ms? / PART_MS).ceil();
-        // The number of parts is a power of two, so that small changes of the estimate do not change it.
-        let n_parts = (n_parts as u32).clamp(1, 1 << 12).next_power_of_two();
-        (n_parts > 1).then(|| (width * height).div_ceil(n_parts))
+    pub fn batch_pixels(&self, (width, height): (u32, u32)) -> Option<u32> {
+        let n_batches = (self.full_ms? / BATCH_MS).ceil();
+        // The number of batches is a power of two, so that small changes of the estimate do not change it.
+        let n_batches = (n_batches as u32).clamp(1, 1 << 12).next_power_of_two();
+        (n_batches > 1).then(|| (width * height).div_ceil(n_batches))
     }
 
     /// Adapts to a window that has `ratio` times as many pixels as before. Beyond a factor of two the estimate is
@@ -104,7 +104,7 @@ impl Budget {
     }
 }
 
-/// Returns whether two numbers of pixels per part differ by a factor of two or more. None stands for the whole
+/// Returns whether two numbers of pixels per batch differ by a factor of two or more. None stands for the whole
 /// picture.
 pub fn differs_by_two(a: Option<u32>, b: Option<u32>) -> bool {
     match (a, b) {

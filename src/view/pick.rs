@@ -8,7 +8,7 @@ use crate::{
     frame::RenderOptions,
     layout::{Hit, NO_TRIANGLE, PathRay},
     reference::{
-        children::{child_kinds_of, children_of},
+        children::{child_flags_of, children_of},
         counting::steps::{Steps, count_steps},
         inputs::KernelInputs,
         primary_hit::camera_ray,
@@ -102,7 +102,7 @@ fn found(scene: &FlatScene, ray: &PathRay, hit: &Hit) -> Option<PickedHit> {
 
 /// Returns the rays of the next level: the reflected and refracted rays at the hits.
 fn next_rays(bindings: &KernelInputs, rays: &[PathRay], hits: &[Hit]) -> Vec<PathRay> {
-    let of_ray = |(ray, hit)| children_of(bindings, ray, hit, child_kinds_of(bindings, ray, hit));
+    let of_ray = |(ray, hit)| children_of(bindings, ray, hit, child_flags_of(bindings, ray, hit));
     rays.iter().zip(hits).flat_map(of_ray).collect()
 }
 

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use super::{
-    budget::{Budget, N_BUDGETS, PART_MS, budget_ix, differs_by_two},
+    budget::{BATCH_MS, Budget, N_BUDGETS, budget_ix, differs_by_two},
     controller::Controller,
     gpu_session::GpuSession,
     history::{FrameRecord, History},
@@ -25,7 +25,7 @@ use crate::{
 };
 
 /// Initial number of parts of a full-quality picture, before its cost has been measured.
-const FIRST_PARTS: u32 = 64;
+const FIRST_BATCHES: u32 = 64;
 /// Least length in seconds of the history that the panel shows.
 const HISTORY_S: f64 = 5.0;
 /// A pixel has the cost view's full brightness if its rays read this many nodes per level of the kd-tree. A pixel has
@@ -323,13 +323,14 @@ impl Session {
         has_room && whole.pixel_aovs == now.pixel_aovs && filter(whole) == filter(now)
     }
 
-    /// Draws the rest of the sample in parts, until the sample is complete or half of [`PART_MS`] is spent. At rest,
-    /// parts are so small that input does not wait long; while the camera moves, parts are as large as possible.
+    /// Draws the rest of the sample recording by recording, until the sample is complete or half of [`BATCH_MS`] is
+    /// spent. At rest, parts are so small that input does not wait long; while the camera moves, parts are as large as
+    /// possible.
     fn draw_batch(&mut self, gpu: &mut GpuSession, window: (u32, u32), is_moving: bool) -> Result<(), GpuError> {
         let renderer = &mut gpu.renderer;
         if !renderer.is_pending() {
             self.sample_ms = 0.0;
-            let most_pixels = self.part_pixels(window).filter(|_| !is_moving);
+            let most_pixels = self.batch_pixels(window).filter(|_| !is_moving);
             if renderer.n_samples() == 0 || differs_by_two(most_pixels, renderer.most_pixels()) {
                 renderer.limit_batches(most_pixels)?;
             }
@@ -338,7 +339,7 @@ impl Session {
         let spent_ms = || start.elapsed().as_secs_f64() * 1e3;
         let mut complete = renderer.draw_batch()?;
         // A part may take less than expected: estimates from small pictures are too high. Then further parts follow.
-        while complete.is_none() && spent_ms() < PART_MS / 2.0 {
+        while complete.is_none() && spent_ms() < BATCH_MS / 2.0 {
             complete = renderer.draw_batch()?;
         }
         self.sample_ms += spent_ms();
@@ -353,9 +354,13 @@ impl Session {
     }
 
     /// Returns the number of pixels of a part of a picture at rest.
-    fn part_pixels(&self, window: (u32, u32)) -> Option<u32> {
+    fn batch_pixels(&self, window: (u32, u32)) -> Option<u32> {
         let is_unknown = self.budget().full_ms().is_none() && self.keeps_both();
-        if is_unknown { Some((window.0 * window.1).div_ceil(FIRST_PARTS)) } else { self.budget().part_pixels(window) }
+        if is_unknown {
+            Some((window.0 * window.1).div_ceil(FIRST_BATCHES))
+        } else {
+            self.budget().batch_pixels(window)
+        }
     }
 
     /// Returns to the options that the device accepted last, and shows a message. The viewer goes on, because the

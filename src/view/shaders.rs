@@ -211,7 +211,8 @@ mod tests {
     #[test]
     fn another_layout_is_refused() {
         let layout = "glsl/shared/layout.glsl";
-        let copy = edited(layout, |text| text.replacen("#define TILE_SIZE 8u", "#define TILE_SIZE 4u", 1));
+        let copy =
+            edited(layout, |text| text.replacen("#define PIXEL_GROUP_SIZE 8u", "#define PIXEL_GROUP_SIZE 4u", 1));
         assert!(compile(copy.path()).unwrap_err().starts_with(layout));
         let copy = edited(layout, |text| format!("{text}\nstruct Bad {{\n    float a;\n    vec3 b;\n}};\n"));
         let error = compile(copy.path()).unwrap_err();

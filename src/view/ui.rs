@@ -13,7 +13,7 @@ use winit::{
 use super::overlay::OverlayFrame;
 use super::{
     gpu_session::GpuSession,
-    panel::{self, Edited, Facts, Layers},
+    panel::{self, Edited, Facts, Overlays},
     session::Session,
 };
 
@@ -80,8 +80,8 @@ impl Ui {
     }
 
     /// Lays out the overlay and applies the user's changes to `edited`.
-    pub fn layout(&mut self, window: &Window, layers: Layers, edited: &mut Edited, facts: &Facts) -> Layout {
-        self.run(window, |ui| panel::show(ui, layers, edited, facts))
+    pub fn layout(&mut self, window: &Window, overlays: Overlays, edited: &mut Edited, facts: &Facts) -> Layout {
+        self.run(window, |ui| panel::show(ui, overlays, edited, facts))
     }
 
     /// Lays out what the window says while it waits.
@@ -106,7 +106,7 @@ impl Ui {
 pub fn lay_out(
     session: &mut Session,
     gpu: &GpuSession,
-    (ui, window, layers): (&mut Ui, &Window, Layers),
+    (ui, window, overlays): (&mut Ui, &Window, Overlays),
     is_flying: bool,
 ) -> Layout {
     let size = window.inner_size();
@@ -114,7 +114,7 @@ pub fn lay_out(
     let playback = session.loaded.timeline.as_ref().map(|timeline| *timeline.playback());
     let mut edited = Edited { settings: session.settings.clone(), projection, playback };
     let facts = session.facts(gpu, (size.width, size.height), is_flying);
-    let layout = ui.layout(window, layers, &mut edited, &facts);
+    let layout = ui.layout(window, overlays, &mut edited, &facts);
     let now = Instant::now();
     if edited.settings != session.settings {
         session.pace.note_input(now);

@@ -1,4 +1,4 @@
-//! Tests of rays of `whitted` that pass straight through blended surfaces, which takes no level of rays.
+//! Tests of rays of `whitted` that pass straight through blended surfaces, which makes them no deeper.
 
 use glam::{Vec3, vec3};
 use kdray::{
@@ -35,7 +35,7 @@ fn check(scene: &FlatScene, max_depth: u32, expected: f32) {
 fn check_with(scene: &FlatScene, options: &RenderOptions, expected: f32) {
     for picture in on_both(scene, options) {
         for &[r, _, _, _] in &picture.radiance {
-            assert!((r - expected).abs() < 1e-5, "{} levels: {r}, not {expected}", options.max_depth);
+            assert!((r - expected).abs() < 1e-5, "depth {}: {r}, not {expected}", options.max_depth);
         }
     }
 }
@@ -43,7 +43,7 @@ fn check_with(scene: &FlatScene, options: &RenderOptions, expected: f32) {
 /// The mirror behind ten sheets shows a lamp behind the camera: rays pass the sheets on their way to the mirror and
 /// back. They use two levels, one for the camera's rays and one for what the mirror reflects.
 #[test]
-fn blended_sheets_take_no_level() {
+fn blended_sheets_make_rays_no_deeper() {
     for n_sheets in [0, 10] {
         let mut scene = empty();
         add_sheets(&mut scene, n_sheets);
@@ -58,7 +58,7 @@ fn blended_sheets_take_no_level() {
 
 /// Between two mirrors, each level adds the lamp once more, with a sheet between them or without.
 #[test]
-fn reflections_take_levels_behind_sheets_too() {
+fn reflections_are_deeper_behind_sheets_too() {
     for n_sheets in [0, 1] {
         let mut scene = empty();
         add_sheets(&mut scene, n_sheets);
@@ -74,7 +74,7 @@ fn reflections_take_levels_behind_sheets_too() {
 
 /// A pane of glass without thickness takes a level, though rays pass straight through it.
 #[test]
-fn panes_of_glass_take_a_level() {
+fn panes_of_glass_make_rays_deeper() {
     let mut scene = empty();
     add_sheets(&mut scene, 2);
     let glass = Material { transmission: 1.0, kd: Vec3::ONE, flags: MATERIAL_MICROFACET, ..BLACK };

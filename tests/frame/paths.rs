@@ -6,7 +6,7 @@ use kdray::{
     accel::kdtree::Traversal,
     cpu::{self, Batching},
     frame::{
-        Crop, Denoise, FrameKind, FrameRenderer, Goal, Integrator, Pass, PathOptions, Picture, PixelFilter, Plan,
+        Crop, Denoise, FrameProperties, FrameRenderer, Goal, Integrator, Pass, PathOptions, Picture, PixelFilter, Plan,
         RenderOptions, plan, sampling::samples_log2,
     },
     gpu::DeviceOverrides,
@@ -145,9 +145,9 @@ fn a_profile_has_the_passes_of_the_plan() {
     let (scene, options) = (scenes::mixed(), RenderOptions { pixel_aovs: true, ..options(20, 15, 2) });
     let mut renderer = GpuRenderer::new(device(), &world_of(&scene), &options).expect("a renderer");
     let mut on_cpu = cpu::CpuRenderer::new(&world_of(&scene), &options, Batching::default());
-    let plan = Plan::new(&FrameKind::new(&options, &world_of(&scene).frame_constants(&options)));
-    let steps = [plan.bounces.concat(), plan.light, plan.image].concat();
-    let expected: Vec<_> = plan::passes(&steps).map(Pass::name).collect();
+    let plan = Plan::new(&FrameProperties::new(&options, &world_of(&scene).frame_constants(&options)));
+    let entries = [plan.bounces.concat(), plan.light, plan.image].concat();
+    let expected: Vec<_> = plan::passes(&entries).map(Pass::name).collect();
     for profile in [renderer.draw_sample().expect("a sample"), on_cpu.draw_sample()] {
         let found: Vec<_> = profile.passes.iter().map(|pass| pass.name).collect();
         assert_eq!(found, expected);

@@ -31,13 +31,13 @@ fn small() -> RenderOptions {
     options(15, 10, 2)
 }
 
-/// Number of pixels of a batch, chosen so that a sample has several parts.
+/// Number of pixels of a batch, chosen so that a sample has several batches.
 const BATCH: u32 = 30;
 
 /// Draws one sample and a part of the second one.
 fn begin(renderer: &mut GpuRenderer) {
     renderer.draw().expect("a sample");
-    assert_eq!(renderer.draw_batch().expect("a part"), None, "the sample has more parts");
+    assert_eq!(renderer.draw_batch().expect("a batch"), None, "the sample has more batches");
 }
 
 /// Draws the rest of the second sample.

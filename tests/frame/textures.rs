@@ -124,7 +124,7 @@ fn a_distant_checkerboard_is_the_mean_of_its_colours() {
 /// The level is that at which a texel is as large as a pixel. The image's columns are as wide as the texels of level 2,
 /// so a picture with pixels of that size still shows them, and one with pixels of twice the size shows their mean.
 #[test]
-fn the_level_follows_the_size_of_pixels() {
+fn the_mip_level_follows_the_size_of_pixels() {
     let column = |x: u32, _: u32| if (x / 4).is_multiple_of(2) { [255; 4] } else { [0, 0, 0, 255] };
     let scene = poster(true, |scene| Texture::of_image(add_image(scene, [64, 64], column)));
     for picture in on_both(&scene, &options(16, 16, 1)) {

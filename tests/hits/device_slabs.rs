@@ -12,7 +12,7 @@ use glam::{Vec3, vec3};
 use kdray::{
     accel::{
         Accel, Query,
-        kdtree::{BuildOptions, Invalid, KdTree, Parts, Traversal},
+        kdtree::{BuildOptions, Invalid, KdArrays, KdTree, Traversal},
     },
     buffers::TreeBuffers,
     cast::{Ray, cast_on_cpu},
@@ -29,7 +29,7 @@ fn tree_of(triangles: &[Triangle], slabs: bool) -> KdTree {
 }
 
 /// Returns the arrays of a tree with the slabs that the device computes. Two runs make the same bits.
-fn parts_with_slabs(context: &Arc<Context>, tree: &KdTree, triangles: &[Triangle]) -> Parts {
+fn arrays_with_slabs(context: &Arc<Context>, tree: &KdTree, triangles: &[Triangle]) -> KdArrays {
     let buffers = TreeBuffers::of_host(context, tree, triangles).expect("a tree");
     let builder = SlabBuilder::new(context, &buffers).expect("a builder");
     let run = || {
@@ -38,7 +38,7 @@ fn parts_with_slabs(context: &Arc<Context>, tree: &KdTree, triangles: &[Triangle
     };
     let (nodes, slabs) = run();
     assert_eq!(run(), (nodes.clone(), slabs.clone()), "the second run");
-    Parts { nodes, slabs, ..tree.clone().into_parts() }
+    KdArrays { nodes, slabs, ..tree.clone().into_arrays() }
 }
 
 fn n_slabs(tree: &KdTree) -> usize {
@@ -57,11 +57,11 @@ fn are_near(found: &Slab, expected: &Slab) -> bool {
 /// are nearly too thick, and for rounding.
 fn check(context: &Arc<Context>, name: &str, triangles: &[Triangle]) -> KdTree {
     let bare = tree_of(triangles, false);
-    let parts = parts_with_slabs(context, &bare, triangles);
+    let arrays = arrays_with_slabs(context, &bare, triangles);
     let of_twin = kd_slabs(&bare, triangles);
-    let n_far = parts.slabs.iter().zip(&of_twin).filter(|(a, b)| !are_near(a, b)).count();
+    let n_far = arrays.slabs.iter().zip(&of_twin).filter(|(a, b)| !are_near(a, b)).count();
     assert!(n_far <= of_twin.len() / 200, "{name}: {n_far} of {} slabs are not the twin's", of_twin.len());
-    let tree = KdTree::from_parts(parts, triangles).unwrap_or_else(|error| panic!("{name}: {error}"));
+    let tree = KdTree::from_arrays(arrays, triangles).unwrap_or_else(|error| panic!("{name}: {error}"));
     println!("{name}: {} slabs, the host has {}", n_slabs(&tree), n_slabs(&tree_of(triangles, true)));
     tree
 }
@@ -141,11 +141,11 @@ fn slabs_resemble_those_of_the_host() {
 fn thinner_slabs_are_noticed() {
     let context = device();
     let triangles = meshes::torus(60, 30);
-    let mut parts = parts_with_slabs(&context, &tree_of(&triangles, false), &triangles);
-    for slab in &mut parts.slabs {
+    let mut arrays = arrays_with_slabs(&context, &tree_of(&triangles, false), &triangles);
+    for slab in &mut arrays.slabs {
         *slab = Slab { normal: 1.25 * slab.normal, offset: 1.25 * slab.offset };
     }
-    assert!(matches!(KdTree::from_parts(parts, &triangles), Err(Invalid::OutsideSlab { .. })));
+    assert!(matches!(KdTree::from_arrays(arrays, &triangles), Err(Invalid::OutsideSlab { .. })));
     assert_silent(&context);
 }
 

@@ -4,7 +4,7 @@
 use crate::support::{
     MeshWithTree, compare, device,
     meshes::triangle,
-    packets::{levels, traced},
+    packets::{simd_levels, traced},
     random::Random,
     rays::ray,
     with_lanes,
@@ -251,8 +251,8 @@ fn needles_in_a_tree_are_hit_where_they_are() {
         let casts: Vec<Ray> = rays.iter().map(cast_ray).collect();
         let expected = cast_on_cpu(world.geometry(), Traversal::Mask, &casts, Query::Closest);
         check(&world, &rays, &expected);
-        for level in levels() {
-            compare::exact(&expected, &traced::<false>(&world, level, &rays)).unwrap();
+        for simd_level in simd_levels() {
+            compare::exact(&expected, &traced::<false>(&world, simd_level, &rays)).unwrap();
         }
         for (context, traversal) in ways {
             let mut caster = GpuCaster::new(context, world.geometry(), traversal).expect("a caster");

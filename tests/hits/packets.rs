@@ -5,7 +5,7 @@ use std::array::from_fn;
 
 use crate::support::{
     MeshWithTree, meshes,
-    packets::{check_one_by_one, levels, traced},
+    packets::{check_one_by_one, simd_levels, traced},
     random::Random,
     rays::nasty_ray,
 };
@@ -26,9 +26,9 @@ use kdray::{
 #[test]
 #[cfg(target_arch = "x86_64")]
 fn the_machines_instructions_are_tested() {
-    let has = |is: fn(&Level) -> bool| levels().iter().any(is);
-    assert!(has(|level| matches!(level, Level::Sse2(_))));
-    assert_eq!(has(|level| matches!(level, Level::Avx2(_))), is_x86_feature_detected!("avx2"));
+    let has = |is: fn(&Level) -> bool| simd_levels().iter().any(is);
+    assert!(has(|simd_level| matches!(simd_level, Level::Sse2(_))));
+    assert_eq!(has(|simd_level| matches!(simd_level, Level::Avx2(_))), is_x86_feature_detected!("avx2"));
 }
 
 /// Returns the hit's four words, with floats as their bits.
@@ -36,8 +36,8 @@ fn bits(hit: &Hit) -> [u32; 4] {
     bytemuck::cast(*hit)
 }
 
-fn together(level: Level, rays: &[PathRay; LANES], triangle: &Triangle, triangle_ix: u32) -> [Option<Hit>; LANES] {
-    dispatch!(level, simd => {
+fn together(simd_level: Level, rays: &[PathRay; LANES], triangle: &Triangle, triangle_ix: u32) -> [Option<Hit>; LANES] {
+    dispatch!(simd_level, simd => {
         let columns = |of: fn(&PathRay) -> Vec3| -> [_; 3] {
             from_fn(|axis| f32x16::load_array(simd, from_fn(|lane| of(&rays[lane])[axis])))
         };
@@ -95,25 +95,25 @@ fn a_triangle_is_met_as_by_one_ray() {
     let mut triangles = meshes::cube(2, 0.0);
     let world = MeshWithTree::new(triangles.clone());
     triangles.extend(odd_triangles());
-    for level in levels() {
+    for simd_level in simd_levels() {
         let (mut n_hits, mut n_at_edges) = (0, 0);
         for seed in 0..5000 {
             let rays = rays_of_a_packet(&mut Random(seed), &world);
             for (triangle_ix, triangle) in (0..).zip(&triangles) {
-                let found = together(level, &rays, triangle, triangle_ix);
+                let found = together(simd_level, &rays, triangle, triangle_ix);
                 for (ray, found) in rays.iter().zip(found) {
                     let expected = alone(ray, triangle, triangle_ix);
                     let [expected_bits, found_bits] = [&expected, &found].map(|hit| hit.as_ref().map(bits));
                     assert_eq!(
                         expected_bits, found_bits,
-                        "{level:?}: {ray:?}, {triangle:?}: {found:?}, not {expected:?}"
+                        "{simd_level:?}: {ray:?}, {triangle:?}: {found:?}, not {expected:?}"
                     );
                     n_hits += u32::from(found.is_some());
                     n_at_edges += u32::from(found.is_some_and(|hit| hit.u == 0.0 || hit.v == 0.0));
                 }
             }
         }
-        assert!(n_hits > 10_000 && n_at_edges > 1000, "{level:?}: {n_hits}, {n_at_edges}");
+        assert!(n_hits > 10_000 && n_at_edges > 1000, "{simd_level:?}: {n_hits}, {n_at_edges}");
     }
 }
 
@@ -125,14 +125,14 @@ fn every_set_of_instructions_finds_the_same() {
         let mut one = Traverser::new(&world.inputs(), Traversal::Mask);
         let expected: Vec<Hit> = rays.iter().map(|ray| one.traverse::<false>(&world.inputs(), &ray.into())).collect();
         assert!(expected.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count() > rays.len() / 5);
-        for level in levels() {
-            let closest = traced::<false>(&world, level, &rays);
+        for simd_level in simd_levels() {
+            let closest = traced::<false>(&world, simd_level, &rays);
             let wrong = (0..rays.len()).find(|&i| bits(&closest[i]) != bits(&expected[i]));
-            assert_eq!(wrong.map(|i| (rays[i], closest[i], expected[i])), None, "{level:?}");
-            let any = traced::<true>(&world, level, &rays);
+            assert_eq!(wrong.map(|i| (rays[i], closest[i], expected[i])), None, "{simd_level:?}");
+            let any = traced::<true>(&world, simd_level, &rays);
             let is_hit = |hit: &Hit| hit.triangle_ix != NO_TRIANGLE;
-            assert!(any.iter().map(is_hit).eq(expected.iter().map(is_hit)), "{level:?}");
-            check_one_by_one(&world, level, &rays, &expected);
+            assert!(any.iter().map(is_hit).eq(expected.iter().map(is_hit)), "{simd_level:?}");
+            check_one_by_one(&world, simd_level, &rays, &expected);
         }
     }
 }

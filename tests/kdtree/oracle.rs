@@ -8,16 +8,16 @@ type Point = [f64; 3];
 /// Minimum and maximum of an axis-aligned box.
 type Box3 = [Point; 2];
 
-/// A triangle's corners, and the bounds of its part in the cell.
-type Part = ([Point; 3], Box3);
+/// A triangle's corners, and the bounds of its piece in the cell.
+type Piece = ([Point; 3], Box3);
 
 /// Returns the SAH cost of the greedy tree.
 pub fn sah_cost(triangles: &[Triangle], options: &BuildOptions) -> f64 {
     let corners = |t: &Triangle| [t.v0, t.v1, t.v2].map(|v| v.as_dvec3().to_array());
     let points: Vec<Point> = triangles.iter().flat_map(corners).collect();
     let margin = points.as_flattened().iter().fold(0.0, |m: f64, x| m.max(x.abs())) * 2f64.powi(-17);
-    let parts: Vec<Part> = triangles.iter().map(|t| (corners(t), grown(bounds(&corners(t)), margin))).collect();
-    cost(&parts, &grown(bounds(&points), margin), options, margin, options.depth_limit())
+    let pieces: Vec<Piece> = triangles.iter().map(|t| (corners(t), grown(bounds(&corners(t)), margin))).collect();
+    cost(&pieces, &grown(bounds(&points), margin), options, margin, options.depth_limit())
 }
 
 fn grown([min, max]: Box3, margin: f64) -> Box3 {
@@ -43,18 +43,18 @@ fn split_cell(cell: &Box3, axis: usize, position: f64) -> [Box3; 2] {
     [below, above]
 }
 
-fn cost(parts: &[Part], cell: &Box3, options: &BuildOptions, margin: f64, levels: u32) -> f64 {
+fn cost(pieces: &[Piece], cell: &Box3, options: &BuildOptions, margin: f64, levels: u32) -> f64 {
     let (step, test) = (f64::from(options.traversal_cost), f64::from(options.intersection_cost));
-    let leaf = test * parts.len() as f64;
-    let Some((weight, axis, position)) = best_plane(parts, cell, options).filter(|_| levels > 0) else {
+    let leaf = test * pieces.len() as f64;
+    let Some((weight, axis, position)) = best_plane(pieces, cell, options).filter(|_| levels > 0) else {
         return leaf;
     };
     if step + test * weight >= leaf {
         return leaf;
     }
     let cells = split_cell(cell, axis, position);
-    let sides = [0, 1].map(|side| -> Vec<Part> {
-        parts.iter().filter_map(|part| part_in(part, &cells, side, (axis, position), margin)).collect()
+    let sides = [0, 1].map(|side| -> Vec<Piece> {
+        pieces.iter().filter_map(|piece| piece_in(piece, &cells, side, (axis, position), margin)).collect()
     });
     let child = |side: usize| {
         half_area(&cells[side]) / half_area(cell) * cost(&sides[side], &cells[side], options, margin, levels - 1)
@@ -63,14 +63,14 @@ fn cost(parts: &[Part], cell: &Box3, options: &BuildOptions, margin: f64, levels
 }
 
 /// Returns the weight, the axis and the position of the best split plane.
-fn best_plane(parts: &[Part], cell: &Box3, options: &BuildOptions) -> Option<(f64, usize, f64)> {
+fn best_plane(pieces: &[Piece], cell: &Box3, options: &BuildOptions) -> Option<(f64, usize, f64)> {
     let mut best: Option<(f64, usize, f64)> = None;
     for axis in 0..3 {
         // At one position, ends come before begins.
         let mut events: Vec<(f64, bool)> =
-            parts.iter().flat_map(|(_, [min, max])| [(min[axis], true), (max[axis], false)]).collect();
+            pieces.iter().flat_map(|(_, [min, max])| [(min[axis], true), (max[axis], false)]).collect();
         events.sort_by(|a, b| a.partial_cmp(b).expect("finite"));
-        let (mut n_below, mut n_above) = (0, parts.len());
+        let (mut n_below, mut n_above) = (0, pieces.len());
         for in_plane in events.chunk_by(|a, b| a.0 == b.0) {
             let position = in_plane[0].0;
             let n_begins = in_plane.iter().filter(|event| event.1).count();
@@ -89,15 +89,21 @@ fn best_plane(parts: &[Part], cell: &Box3, options: &BuildOptions) -> Option<(f6
     best
 }
 
-/// Returns the part of a triangle on one side (0 below, 1 above) of a plane, or `None` if there is none.
-fn part_in(part: &Part, cells: &[Box3; 2], side: usize, (axis, position): (usize, f64), margin: f64) -> Option<Part> {
-    let (corners, part_box @ [min, max]) = part;
+/// Returns the piece of a triangle on one side (0 below, 1 above) of a plane, or `None` if there is none.
+fn piece_in(
+    piece: &Piece,
+    cells: &[Box3; 2],
+    side: usize,
+    (axis, position): (usize, f64),
+    margin: f64,
+) -> Option<Piece> {
+    let (corners, piece_box @ [min, max]) = piece;
     let sides = [min[axis] < position, max[axis] > position];
     if !sides[side] {
         return None;
     }
     if !sides[1 - side] {
-        return Some(*part);
+        return Some(*piece);
     }
     let mut polygon = corners.to_vec();
     let [near_min, near_max] = grown(cells[side], margin);
@@ -109,14 +115,14 @@ fn part_in(part: &Part, cells: &[Box3; 2], side: usize, (axis, position): (usize
         return None;
     }
     let clipped = grown(bounds(&polygon), margin);
-    let limits = [cells[side], *part_box];
+    let limits = [cells[side], *piece_box];
     let within = |pick: fn(f64, f64) -> f64, end: usize| {
         [0, 1, 2].map(|k| limits.iter().fold(clipped[end][k], |x, limit| pick(x, limit[end][k])))
     };
     Some((*corners, [within(f64::max, 0), within(f64::min, 1)]))
 }
 
-/// Returns the part of a polygon with a height of at least 0 over a plane perpendicular to an axis.
+/// Returns the piece of a polygon with a height of at least 0 over a plane perpendicular to an axis.
 fn clip(polygon: &[Point], axis: usize, height: impl Fn(f64) -> f64) -> Vec<Point> {
     let mut kept = Vec::new();
     for (ix, a) in polygon.iter().enumerate() {

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use kdray::{
-    accel::kdtree::{BuildOptions, Invalid, KdTree, Node, Parts},
+    accel::kdtree::{BuildOptions, Invalid, KdArrays, KdTree, Node},
     layout::{KD_HAS_SLAB, KD_MAX_DEPTH, KdNode, Slab, Triangle},
 };
 
@@ -11,7 +11,7 @@ use crate::meshes::{boxed, room, triangle};
 /// A valid tree into which a test plants an error.
 struct Plant {
     triangles: Vec<Triangle>,
-    tree: Parts,
+    tree: KdArrays,
 }
 
 impl Plant {
@@ -19,18 +19,18 @@ impl Plant {
         let triangles = room(12);
         let tree = KdTree::build(&triangles, &BuildOptions::default());
         assert_eq!(tree.validate(&triangles), Ok(()));
-        Self { triangles, tree: tree.into_parts() }
+        Self { triangles, tree: tree.into_arrays() }
     }
 
     /// Returns the validator's error after a change.
-    fn after(mut self, change: impl FnOnce(&mut Parts)) -> Invalid {
+    fn after(mut self, change: impl FnOnce(&mut KdArrays)) -> Invalid {
         change(&mut self.tree);
-        KdTree::from_parts(self.tree, &self.triangles).expect_err("the planted error")
+        KdTree::from_arrays(self.tree, &self.triangles).expect_err("the planted error")
     }
 }
 
 /// Returns the last split: node, axis, position, child.
-fn last_split(tree: &Parts) -> (u32, usize, f32, u32) {
+fn last_split(tree: &KdArrays) -> (u32, usize, f32, u32) {
     let split = |node| match tree.node(node) {
         Node::Split { axis, position, child } => Some((node, axis, position, child)),
         Node::Leaf { .. } => None,
@@ -39,7 +39,7 @@ fn last_split(tree: &Parts) -> (u32, usize, f32, u32) {
 }
 
 /// Returns the last leaf with at least `least` triangles: node, first, count.
-fn last_leaf(tree: &Parts, least: u32) -> (u32, u32, u32) {
+fn last_leaf(tree: &KdArrays, least: u32) -> (u32, u32, u32) {
     let leaf = |node| match tree.node(node) {
         Node::Leaf { first, count } if count >= least => Some((node, first, count)),
         _ => None,
@@ -47,12 +47,12 @@ fn last_leaf(tree: &Parts, least: u32) -> (u32, u32, u32) {
     (0..tree.nodes.len() as u32).rev().find_map(leaf).expect("a leaf")
 }
 
-fn set(tree: &mut Parts, node: u32, to: Node) {
+fn set(tree: &mut KdArrays, node: u32, to: Node) {
     tree.nodes[node as usize] = to.into();
 }
 
 /// Removes an entry of a leaf, and adapts the ranges of the leaves after it.
-fn drop_entry(tree: &mut Parts, entry: u32) {
+fn drop_entry(tree: &mut KdArrays, entry: u32) {
     tree.leaf_triangles.remove(entry as usize);
     tree.leaf_planes.remove(entry as usize);
     for node in (0..tree.nodes.len() as u32).filter(|&node| node != 1) {
@@ -73,7 +73,7 @@ fn any_dropped_reference() {
         let mut tree = plant.tree.clone();
         let triangle = tree.leaf_triangles[entry as usize];
         drop_entry(&mut tree, entry);
-        match KdTree::from_parts(tree, &plant.triangles) {
+        match KdTree::from_arrays(tree, &plant.triangles) {
             Err(Invalid::Missing { triangle: missing, .. }) => n_missing += u32::from(missing == triangle),
             // A leaf may hold a triangle that does not meet it, because the triangle's bounds are conservative.
             other => assert_eq!(other.err(), None),
@@ -91,12 +91,12 @@ fn a_dropped_triangle_in_a_split_plane() {
     let options = BuildOptions { intersection_cost: 4.0, ..Default::default() };
     let tree = KdTree::build(&triangles, &options);
     assert_eq!(tree.validate(&triangles), Ok(()));
-    let tree = tree.into_parts();
+    let tree = tree.into_arrays();
     for entry in 0..tree.leaf_triangles.len() as u32 {
         let mut tree = tree.clone();
         let triangle = tree.leaf_triangles[entry as usize];
         drop_entry(&mut tree, entry);
-        let found = KdTree::from_parts(tree, &triangles);
+        let found = KdTree::from_arrays(tree, &triangles);
         assert!(matches!(found, Err(Invalid::Missing { triangle: t, .. }) if t == triangle), "{entry}: {found:?}");
     }
 }
@@ -237,7 +237,7 @@ fn a_wrong_plane() {
 }
 
 /// Returns the last node with a slab, and its slab.
-fn last_slab(tree: &Parts) -> (u32, Slab) {
+fn last_slab(tree: &KdArrays) -> (u32, Slab) {
     let slab = |node: u32| {
         let is_marked = tree.nodes[node as usize].axis_and_child & KD_HAS_SLAB != 0;
         is_marked.then(|| (node, tree.slabs[node as usize]))
@@ -292,7 +292,7 @@ fn a_wrong_depth() {
     // A chain of splits with one level more than the traversal supports.
     let n_levels = KD_MAX_DEPTH - 1;
     let triangles = [triangle([Vec3::ZERO, Vec3::X, Vec3::Y])];
-    let mut tree = KdTree::build(&triangles, &BuildOptions { max_depth: Some(0), ..Default::default() }).into_parts();
+    let mut tree = KdTree::build(&triangles, &BuildOptions { max_depth: Some(0), ..Default::default() }).into_arrays();
     let end = tree.box_max.x;
     for level in 0..n_levels {
         let child = 2 * level + 2;
@@ -302,14 +302,14 @@ fn a_wrong_depth() {
         tree.parents.push(node);
     }
     tree.depth = n_levels;
-    let found = KdTree::from_parts(tree, &triangles).expect_err("too deep");
+    let found = KdTree::from_arrays(tree, &triangles).expect_err("too deep");
     assert_eq!(found, Invalid::Depth { recorded: n_levels, found: n_levels });
 }
 
 #[test]
 fn other_triangles() {
     let Plant { mut triangles, tree } = Plant::new();
-    let built = KdTree::from_parts(tree, &triangles).expect("the tree as it was built");
+    let built = KdTree::from_arrays(tree, &triangles).expect("the tree as it was built");
     let built_of = triangles.len();
     triangles.pop();
     assert_eq!(built.validate(&triangles), Err(Invalid::Triangles { built_of, given: built_of - 1 }));

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use kdray::{
-    layout::{Auxiliary, EDGE_STEPS, EdgeStep},
+    layout::{AtrousIteration, Auxiliary, N_ATROUS_ITERATIONS},
     reference,
 };
 
@@ -12,13 +12,18 @@ use super::{
 };
 use crate::support::{compare, random::Random};
 
-/// Takes the steps of the filter that are in the range.
-fn filtered(stage: &PathStage, steps: std::ops::Range<u32>, aux: &[Auxiliary], light: &[[f32; 4]]) -> Vec<[f32; 4]> {
+/// Takes the iterations of the filter that are in the range.
+fn filtered(
+    stage: &PathStage,
+    iterations: std::ops::Range<u32>,
+    aux: &[Auxiliary],
+    light: &[[f32; 4]],
+) -> Vec<[f32; 4]> {
     let pixels = &stage.resources.pixels;
     pixels.pixel_aux.upload(aux).expect("pixel_aux");
     pixels.filtered().upload(light).expect("pixel_filtered");
-    for step_ix in steps {
-        stage.run(|commands| stage.passes.edge.atrous_filter.record(commands, &stage.resources, step_ix));
+    for iteration_ix in iterations {
+        stage.run(|commands| stage.passes.edge.atrous_filter.record(commands, &stage.resources, iteration_ix));
     }
     pixels.filtered().download().expect("pixel_filtered")
 }
@@ -30,7 +35,7 @@ fn whole(aux: &[Auxiliary], light: impl Fn(usize) -> f32, variance: f32) -> Vec<
         [light, light, light, variance]
     };
     let light: Vec<_> = (0..2 * N_PIXELS).map(halves).collect();
-    let found = filtered(&edge_stage(1), 0..EDGE_STEPS, aux, &light);
+    let found = filtered(&edge_stage(1), 0..N_ATROUS_ITERATIONS, aux, &light);
     found[..N_PIXELS].iter().map(|pixel| pixel[0]).collect()
 }
 
@@ -45,11 +50,11 @@ fn agrees_with_its_twin() {
     let aux = mixed_aux(&mut random);
     let mut pixel = |_| random.in_box(Vec3::ZERO, Vec3::ONE).extend(random.between(0.0, 0.2)).to_array();
     let light: Vec<_> = (0..2 * N_PIXELS).map(&mut pixel).collect();
-    for step_ix in 0..EDGE_STEPS {
+    for iteration_ix in 0..N_ATROUS_ITERATIONS {
         let mut expected = light.clone();
-        reference::atrous_filter::atrous_filter(stage.frame(), &EdgeStep { step_ix }, &aux, &mut expected);
+        reference::atrous_filter::atrous_filter(stage.frame(), &AtrousIteration { iteration_ix }, &aux, &mut expected);
         assert_ne!(expected, light);
-        compare::pixels(1e-4, 0, &expected, &filtered(&stage, step_ix..step_ix + 1, &aux, &light)).unwrap();
+        compare::pixels(1e-4, 0, &expected, &filtered(&stage, iteration_ix..iteration_ix + 1, &aux, &light)).unwrap();
     }
 }
 
@@ -86,8 +91,8 @@ fn an_edge_of_light_stays_if_there_is_no_noise() {
     }
 }
 
-/// A step that regards all differences as noise averages them with the spline's weights, which leave (35 / 128)^2 of
-/// the variance.
+/// An iteration that regards all differences as noise averages them with the spline's weights, which leave (35 / 128)^2
+/// of the variance.
 #[test]
 fn a_step_reduces_noise_by_the_factor_of_its_weights() {
     let stage = edge_stage(1);

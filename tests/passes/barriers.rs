@@ -59,11 +59,11 @@ fn accumulate(stage: &Stage, commands: &Commands) {
 }
 
 fn compact(stage: &Stage, commands: &Commands) {
-    // The section's last element, a barrier, is left out.
-    let section = plan::next_rays();
-    let (_, section) = section.split_last().expect("passes");
+    // The sequence's last element, a barrier, is left out.
+    let sequence = plan::next_rays();
+    let (_, sequence) = sequence.split_last().expect("passes");
     let inputs = Inputs { batch: BATCH, ..Inputs::default() };
-    stage.passes.record_section(commands, &stage.resources, section, &inputs);
+    stage.passes.record_sequence(commands, &stage.resources, sequence, &inputs);
 }
 
 fn tonemap(stage: &Stage, commands: &Commands) {

@@ -8,7 +8,7 @@ use crate::{
         MeshWithTree, assert_silent,
         closest::{MISS, agree, check},
         device, meshes,
-        packets::levels,
+        packets::simd_levels,
         pretended,
         random::Random,
     },
@@ -96,11 +96,11 @@ fn by_twin(world: &MeshWithTree, points: &[QueryPoint]) -> Vec<Hit> {
     hits
 }
 
-/// Through the wide hierarchy, with the instructions of a level.
-fn by_hierarchy(world: &MeshWithTree, level: Level, points: &[QueryPoint]) -> Vec<Hit> {
+/// Through the wide hierarchy, with the instructions of a SIMD level.
+fn by_hierarchy(world: &MeshWithTree, simd_level: Level, points: &[QueryPoint]) -> Vec<Hit> {
     let bvh = WideBvh::new(world.tree(), &world.triangles);
     let mut hits = vec![MISS; points.len()];
-    closest_point_by(&world.inputs(), || WidePointSearch::new(&bvh, level), points, &mut hits);
+    closest_point_by(&world.inputs(), || WidePointSearch::new(&bvh, simd_level), points, &mut hits);
     hits
 }
 
@@ -140,8 +140,8 @@ fn the_hierarchy_finds_what_the_twin_finds() {
         check(&world.triangles, &[], &points, &hits).unwrap_or_else(|what| panic!("world {i}: {what}"));
         let n_same = hits.iter().zip(&twin).filter(|(a, b)| a == b).count();
         assert!(n_same * 100 >= 99 * N_POINTS, "world {i}: {n_same} of {N_POINTS}");
-        for level in levels() {
-            assert!(by_hierarchy(world, level, &points) == hits, "world {i}, {level:?}");
+        for simd_level in simd_levels() {
+            assert!(by_hierarchy(world, simd_level, &points) == hits, "world {i}, {simd_level:?}");
         }
     }
 }

@@ -53,7 +53,7 @@ fn stage_of(capacity: u32, materials: &[Material]) -> Stage {
 }
 
 /// Returns a ray whose pixel is its index, and its hit. Where some surfaces are blended, the rays have used 0 to 4 of
-/// the five levels, by turns.
+/// the five depths, by turns.
 fn parent(stage: &Stage, i: usize, triangle_ix: u32) -> (PathRay, Hit) {
     let n_used = if stage.resources.constants().extra_bounces > 0 { i as u32 % 5 } else { 0 };
     let ray = PathRay {
@@ -70,7 +70,7 @@ fn parent(stage: &Stage, i: usize, triangle_ix: u32) -> (PathRay, Hit) {
 /// The output of compaction.
 struct Compacted {
     rays: Vec<PathRay>,
-    child_kinds: Vec<u32>,
+    child_flags: Vec<u32>,
     first_children: Vec<u32>,
     bounces: Vec<Bounce>,
 }
@@ -85,17 +85,17 @@ fn on_device(stage: &Stage, n_before: u32, child_counts: &[u32]) -> Compacted {
     stage.set_rays(&rays);
     stage.set_hits(&hits);
     let queue = &resources.queue;
-    for words in [&queue.child_kinds, &queue.first_children, &queue.scan_blocks] {
+    for words in [&queue.child_flags, &queue.first_children, &queue.scan_blocks] {
         words.upload(&vec![UNTOUCHED_WORD; words.len()]).expect("words");
     }
     let batch = Batch { depth: 1, bounce_ix: 1, ..FIRST };
     stage.run(|commands| {
         let inputs = Inputs { batch, ..Inputs::default() };
-        stage.passes.record_section(commands, resources, &plan::next_rays(), &inputs);
+        stage.passes.record_sequence(commands, resources, &plan::next_rays(), &inputs);
     });
     Compacted {
         rays: queue.rays.download().expect("rays"),
-        child_kinds: queue.child_kinds.download().expect("child_kinds"),
+        child_flags: queue.child_flags.download().expect("child_flags"),
         first_children: queue.first_children.download().expect("first_children"),
         bounces: resources.bounces.download().expect("bounces"),
     }
@@ -113,18 +113,18 @@ fn on_cpu(stage: &Stage, n_before: u32, child_counts: &[u32]) -> Compacted {
     let (before, behind) = all.split_at_mut(n_before as usize + n);
     before[n_before as usize..].copy_from_slice(&rays);
     let untouched = || vec![UNTOUCHED_WORD; capacity];
-    let (mut child_kinds, mut first_children) = (untouched(), untouched());
+    let (mut child_flags, mut first_children) = (untouched(), untouched());
     let places = n_before as usize..n_before as usize + n;
     let mut scan_blocks = vec![0; n.div_ceil(SCAN_GROUP_SIZE as usize)];
     let parents = Parents { rays: &rays, hits: &hits };
-    reference::compact::reduce(&bindings, parents, &mut child_kinds[places.clone()], &mut scan_blocks);
+    reference::compact::reduce(&bindings, parents, &mut child_flags[places.clone()], &mut scan_blocks);
     let (this, mut next) = (bounces[1], bounces[2]);
     reference::compact::spine(&mut scan_blocks, constants, &this, &mut next);
     if next.overflow == 0 {
         reference::compact::scatter(
             &bindings,
             parents,
-            &child_kinds[places.clone()],
+            &child_flags[places.clone()],
             &scan_blocks,
             next.first_ray,
             &mut first_children[places],
@@ -133,14 +133,14 @@ fn on_cpu(stage: &Stage, n_before: u32, child_counts: &[u32]) -> Compacted {
     }
     bounces[2] = next;
     bounces[0].any_overflow = next.overflow;
-    Compacted { rays: all, child_kinds, first_children, bounces }
+    Compacted { rays: all, child_flags, first_children, bounces }
 }
 
 fn check(stage: &Stage, n_before: u32, child_counts: &[u32]) -> Compacted {
     let expected = on_cpu(stage, n_before, child_counts);
     let found = on_device(stage, n_before, child_counts);
     compare::rays(1e-5, 0, &expected.rays, &found.rays).unwrap();
-    compare::exact(&expected.child_kinds, &found.child_kinds).unwrap();
+    compare::exact(&expected.child_flags, &found.child_flags).unwrap();
     compare::exact(&expected.first_children, &found.first_children).unwrap();
     compare::exact(&expected.bounces, &found.bounces).unwrap();
     found
@@ -179,12 +179,12 @@ fn all_children_keep_their_order() {
     let children = &found.rays[2500..];
     assert!(children.iter().enumerate().all(|(i, ray)| ray.pixel_ix == i as u32 / 2));
     assert!(children.iter().enumerate().all(|(i, ray)| (ray.direction.y > 0.0) == i.is_multiple_of(2)));
-    assert!((0..2500).all(|i| found.child_kinds[i] == CHILD_REFLECTED | CHILD_TRANSMITTED));
+    assert!((0..2500).all(|i| found.child_flags[i] == CHILD_REFLECTED | CHILD_TRANSMITTED));
     assert!((0..2500).all(|i| found.first_children[i] == 2500 + 2 * i as u32));
     assert_eq!((found.bounces[2].first_ray, found.bounces[2].n_rays, found.bounces[2].overflow), (2500, 5000, 0));
     let found = check(&stage, 10, &[1; 2490]);
     assert!(
-        (0..2490).all(|i| found.rays[2500 + i].pixel_ix == i as u32 && found.child_kinds[10 + i] == CHILD_REFLECTED)
+        (0..2490).all(|i| found.rays[2500 + i].pixel_ix == i as u32 && found.child_flags[10 + i] == CHILD_REFLECTED)
     );
     let found = check(&stage, 0, &[0; 2500]);
     compare::exact(&[UNTOUCHED_RAY; 5000], &found.rays[2500..]).unwrap();
@@ -192,17 +192,17 @@ fn all_children_keep_their_order() {
     assert_eq!((next.n_rays, next.trace_groups_x, next.scan_groups_x, next.shade_groups_x), (0, 0, 0, 40));
 }
 
-/// Rays that have used all levels go on only where they pass straight through a blended surface. Other children use a
-/// level more than their parents.
+/// Rays at the last depth go on only where they pass straight through a blended surface. Other children are
+/// one deeper than their parents.
 #[test]
-fn levels_are_counted_where_surfaces_are_blended() {
+fn depth_is_counted_where_surfaces_are_blended() {
     let stage = stage_of(100, &[scenes::veil(Vec3::ONE, 0.5), scenes::mirror(Vec3::splat(0.5)), scenes::glass(1.5)]);
     let found = check(&stage, 0, &[0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 2, 2, 2, 2, 2]);
-    let (both, levels) = (CHILD_REFLECTED | CHILD_TRANSMITTED, [1; 4].into_iter().chain([0]));
+    let (both, depths) = (CHILD_REFLECTED | CHILD_TRANSMITTED, [1; 4].into_iter().chain([0]));
     let of_veil = [CHILD_TRANSMITTED; 5].into_iter();
     let expected: Vec<_> =
-        of_veil.chain(levels.clone().map(|n| n * CHILD_REFLECTED)).chain(levels.map(|n| n * both)).collect();
-    assert_eq!(found.child_kinds[..15], expected);
+        of_veil.chain(depths.clone().map(|n| n * CHILD_REFLECTED)).chain(depths.map(|n| n * both)).collect();
+    assert_eq!(found.child_flags[..15], expected);
     let n_used = |ray: &PathRay| f32::INFINITY.to_bits() - ray.t_max.to_bits();
     let of_children: Vec<_> = found.rays[15..32].iter().map(n_used).collect();
     assert_eq!(of_children, [0, 1, 2, 3, 4, 1, 2, 3, 4, 1, 1, 2, 2, 3, 3, 4, 4]);

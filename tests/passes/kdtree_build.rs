@@ -7,7 +7,7 @@ use glam::{Vec3, vec3};
 use kdray::{
     accel::{
         Statistics,
-        kdtree::{self, BuildOptions, KdTree, Parts},
+        kdtree::{self, BuildOptions, KdArrays, KdTree},
     },
     buffers::KdTreeRoom,
     gpu::{Buffer, BufferUse, Context, Timer},
@@ -38,10 +38,10 @@ fn builder(context: &Arc<Context>, triangles: &[Triangle], options: &KdTreeBuild
     KdTreeBuilder::new(context, &buffer, options).expect("a builder")
 }
 
-fn built(builder: &KdTreeBuilder) -> (BuiltTree, Parts) {
+fn built(builder: &KdTreeBuilder) -> (BuiltTree, KdArrays) {
     let built = builder.build(None).expect("a tree");
-    let parts = builder.read_back(&built).expect("its arrays");
-    (built, parts)
+    let arrays = builder.read_back(&built).expect("its arrays");
+    (built, arrays)
 }
 
 /// Returns the cost of a tree as a multiple of that of the host's tree.
@@ -53,9 +53,9 @@ fn relative_cost(tree: &KdTree, triangles: &[Triangle]) -> f64 {
 }
 
 /// Checks a tree against the twin's, which knows only scale 0. Software drivers divide exactly, GPUs need not.
-fn check_twin(context: &Context, name: &str, triangles: &[Triangle], (found, parts): (&BuiltTree, &Parts)) {
+fn check_twin(context: &Context, name: &str, triangles: &[Triangle], (found, arrays): (&BuiltTree, &KdArrays)) {
     if context.is_software() && found.finest_scale == 0 {
-        let Parts { nodes, parents, leaf_triangles, .. } = parts.clone();
+        let KdArrays { nodes, parents, leaf_triangles, .. } = arrays.clone();
         let is_twin = Tree { nodes, parents, leaf_triangles } == kdtree_build(triangles, &BuildOptions::default());
         assert!(is_twin, "{name} has another tree than the twin's");
     }
@@ -64,11 +64,11 @@ fn check_twin(context: &Context, name: &str, triangles: &[Triangle], (found, par
 /// Builds a tree twice and checks it.
 fn check(context: &Arc<Context>, name: &str, triangles: &[Triangle]) {
     let builder = builder(context, triangles, &bare());
-    let (found, parts) = built(&builder);
+    let (found, arrays) = built(&builder);
     assert_eq!(found.n_limited, 0, "{name}");
-    assert_eq!(built(&builder).1, parts, "{name}, again");
-    check_twin(context, name, triangles, (&found, &parts));
-    let tree = KdTree::from_parts(parts, triangles).unwrap_or_else(|invalid| panic!("{name}: {invalid}"));
+    assert_eq!(built(&builder).1, arrays, "{name}, again");
+    check_twin(context, name, triangles, (&found, &arrays));
+    let tree = KdTree::from_arrays(arrays, triangles).unwrap_or_else(|invalid| panic!("{name}: {invalid}"));
     let cost = relative_cost(&tree, triangles);
     println!("{name}: {} nodes, {} entries, {cost} times the host's cost", found.n_nodes, found.n_entries);
     assert!(cost <= MOST_COST, "{name}: {cost} times the host's cost");
@@ -188,12 +188,12 @@ fn a_build_without_room_ends_in_leaves() {
     for room in rooms {
         let options = KdTreeBuilderOptions { room, ..bare() };
         let builder = builder(&context, &triangles, &options);
-        let (found, parts) = built(&builder);
+        let (found, arrays) = built(&builder);
         let capacities = builder.buffers().capacities;
         assert!(found.n_limited > 0, "{room:?}");
         assert!(found.n_entries <= capacities.n_references && found.n_nodes <= 2 * capacities.n_pairs, "{room:?}");
-        assert_eq!(built(&builder).1, parts, "{room:?}, again");
-        KdTree::from_parts(parts, &triangles).unwrap_or_else(|invalid| panic!("{room:?}: {invalid}"));
+        assert_eq!(built(&builder).1, arrays, "{room:?}, again");
+        KdTree::from_arrays(arrays, &triangles).unwrap_or_else(|invalid| panic!("{room:?}: {invalid}"));
     }
     assert_silent(&context);
 }
@@ -245,9 +245,9 @@ fn trees_of_limited_depth_are_valid_and_cost_more() {
     for max_depth in [0, 1, 5] {
         let tree = BuildOptions { max_depth: Some(max_depth), ..bare().tree };
         let options = KdTreeBuilderOptions { tree, ..KdTreeBuilderOptions::default() };
-        let (found, parts) = built(&builder(&context, &triangles, &options));
+        let (found, arrays) = built(&builder(&context, &triangles, &options));
         assert_eq!(found.depth, max_depth);
-        let tree = KdTree::from_parts(parts, &triangles).expect("a valid tree");
+        let tree = KdTree::from_arrays(arrays, &triangles).expect("a valid tree");
         assert!(relative_cost(&tree, &triangles) > MOST_COST, "{max_depth} levels");
     }
     assert_silent(&context);
@@ -257,14 +257,14 @@ fn trees_of_limited_depth_are_valid_and_cost_more() {
 fn check_slabs(context: &Arc<Context>, name: &str, triangles: &[Triangle]) {
     let bare = built(&builder(context, triangles, &bare())).1;
     let builder = builder(context, triangles, &KdTreeBuilderOptions::default());
-    let (found, parts) = built(&builder);
-    assert_eq!(built(&builder).1, parts, "{name}, again");
+    let (found, arrays) = built(&builder);
+    assert_eq!(built(&builder).1, arrays, "{name}, again");
     let without = |node: &KdNode| KdNode { axis_and_child: node.axis_and_child & !KD_HAS_SLAB, ..*node };
-    let nodes: Vec<KdNode> = parts.nodes.iter().map(without).collect();
-    let n_slabs = parts.nodes.iter().zip(&nodes).filter(|(marked, bare)| marked != bare).count();
-    assert_eq!(Parts { nodes, slabs: Vec::new(), ..parts.clone() }, bare, "{name}");
-    let tree = KdTree::from_parts(parts, triangles).unwrap_or_else(|invalid| panic!("{name}: {invalid}"));
-    let twin = kd_slabs(&KdTree::from_parts(bare, triangles).expect("a tree"), triangles);
+    let nodes: Vec<KdNode> = arrays.nodes.iter().map(without).collect();
+    let n_slabs = arrays.nodes.iter().zip(&nodes).filter(|(marked, bare)| marked != bare).count();
+    assert_eq!(KdArrays { nodes, slabs: Vec::new(), ..arrays.clone() }, bare, "{name}");
+    let tree = KdTree::from_arrays(arrays, triangles).unwrap_or_else(|invalid| panic!("{name}: {invalid}"));
+    let twin = kd_slabs(&KdTree::from_arrays(bare, triangles).expect("a tree"), triangles);
     let of_twin = twin.iter().filter(|slab| **slab != Slab::default()).count();
     println!("{name}: {n_slabs} slabs, the twin has {of_twin}");
     assert!(n_slabs.abs_diff(of_twin) <= 1 + of_twin / 100, "{name}: {n_slabs} slabs, not {of_twin}");

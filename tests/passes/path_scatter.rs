@@ -62,7 +62,7 @@ fn check(stage: &PathStage, depth: u32, n: u32) -> (usize, u32) {
     stage.set_n_paths(&rows);
     stage.resources.queue.rays.upload(&rays).expect("rays");
     stage.resources.queue.hits.upload(&hits).expect("hits");
-    stage.resources.queue.child_kinds.upload(&vec![UNTOUCHED_WORD; n_all]).expect("child_kinds");
+    stage.resources.queue.child_flags.upload(&vec![UNTOUCHED_WORD; n_all]).expect("child_flags");
     paths.path_states.upload(&states).expect("path_states");
     paths.shadow_rays.upload(&vec![NO_SHADOW_RAY; n_all]).expect("shadow_rays");
     paths.live_paths.upload(&list).expect("live_paths");
@@ -70,16 +70,16 @@ fn check(stage: &PathStage, depth: u32, n: u32) -> (usize, u32) {
     stage.run(|commands| stage.passes.path_scatter.record(commands, &stage.resources, &batch));
 
     let (mut rays, mut states, mut shadow_rays) = (rays, states, vec![NO_SHADOW_RAY; n_all]);
-    let mut kinds = vec![UNTOUCHED_WORD; n_all];
+    let mut flags = vec![UNTOUCHED_WORD; n_all];
     let mut blocks = vec![[0; 2]; n.div_ceil(SCAN_GROUP_SIZE) as usize];
     let buffers = PathBuffers { rays: &mut rays, states: &mut states, shadow_rays: &mut shadow_rays };
-    let counts = (&mut kinds[..n as usize], &mut blocks[..]);
+    let counts = (&mut flags[..n as usize], &mut blocks[..]);
     path_scatter(&stage.inputs(), &batch, (&live, &hits), buffers, counts);
     // Where rounding decides which lobe or which light is chosen, a path takes another way.
     let n_outliers = n as usize / 50;
     let queue = &stage.resources.queue;
-    let found = queue.child_kinds.download().expect("child_kinds");
-    compare::exact_but_for(n_outliers, &kinds, &found).unwrap();
+    let found = queue.child_flags.download().expect("child_flags");
+    compare::exact_but_for(n_outliers, &flags, &found).unwrap();
     let sums: Vec<_> = found[..n as usize].chunks(SCAN_GROUP_SIZE as usize).flat_map(counts_of_block).collect();
     compare::exact(&sums, &queue.scan_blocks.download_first(sums.len()).expect("scan_blocks")).unwrap();
     compare::rays(1e-3, n_outliers, &rays, &queue.rays.download().expect("rays")).unwrap();

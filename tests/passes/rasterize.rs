@@ -49,7 +49,7 @@ impl View {
         hits_by(&self.stage, |commands, batch| {
             Rasterize::reset(commands, resources);
             commands.barrier(Access::TransferWrite, Access::AnyUse); // raster_groups
-            passes.record_section(commands, resources, &plan::visibility(Primary::SoftwareRaster), &Inputs::default());
+            passes.record_sequence(commands, resources, &plan::visibility(Primary::SoftwareRaster), &Inputs::default());
             passes.primary_hit.record(commands, batch);
         })
     }

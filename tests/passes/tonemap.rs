@@ -35,7 +35,7 @@ fn agrees_with_its_twin() {
             let found = encoded(&stage, &pixels);
             compare::bytes(1, &expected, &found).unwrap();
             let n_off = expected.iter().zip(&found).filter(|(a, b)| a != b).count();
-            assert!(n_off <= pixels.len() / 50, "{tonemap}: {n_off} pixels are a level off");
+            assert!(n_off <= pixels.len() / 50, "{tonemap}: {n_off} pixels are one code off");
         }
     }
 }
@@ -55,7 +55,7 @@ fn another_curve_is_noticed() {
 fn known_values_are_encoded_as_the_standard_says() {
     let stage = empty_stage(options(3, 3));
     let linear = [0.0, 0.001, 0.0031308, 0.01, 0.21404, 0.5, 1.0, 7.0, f32::INFINITY];
-    let levels = [0, 3, 10, 25, 127, 188, 255, 255, 255];
+    let expected = [0, 3, 10, 25, 127, 188, 255, 255, 255];
     let pixels = linear.map(|x| [x, x, x, 1.0]);
-    compare::bytes(1, &levels.map(|x| [x, x, x, 255]), &encoded(&stage, &pixels)).unwrap();
+    compare::bytes(1, &expected.map(|x| [x, x, x, 255]), &encoded(&stage, &pixels)).unwrap();
 }

@@ -24,7 +24,7 @@ mod standard;
 mod strangers;
 #[path = "../support/mod.rs"]
 mod support;
-mod tiles;
+mod udim;
 
 use std::{fs, path::Path};
 

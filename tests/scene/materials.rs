@@ -280,7 +280,7 @@ fn load_toml(material: &str, images: &[(&str, &[u8])]) -> Result<Scene, SceneErr
 }
 
 #[test]
-fn scene_files_describe_layers_and_conductors() {
+fn scene_files_describe_coats_and_conductors() {
     let text = "clearcoat = 0.5, clearcoat_roughness = 0.25, sheen_color = [0.1, 0.2, 2], sheen_roughness = 0.75, \
                 conductor_eta = [0.2, 1, 2], conductor_k = [4, 0, 1], single_scattering = true";
     let scene = load_toml(text, &[]).unwrap();

@@ -2,7 +2,7 @@
 
 use glam::{Vec3, vec3};
 use kdray::{
-    accel::kdtree::{BuildOptions, KdTree, Node, Parts},
+    accel::kdtree::{BuildOptions, KdArrays, KdTree, Node},
     layout::{Plane, Triangle},
 };
 
@@ -29,24 +29,24 @@ pub fn chain(n_levels: u32) -> MeshWithTree {
     let triangles = slabs(n_levels + 1);
     let flat = KdTree::build(&triangles, &BuildOptions { max_depth: Some(0), ..BuildOptions::default() });
     let leaf = |ix: u32| Node::Leaf { first: ix, count: 1 }.into();
-    let mut parts = Parts {
+    let mut arrays = KdArrays {
         nodes: vec![leaf(0); 2],
         parents: vec![0],
         leaf_triangles: (0..triangles.len() as u32).collect(),
         leaf_planes: triangles.iter().map(|t| Plane { normal: Vec3::X, distance: t.v0.x }).collect(),
         slabs: Vec::new(),
         depth: n_levels,
-        ..flat.into_parts()
+        ..flat.into_arrays()
     };
     let mut node = 0;
     for level in 0..n_levels {
         let child = 2 * level + 2;
-        parts.nodes[node as usize] = Node::Split { axis: 0, position: (level + 1) as f32, child }.into();
-        parts.nodes.extend([leaf(level), leaf(level + 1)]);
-        parts.parents.push(node);
+        arrays.nodes[node as usize] = Node::Split { axis: 0, position: (level + 1) as f32, child }.into();
+        arrays.nodes.extend([leaf(level), leaf(level + 1)]);
+        arrays.parents.push(node);
         node = child + 1;
     }
-    parts.nodes[1] = Node::Leaf { first: 0, count: 0 }.into();
-    let tree = KdTree::from_parts(parts, &triangles).expect("a tree");
+    arrays.nodes[1] = Node::Leaf { first: 0, count: 0 }.into();
+    let tree = KdTree::from_arrays(arrays, &triangles).expect("a tree");
     MeshWithTree::with_tree(triangles, tree)
 }

@@ -87,7 +87,7 @@ pub fn rays(relative: f32, n_outliers: usize, expected: &[PathRay], found: &[Pat
     })
 }
 
-/// Succeeds if every channel is within `levels`.
-pub fn bytes(levels: u8, expected: &[[u8; 4]], found: &[[u8; 4]]) -> Result<(), String> {
-    all_agree(expected, found, 0, |a, b| (0..4).all(|i| a[i].abs_diff(b[i]) <= levels))
+/// Succeeds if every channel is within `most_off`.
+pub fn bytes(most_off: u8, expected: &[[u8; 4]], found: &[[u8; 4]]) -> Result<(), String> {
+    all_agree(expected, found, 0, |a, b| (0..4).all(|i| a[i].abs_diff(b[i]) <= most_off))
 }

@@ -70,11 +70,11 @@ fn changed_shaders_draw_and_broken_ones_do_not() {
     let warning = messages.wait_for("warning: glsl/passes/tonemap.comp:");
     assert!(warning.contains("no_such_word"), "{warning}");
     assert!(picture.is_shown_on(&display.screen()), "the previous shaders stay in use");
-    edit(&path(layout), "#define TILE_SIZE 8u", "#define TILE_SIZE 4u");
+    edit(&path(layout), "#define PIXEL_GROUP_SIZE 8u", "#define PIXEL_GROUP_SIZE 4u");
     edit(&path(tonemap), "no_such_word + ", "255u - ");
     messages.wait_for("warning: glsl/shared/layout.glsl: ");
     assert!(picture.is_shown_on(&display.screen()), "the previous shaders stay in use");
-    edit(&path(layout), "#define TILE_SIZE 4u", "#define TILE_SIZE 8u");
+    edit(&path(layout), "#define PIXEL_GROUP_SIZE 4u", "#define PIXEL_GROUP_SIZE 8u");
     display.wait_until("the mended kernel's picture", |screen| inverted(&picture).is_shown_on(screen));
 
     display.focus("kdray");

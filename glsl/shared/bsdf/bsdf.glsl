@@ -1,9 +1,9 @@
 // How surfaces of microfacets scatter light in the path tracer: the bidirectional scattering distribution function.
 // Twin of src/reference/bsdf/mod.rs.
 //
-// From the top, a surface has these layers:
+// From the top, a surface has these lobes:
 //
-// - a clear layer (clearcoat.glsl),
+// - a clear coat (clearcoat.glsl),
 // - the sheen of cloth (sheen.glsl),
 // - an interface of microfacets, which reflects (reflection.glsl) or lets pass (transmission.glsl),
 // - a Lambertian surface below it (lambert.glsl).

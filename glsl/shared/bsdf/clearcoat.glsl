@@ -1,5 +1,5 @@
-// A clear layer above a surface, of the index of refraction 1.5 (KHR_materials_clearcoat), whose microfacets reflect as
-// those of reflection.glsl do. What the layer reflects towards the viewer is missing below it. Twin of
+// A clear coat above a surface, of the index of refraction 1.5 (KHR_materials_clearcoat), whose microfacets reflect as
+// those of reflection.glsl do. What the coat reflects towards the viewer is missing below it. Twin of
 // src/reference/bsdf/clearcoat.rs.
 #ifndef KDRAY_BSDF_CLEARCOAT
 #define KDRAY_BSDF_CLEARCOAT
@@ -14,7 +14,7 @@ float clearcoat_fresnel(float cosine) {
     return mix(CLEARCOAT_REFLECTANCE, 1.0, grazing_weight(cosine));
 }
 
-// The share of light that a whole layer reflects. roughness: as in `ggx_albedo`.
+// The share of light that a whole coat reflects. roughness: as in `ggx_albedo`.
 float clearcoat_albedo(float cosine, float roughness) {
     GgxAlbedo albedo = ggx_albedo(cosine, roughness);
     return CLEARCOAT_REFLECTANCE * (1.0 - albedo.loss - albedo.grazing) + albedo.grazing;

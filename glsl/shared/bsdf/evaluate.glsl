@@ -33,7 +33,7 @@ void add_reflection(BsdfTerms terms, vec3 to_light, vec3 half_vector, inout Bsdf
     sum.pdf += terms.choice.x * choice * reflection_pdf(terms.to_viewer, half_vector, terms.width);
 }
 
-// Adds the reflection of the clear layer.
+// Adds the reflection of the clear coat.
 void add_clearcoat(BsdfTerms terms, vec3 to_light, vec3 half_vector, inout BsdfEval sum) {
     if (!has_clearcoat(terms.material) || terms.coat_roughness == 0.0) return;
     float width = terms.coat_roughness * terms.coat_roughness;

@@ -41,7 +41,7 @@ float interface_width(Material material) {
     return width < LEAST_ROUGH_WIDTH ? 0.0 : min(width, 1.0);
 }
 
-// The roughness of the clear layer; 0 if it is perfectly smooth.
+// The roughness of the clear coat; 0 if it is perfectly smooth.
 float clearcoat_roughness(Material material) {
     float roughness = material.clearcoat_roughness;
     return roughness * roughness < LEAST_ROUGH_WIDTH ? 0.0 : min(roughness, 1.0);

@@ -74,7 +74,7 @@ LobeSample sample_interface(BsdfTerms terms, vec3 u) {
     return delta_lobe(refracted, terms.base_share * terms.eta * terms.eta * split.transmitted, probability);
 }
 
-// A sample of the clear layer.
+// A sample of the clear coat.
 LobeSample sample_clearcoat(BsdfTerms terms, vec2 u) {
     float width = terms.coat_roughness * terms.coat_roughness;
     vec3 half_vector = vec3(0.0, 0.0, 1.0);

@@ -1,4 +1,4 @@
-// What all lobes need that depends on the material and the viewer: the layers' shares, and the probabilities with which
+// What all lobes need that depends on the material and the viewer: the lobes' shares, and the probabilities with which
 // the lobes are chosen. Twin of src/reference/bsdf/terms.rs.
 #ifndef KDRAY_BSDF_TERMS
 #define KDRAY_BSDF_TERMS
@@ -23,7 +23,7 @@ struct BsdfTerms {
     vec3 to_viewer;
     // Width of the interface's distribution of normals. It is 0 if the interface is perfectly smooth.
     float width;
-    // Roughness of the clear layer. It is 0 if the layer is perfectly smooth.
+    // Roughness of the clear coat. It is 0 if the coat is perfectly smooth.
     float coat_roughness;
     float sheen_roughness;
     // Index of refraction on the viewer's side, divided by that of the other side. 1: light passes unbent.
@@ -31,7 +31,7 @@ struct BsdfTerms {
     bool is_solid;
     // Whether there is an interface. Without one, the base is Lambertian.
     bool has_interface;
-    // Share of the light that the layers above leave to the sheen, and to the interface.
+    // Share of the light that the lobes above leave to the sheen, and to the interface.
     float sheen_share;
     float base_share;
     float sheen_bound;
@@ -46,7 +46,7 @@ struct BsdfTerms {
     vec3 between;
     // Probability that the interface's light is sampled as reflected if it passes straight, whatever the microfacet.
     float straight_choice;
-    // Probabilities of the lobes: interface, Lambertian, clear layer, sheen. Their sum is 1, or 0 for a black surface.
+    // Probabilities of the lobes: interface, Lambertian, clear coat, sheen. Their sum is 1, or 0 for a black surface.
     vec4 choice;
 };
 
@@ -124,8 +124,8 @@ vec3 interface_albedo(BsdfTerms terms, GgxAlbedo albedo) {
     return with_metal(material, (1.0 - material.transmission) * opaque, metal);
 }
 
-// Sets the shares of the layers, and the probabilities of the lobes.
-void set_layers(inout BsdfTerms terms, GgxAlbedo albedo) {
+// Sets the shares and the probabilities of the lobes.
+void set_shares(inout BsdfTerms terms, GgxAlbedo albedo) {
     Material material = terms.material;
     float cosine = terms.to_viewer.z;
     float coat = 0.0, sheen = 0.0;
@@ -207,7 +207,7 @@ BsdfTerms bsdf_terms(Material material, Surface surface, vec3 to_viewer) {
     if (terms.has_interface) albedo = ggx_albedo(terms.to_viewer.z, roughness);
     terms.clear_gain = 1.0 / (1.0 - clear_loss(terms, albedo));
     set_lambert(terms, albedo, roughness);
-    set_layers(terms, albedo);
+    set_shares(terms, albedo);
     if ((material.flags & MATERIAL_UNLIT) != 0u) terms.choice = vec4(0.0);
     return terms;
 }

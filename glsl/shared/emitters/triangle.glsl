@@ -12,7 +12,7 @@
 #include "shading/material.glsl"
 #include "emitters/light_sample.glsl"
 
-// The radiance that a triangle emits at barycentric weights of its second and third corner, by the largest level of
+// The radiance that a triangle emits at barycentric weights of its second and third corner, by mip level 0 of
 // its texture. A surface without shading (`unlit`) emits nothing.
 vec3 emission_at(uint triangle_ix, float u, float v) {
     uint material_ix = material_ix_of(triangle_ix);

@@ -35,9 +35,9 @@ void size_dispatches() {
     build.counted_pair_groups_y = counted_pairs.y;
     build.counted_cell_groups_x = counted_cells.x;
     build.counted_cell_groups_y = counted_cells.y;
-    uint n_tiles = is_counted ? blocks_of(build.n_pairs) : 0u;
-    build.tiles_per_group = max((n_tiles + GRID_MAX_SORT_GROUPS - 1u) / GRID_MAX_SORT_GROUPS, 1u);
-    build.sort_groups_x = (n_tiles + build.tiles_per_group - 1u) / build.tiles_per_group;
+    uint n_blocks = is_counted ? blocks_of(build.n_pairs) : 0u;
+    build.blocks_per_group = max((n_blocks + GRID_MAX_SORT_GROUPS - 1u) / GRID_MAX_SORT_GROUPS, 1u);
+    build.sort_groups_x = (n_blocks + build.blocks_per_group - 1u) / build.blocks_per_group;
     build.sort_groups_y = 1u;
 }
 

@@ -1,8 +1,8 @@
 // What the kernels share that compute a kd-tree's slabs (src/passes/kd_slabs.rs). The terms:
 //
 //   entry       an entry of `leaf_triangles`. Entries are in depth-first order, so those below a node are consecutive.
-//   part        of an entry: the part of its triangle within its margin of its leaf's cell
-//   candidate   a node that gets a slab if the parts below it are flat enough. On each path from the root, these are
+//   piece       of an entry: the part of its triangle within its margin of its leaf's cell
+//   candidate   a node that gets a slab if the pieces below it are flat enough. On each path from the root, these are
 //               the first splits with at most 8, 32, 128, 512 and 2048 entries below them, and leaves of 2 to 2048
 //               entries.
 //   scaled      world units times `world_scale`, a power of two. No scaled coordinate of the root's cell exceeds 4.

@@ -1,5 +1,5 @@
-// The mean normal of a surface: the main axis of the sum of a a^T / |a| over the area vectors a of its parts. The sum
-// does not depend on the triangles' winding, and a part counts by its area. Needs nothing before it; includes
+// The mean normal of a surface: the main axis of the sum of a a^T / |a| over the area vectors a of its pieces. The sum
+// does not depend on the triangles' winding, and a piece counts by its area. Needs nothing before it; includes
 // slab_build.glsl.
 #ifndef KDRAY_SLAB_NORMAL
 #define KDRAY_SLAB_NORMAL

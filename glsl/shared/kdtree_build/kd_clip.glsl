@@ -1,6 +1,6 @@
 // Clipping of triangles to cells, in f32. Twin of src/accel/kdtree/clip.rs, with more room for rounding.
 //
-// The parts contain those that exact arithmetic would find within the margin of the cell and of the plane. Proof: let
+// The pieces contain those that exact arithmetic would find within the margin of the cell and of the plane. Proof: let
 // m be the triangle's largest coordinate, e its greatest extent on an axis, and u = 2^-24. Each computed corner stands
 // for an exact point of the triangle: a crossing of the edge from a to b stands for the point that the computed t gives
 // between the points of a and b. Computing the crossing adds an error of at most u (m + 2 e) to the greater one of
@@ -44,7 +44,7 @@ vec3 crossing(vec3 a, vec3 b, uint axis, float position) {
     return point;
 }
 
-// Cuts off the part beyond a plane. Sets n to MAX_CORNERS + 1 if there are too many corners.
+// Cuts off the piece beyond a plane. Sets n to MAX_CORNERS + 1 if there are too many corners.
 void cut(inout Polygon polygon, uint axis, float side, float position) {
     bool is_cut = false;
     for (uint i = 0u; i < polygon.n; ++i) {
@@ -70,7 +70,7 @@ void cut(inout Polygon polygon, uint axis, float side, float position) {
     polygon = kept;
 }
 
-// The bounds of the part of a polygon that is not beyond a plane; least exceeds greatest if it is empty.
+// The bounds of the piece of a polygon that is not beyond a plane; least exceeds greatest if it is empty.
 void bounds_in(Polygon polygon, uint axis, float side, float position, out vec3 least, out vec3 greatest) {
     least = vec3(3.4028235e38);
     greatest = vec3(-3.4028235e38);
@@ -101,27 +101,27 @@ float reach_of(Triangle triangle) {
     return reach;
 }
 
-// Narrows the bounds of a reference's part on one side of a plane to the bounds of the polygon there.
-void narrow(Polygon polygon, uint axis, float side, float position, float reach, inout KdReference part) {
+// Narrows the bounds of a reference's piece on one side of a plane to the bounds of the polygon there.
+void narrow(Polygon polygon, uint axis, float side, float position, float reach, inout KdReference piece) {
     precise float limit = position + side * reach;
     vec3 least, greatest;
     bounds_in(polygon, axis, side, limit, least, greatest);
     if (any(greaterThan(least, greatest))) {
-        part.box_min = vec3(1.0);
-        part.box_max = vec3(-1.0);
+        piece.box_min = vec3(1.0);
+        piece.box_max = vec3(-1.0);
         return;
     }
     precise vec3 low = least - reach;
     precise vec3 high = greatest + reach;
-    part.box_min = max(part.box_min, low);
-    part.box_max = min(part.box_max, high);
+    piece.box_min = max(piece.box_min, low);
+    piece.box_max = min(piece.box_max, high);
 }
 
-bool is_empty(KdReference part) {
-    return any(greaterThan(part.box_min, part.box_max));
+bool is_empty(KdReference piece) {
+    return any(greaterThan(piece.box_min, piece.box_max));
 }
 
-// Splits a reference that its cell's plane cuts. A part that is empty has a corner box_min beyond box_max.
+// Splits a reference that its cell's plane cuts. A piece that is empty has a corner box_min beyond box_max.
 void split_reference(Triangle triangle, KdCell cell, inout KdReference below, out KdReference above) {
     above = below;
     below.box_max[cell.axis] = cell.position;

@@ -12,7 +12,7 @@ uint every_second_bit(uint n) {
     return (n & 1u) | ((n >> 1) & 2u) | ((n >> 2) & 4u);
 }
 
-// The index from the top of the k-th of n bands, which are rows of tiles. k counts from 0, from the middle outward,
+// The index from the top of the k-th of n bands, which are rows of squares. k counts from 0, from the middle outward,
 // alternately above and below. The bottom band, which the window's border may cut, comes last. So all bands before it
 // have the same number of pixels, and `pixel_of` finds a pixel's band by a division.
 uint band_outward(uint k, uint n) {
@@ -20,23 +20,23 @@ uint band_outward(uint k, uint n) {
     return (n_left & 1u) == 0u ? n - 1u - (n_left >> 1) : n_left >> 1;
 }
 
-// The pixel at index `order` of the queue, from 0 to width * height - 1. Pixels are ordered tile by tile (TILE_SIZE x
-// TILE_SIZE pixels), and in each tile along a Z-curve, so that subgroups of any size are blocks of the image. In
-// tiles that the right or lower border cuts, pixels are ordered row by row. The bands of tiles come from the middle
-// outward: most pictures show their subject in the middle, where rays take longest. These rays start early, so that a
-// dispatch does not wait for them at its end.
+// The pixel at index `order` of the queue, from 0 to width * height - 1. Pixels are ordered square by square
+// (PIXEL_GROUP_SIZE x PIXEL_GROUP_SIZE pixels), and in each square along a Z-curve, so that subgroups of any size are
+// blocks of the image. In squares that the right or lower border cuts, pixels are ordered row by row. The bands of
+// squares come from the middle outward: most pictures show their subject in the middle, where rays take longest. These
+// rays start early, so that a dispatch does not wait for them at its end.
 uvec2 pixel_of(uint order, uint width, uint height) {
-    uint nth_band = order / (TILE_SIZE * width);
-    uint in_band = order - nth_band * TILE_SIZE * width;
-    uint band = band_outward(nth_band, (height + TILE_SIZE - 1u) / TILE_SIZE);
-    uint rows = min(TILE_SIZE, height - band * TILE_SIZE);
-    uint tile = in_band / (TILE_SIZE * rows);
-    uint in_tile = in_band - tile * TILE_SIZE * rows;
-    uint columns = min(TILE_SIZE, width - tile * TILE_SIZE);
-    bool is_whole = rows == TILE_SIZE && columns == TILE_SIZE;
-    uvec2 at = is_whole ? uvec2(every_second_bit(in_tile), every_second_bit(in_tile >> 1))
-        : uvec2(in_tile % columns, in_tile / columns);
-    return TILE_SIZE * uvec2(tile, band) + at;
+    uint nth_band = order / (PIXEL_GROUP_SIZE * width);
+    uint in_band = order - nth_band * PIXEL_GROUP_SIZE * width;
+    uint band = band_outward(nth_band, (height + PIXEL_GROUP_SIZE - 1u) / PIXEL_GROUP_SIZE);
+    uint rows = min(PIXEL_GROUP_SIZE, height - band * PIXEL_GROUP_SIZE);
+    uint square = in_band / (PIXEL_GROUP_SIZE * rows);
+    uint in_square = in_band - square * PIXEL_GROUP_SIZE * rows;
+    uint columns = min(PIXEL_GROUP_SIZE, width - square * PIXEL_GROUP_SIZE);
+    bool is_whole = rows == PIXEL_GROUP_SIZE && columns == PIXEL_GROUP_SIZE;
+    uvec2 at = is_whole ? uvec2(every_second_bit(in_square), every_second_bit(in_square >> 1))
+        : uvec2(in_square % columns, in_square / columns);
+    return PIXEL_GROUP_SIZE * uvec2(square, band) + at;
 }
 
 // Converts a pixel of the window to the same pixel's coordinates in the whole picture.

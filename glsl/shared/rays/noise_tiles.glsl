@@ -23,7 +23,7 @@ uint noise_tile_of(uvec2 pixel) {
 // Converts a pixel of the window to the same pixel's coordinates in the whole picture. Tiles at the right and at the
 // lower edge may extend beyond the picture.
 uvec2 picture_pixel_of(uvec2 pixel) {
-    if (frame.window_x != WINDOW_OF_TILES) return in_picture(pixel);
+    if (frame.window_x != WINDOW_OF_NOISE_TILES) return in_picture(pixel);
     uint tile = noise_tile_of(pixel);
     uvec2 place = uvec2(tile & 0xfffu, tile >> 12 & 0xfffu);
     return NOISE_TILE_SIZE * place + uvec2(pixel.x, pixel.y % NOISE_TILE_SIZE);
@@ -31,7 +31,7 @@ uvec2 picture_pixel_of(uvec2 pixel) {
 
 // The index of the first sample that the frame draws of a pixel of the window.
 uint first_sample_of(uvec2 pixel) {
-    if (frame.window_x != WINDOW_OF_TILES) return frame.first_sample;
+    if (frame.window_x != WINDOW_OF_NOISE_TILES) return frame.first_sample;
     return frame.first_sample + (noise_tile_of(pixel) >> 24) * frame.window_y;
 }
 

@@ -1,4 +1,4 @@
-// Counts of what an invocation's rays read of the acceleration structure.
+// Counts of steps. A step is a read of the acceleration structure by a ray.
 //
 // Needs a constant `bool COUNT_COSTS`, which the kernel declares before it includes this file. If it is false, the
 // counting is compiled out. Provides `count_steps`, `steps_so_far` and `n_steps`.

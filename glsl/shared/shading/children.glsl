@@ -1,8 +1,8 @@
 // The child rays that start at a hit: reflected, transmitted, both or none. Twin of src/reference/children.rs.
 //
-// A child uses a level of rays more than its parent, unless it passes straight through a blended surface. The rays of a
-// frame have no end, so `t_max` can say how many levels a ray has used: as many floats lie between it and infinity.
-// Without blended surfaces, levels are bounces, and `t_max` stays.
+// A child is one deeper than its parent, unless it passes straight through a blended surface. The rays of a frame have
+// no end, so `t_max` can say a ray's depth: as many floats lie between it and infinity. Without blended surfaces, the
+// depth is the bounce, and `t_max` stays.
 #ifndef KDRAY_CHILDREN
 #define KDRAY_CHILDREN
 
@@ -14,8 +14,8 @@
 
 layout(constant_id = CONSTANT_BLENDED) const bool BLENDED = false;
 
-// Whether the ray is on the last level of rays, and has no children that use a further one.
-bool is_on_last_level(PathRay ray) {
+// Whether the ray is at the last depth, and has no children that are deeper.
+bool is_at_last_depth(PathRay ray) {
     uint n_used = floatBitsToUint(INFINITY) - floatBitsToUint(ray.t_max);
     return BLENDED && n_used + 1u >= frame.max_depth - frame.extra_bounces;
 }
@@ -35,7 +35,7 @@ Scattering scattering_at(PathRay ray, Hit hit, out Surface surface) {
     vec3 transmitted = transmittance(material, surface, hit.t);
     next.reflected_weight = kept_weight(ray, material, next.reflected_weight * transmitted);
     next.transmitted_weight = kept_weight(ray, material, next.transmitted_weight * transmitted);
-    if (is_on_last_level(ray)) {
+    if (is_at_last_depth(ray)) {
         next.reflected_weight = vec3(0.0);
         if (!next.passes_straight) next.transmitted_weight = vec3(0.0);
     }
@@ -43,14 +43,14 @@ Scattering scattering_at(PathRay ray, Hit hit, out Surface surface) {
 }
 
 // The child of a ray that leaves the surface of its hit in a direction.
-PathRay child_ray(Surface surface, vec3 direction, Hit hit, PathRay ray, vec3 weight, bool uses_level) {
+PathRay child_ray(Surface surface, vec3 direction, Hit hit, PathRay ray, vec3 weight, bool is_deeper) {
     PathRay child = ray_from(surface, direction, hit.triangle_ix, ray, ray.throughput * weight);
-    if (BLENDED && uses_level) child.t_max = uintBitsToFloat(floatBitsToUint(ray.t_max) - 1u);
+    if (BLENDED && is_deeper) child.t_max = uintBitsToFloat(floatBitsToUint(ray.t_max) - 1u);
     return child;
 }
 
 // The ray's children that carry light, as bits CHILD_*.
-uint child_kinds_of(PathRay ray, Hit hit) {
+uint child_flags_of(PathRay ray, Hit hit) {
     if (hit.triangle_ix == NO_TRIANGLE) return 0u;
     place(hit.triangle_ix);
     // Textures may change what a material scatters.

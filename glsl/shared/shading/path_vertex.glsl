@@ -1,10 +1,10 @@
-// One step of a path: the light at its hit, and the way on. Twin of src/reference/path_vertex.rs.
+// One vertex of a path: the light at its hit, and the way on. Twin of src/reference/path_vertex.rs.
 //
 // Light reaches a hit in two ways: a sampled light is seen from it, or the direction in which the path goes on meets a
 // light. Each way gets the share of the power heuristic (Veach: Robust Monte Carlo Methods for Light Transport
 // Simulation, 1997, section 9.2.4), so that the sum of both is the light, and each counts where it is good.
 //
-// Needs nothing. Provides `step_path`.
+// Needs nothing. Provides `scatter_path`.
 #ifndef KDRAY_PATH_VERTEX
 #define KDRAY_PATH_VERTEX
 
@@ -105,7 +105,7 @@ bool survives(uint depth, float u, inout vec3 throughput) {
 
 // Adds the light that the path's ray meets to its state, samples a light at the hit, and replaces the ray by the one
 // with which the path goes on. Returns whether it does.
-bool step_path(
+bool scatter_path(
     SampleKey key, uint depth, Hit hit, inout PathRay ray, inout PathState state, out ShadowRay shadow_ray
 ) {
     shadow_ray.state = SHADOW_RAY_NONE;

@@ -1,5 +1,5 @@
-// The parts of `texture_words`: the texels of images, and what leads from a triangle to them. The array begins with the
-// linear values of the 256 bytes of sRGB (src/world/mips.rs). The other parts begin where `accel` says.
+// The arrays in `texture_words`: the texels of images, and what leads from a triangle to them. They begin with the
+// linear values of the 256 bytes of sRGB (src/world/mips.rs). The other arrays begin where `accel` says.
 //
 // Needs nothing: it includes scene.glsl. Provides `TEXTURED`, `load_texels`, `texture_at`, `maps_of`,
 // `map_flags_of`, `uv_at`, `corner_uv`, `corner_surface` and `corner_colour_at`.

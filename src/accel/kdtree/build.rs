@@ -59,9 +59,9 @@ impl KdTree {
         // The budget of a cell is its share of the triangles.
         let meter = progress.begin(Work::Building, budget);
         let input = Input { triangles, options, scales };
-        let mut parts = flatten(grow((input, &meter), references, cell), bounds);
-        parts.leaf_planes = planes_of(&parts, triangles, &scales);
-        let mut tree = KdTree { parts, n_triangles: triangles.len(), scales };
+        let mut arrays = flatten(grow((input, &meter), references, cell), bounds);
+        arrays.leaf_planes = planes_of(&arrays, triangles, &scales);
+        let mut tree = KdTree { arrays, n_triangles: triangles.len(), scales };
         if options.slabs {
             tree.add_slabs(triangles);
         }
@@ -101,9 +101,9 @@ fn partition(input: Input, references: Vec<Reference>, cell: &Bounds, split: &Sp
     let sorted_out = |chunk: &[Reference]| {
         let (mut below, mut above) = (Vec::with_capacity(chunk.len()), Vec::with_capacity(chunk.len()));
         for reference in chunk {
-            let parts = split_reference(input, reference, cell, split);
-            below.extend(parts[0]);
-            above.extend(parts[1]);
+            let pieces = split_reference(input, reference, cell, split);
+            below.extend(pieces[0]);
+            above.extend(pieces[1]);
         }
         (below, above)
     };

@@ -1,5 +1,5 @@
 //! Clipping of triangles to cells, and "perfect splits" (Havran 2000). A perfect split cuts the clipped triangle at
-//! the plane and takes the bounds of each of the two parts.
+//! the plane and takes the bounds of each of the two pieces.
 //!
 //! The clipping is Sutherland-Hodgman's, in f64. Coordinates are f32, so a computed point is off by some 2^-52 of
 //! them, which is far less than a triangle's margin.
@@ -15,18 +15,18 @@ pub struct Polygon {
     len: usize,
 }
 
-/// Clips `triangle` to a cell and cuts it at a plane through the cell. Returns the bounds of the parts below and
-/// above the plane, or none for an empty part. A part reaches up to the margin outside the cell and beyond the plane.
+/// Clips `triangle` to a cell and cuts it at a plane through the cell. Returns the bounds of the pieces below and
+/// above the plane, or none for an empty piece. A piece reaches up to the margin outside the cell and beyond the plane.
 /// Its bounds are then grown by the margin once more. `plane`: the axis and the coordinate of the plane, world units.
 pub fn split_bounds(triangle: &Triangle, cell: &Bounds, plane: (usize, f32), margin: f32) -> [Option<Bounds>; 2] {
     let polygon = Polygon::near(triangle, cell, margin);
     let (axis, position, margin) = (plane.0, f64::from(plane.1), f64::from(margin));
     [polygon.bounds_in::<true>(axis, position + margin), polygon.bounds_in::<false>(axis, position - margin)]
-        .map(|part| part.grown(margin))
+        .map(|piece| piece.grown(margin))
 }
 
 impl Polygon {
-    /// Returns the part of `triangle` within a margin of a cell.
+    /// Returns the piece of `triangle` within a margin of a cell.
     pub fn near(triangle: &Triangle, cell: &Bounds, margin: f32) -> Self {
         let corner = |v: glam::Vec3| v.as_dvec3().to_array();
         let mut polygon = Polygon { corners: [[0.0; 3]; MAX_CORNERS], len: 3 };
@@ -44,7 +44,7 @@ impl Polygon {
         &self.corners[..self.len]
     }
 
-    /// Cuts off the part above (`KEEP_BELOW`) or below a plane.
+    /// Cuts off the piece above (`KEEP_BELOW`) or below a plane.
     fn clip<const KEEP_BELOW: bool>(&mut self, axis: usize, position: f64) {
         let outside = |p: &[f64; 3]| if KEEP_BELOW { p[axis] > position } else { p[axis] < position };
         if !self.corners[..self.len].iter().any(outside) {
@@ -71,19 +71,19 @@ impl Polygon {
         self.len = (self.len + 1).min(MAX_CORNERS);
     }
 
-    /// Returns the bounds of the part below (`KEEP_BELOW`) or above a plane.
+    /// Returns the bounds of the piece below (`KEEP_BELOW`) or above a plane.
     fn bounds_in<const KEEP_BELOW: bool>(&self, axis: usize, position: f64) -> Box3 {
-        let mut part = Box3::EMPTY;
+        let mut piece = Box3::EMPTY;
         for ix in 0..self.len {
             let (a, b) = (&self.corners[ix], &self.corners[if ix + 1 == self.len { 0 } else { ix + 1 }]);
             if if KEEP_BELOW { a[axis] <= position } else { a[axis] >= position } {
-                part.grow(a);
+                piece.grow(a);
             }
             if (a[axis] < position && b[axis] > position) || (a[axis] > position && b[axis] < position) {
-                part.grow(&crossing(a, b, axis, position));
+                piece.grow(&crossing(a, b, axis, position));
             }
         }
-        part
+        piece
     }
 }
 

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{EMPTY_LEAF, Node, Parts, subtree::Subtree};
+use super::{EMPTY_LEAF, KdArrays, Node, subtree::Subtree};
 use crate::accel::bounds::Bounds;
 
 /// Node of the upper part of a tree with all nodes below it. Its lowest nodes are whole subtrees.
@@ -12,8 +12,8 @@ pub enum UpperTree {
 }
 
 /// Makes the tree's arrays as kernels read them, without planes and slabs. `cell`: the root's cell.
-pub fn flatten(top: UpperTree, cell: Bounds) -> Parts {
-    let mut tree = Parts {
+pub fn flatten(top: UpperTree, cell: Bounds) -> KdArrays {
+    let mut tree = KdArrays {
         nodes: vec![EMPTY_LEAF; 2],
         parents: vec![0],
         leaf_triangles: Vec::new(),
@@ -28,7 +28,7 @@ pub fn flatten(top: UpperTree, cell: Bounds) -> Parts {
 }
 
 /// Writes a node at the index `slot`, and appends all nodes below it.
-fn append(tree: &mut Parts, slot: usize, top: UpperTree) {
+fn append(tree: &mut KdArrays, slot: usize, top: UpperTree) {
     match top {
         UpperTree::Subtree(subtree) => append_subtree(tree, slot, &subtree),
         UpperTree::Split { axis, position, children } => {
@@ -44,7 +44,7 @@ fn append(tree: &mut Parts, slot: usize, top: UpperTree) {
 }
 
 /// Writes a subtree's root at the index `slot`, and appends the subtree's other nodes and its entries.
-fn append_subtree(tree: &mut Parts, slot: usize, subtree: &Subtree) {
+fn append_subtree(tree: &mut KdArrays, slot: usize, subtree: &Subtree) {
     let (first_node, first_triangle) = (tree.nodes.len() as u32, tree.leaf_triangles.len() as u32);
     let relocated = |node| match Node::from(node) {
         Node::Leaf { first, count } => Node::Leaf { first: first + first_triangle, count },

@@ -11,6 +11,7 @@
 //!
 //! Wald and Havran, "On building fast kd-trees for ray tracing, and on doing that in O(N log N)", 2006.
 
+mod arrays;
 mod binned;
 mod boxes;
 mod build;
@@ -19,7 +20,6 @@ mod counted;
 mod coverage;
 mod flatten;
 mod links;
-mod parts;
 mod planes;
 mod ropes;
 mod sah;
@@ -38,8 +38,8 @@ use crate::layout::{
     AccelConstants, KD_AXIS_MASK, KD_LEAF, KD_MAX_DEPTH, KD_PAIR_SHIFT, KD_PLANE_EPSILON, KdNode, Triangle,
 };
 
+pub use arrays::KdArrays;
 pub use links::TraversalLinks;
-pub use parts::Parts;
 use scales::Scales;
 pub use statistics::Statistics;
 pub use traversal::Traversal;
@@ -48,10 +48,10 @@ pub use validate::Invalid;
 /// A kd-tree over triangles, as the kernels read it.
 ///
 /// Kernels read it without bounds checks. So a tree comes either from [`KdTree::build`], which makes only valid
-/// trees, or from [`KdTree::from_parts`], which validates. Nothing can change it afterwards.
+/// trees, or from [`KdTree::from_arrays`], which validates. Nothing can change it afterwards.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KdTree {
-    parts: Parts,
+    arrays: KdArrays,
     /// The number of triangles that the tree was built from. Every triangle index in a leaf is less than this number.
     n_triangles: usize,
     scales: Scales,
@@ -93,8 +93,8 @@ impl LazyTree {
     /// Returns what a traversal reads beside the tree, for any nodes of a tree over the triangles.
     pub(crate) fn links_of(&self, nodes: Vec<KdNode>, traversal: Traversal) -> TraversalLinks {
         let [box_min, box_max] = self.bounds();
-        let parts = Parts { nodes, box_min, box_max, ..Parts::default() };
-        TraversalLinks::new(&KdTree { parts, n_triangles: self.n_triangles(), scales: Scales::default() }, traversal)
+        let arrays = KdArrays { nodes, box_min, box_max, ..KdArrays::default() };
+        TraversalLinks::new(&KdTree { arrays, n_triangles: self.n_triangles(), scales: Scales::default() }, traversal)
     }
 }
 

@@ -25,7 +25,7 @@
 use rayon::prelude::*;
 
 use super::{
-    Node, Parts,
+    KdArrays, Node,
     scales::{Scales, length_of},
 };
 use crate::{
@@ -38,7 +38,7 @@ const MAX_ERROR: f64 = 25.0 / (1 << 24) as f64;
 
 /// Whether the planes of a tree let no ray miss a triangle: each is 0, or near its triangle (see the module's
 /// documentation), and its normal is no longer than that of [`planes_of`], but for a rounding.
-pub fn are_valid(parts: &Parts, triangles: &[Triangle], scales: &Scales) -> bool {
+pub fn are_valid(arrays: &KdArrays, triangles: &[Triangle], scales: &Scales) -> bool {
     let is_near = |((&ix, plane), cell_scale): ((&u32, &Plane), u32)| {
         let triangle = &triangles[ix as usize];
         let length = f64::from(length_of(cell_scale.min(scales.of_triangle(triangle))));
@@ -48,31 +48,31 @@ pub fn are_valid(parts: &Parts, triangles: &[Triangle], scales: &Scales) -> bool
         let corners = [triangle.v0, triangle.v1, triangle.v2];
         normal.length() <= 1.0 + 1e-6 && corners.into_iter().all(|corner| height(corner) <= most)
     };
-    let planes = parts.leaf_triangles.par_iter().zip(&parts.leaf_planes).zip(cell_scales(parts, scales));
-    parts.leaf_planes.len() == parts.leaf_triangles.len() && planes.all(is_near)
+    let planes = arrays.leaf_triangles.par_iter().zip(&arrays.leaf_planes).zip(cell_scales(arrays, scales));
+    arrays.leaf_planes.len() == arrays.leaf_triangles.len() && planes.all(is_near)
 }
 
 /// Returns the plane of each entry's triangle. It has the coarser one of the scales of the triangle and of the leaf's
 /// cell.
-pub fn planes_of(parts: &Parts, triangles: &[Triangle], scales: &Scales) -> Vec<Plane> {
+pub fn planes_of(arrays: &KdArrays, triangles: &[Triangle], scales: &Scales) -> Vec<Plane> {
     let in_cell = |(&ix, cell_scale): (&u32, u32)| {
         let triangle = &triangles[ix as usize];
         let Plane { normal, distance } = plane_of(triangle);
         let length = length_of(cell_scale.min(scales.of_triangle(triangle)));
         Plane { normal: normal / length, distance: distance / length }
     };
-    parts.leaf_triangles.par_iter().zip(cell_scales(parts, scales)).map(in_cell).collect()
+    arrays.leaf_triangles.par_iter().zip(cell_scales(arrays, scales)).map(in_cell).collect()
 }
 
 /// Returns the scale of each entry's cell.
-fn cell_scales(parts: &Parts, scales: &Scales) -> Vec<u32> {
-    let mut of_entries = vec![0; parts.leaf_triangles.len()];
+fn cell_scales(arrays: &KdArrays, scales: &Scales) -> Vec<u32> {
+    let mut of_entries = vec![0; arrays.leaf_triangles.len()];
     if scales.has_one() {
         return of_entries;
     }
-    let mut stack = vec![(0, Bounds { min: parts.box_min.to_array(), max: parts.box_max.to_array() })];
+    let mut stack = vec![(0, Bounds { min: arrays.box_min.to_array(), max: arrays.box_max.to_array() })];
     while let Some((node_ix, cell)) = stack.pop() {
-        match parts.node(node_ix) {
+        match arrays.node(node_ix) {
             Node::Leaf { first, count } => {
                 of_entries[first as usize..][..count as usize].fill(scales.of_cell(&cell));
             }
@@ -117,9 +117,9 @@ mod tests {
         let triangles = staircase(100);
         let tree = KdTree::build(&triangles, &BuildOptions { slabs: false, ..BuildOptions::default() });
         let scales = tree.scales;
-        let parts = tree.into_parts();
+        let arrays = tree.into_arrays();
         let is_valid = |change: fn(&mut Plane, f32)| {
-            let mut changed = parts.clone();
+            let mut changed = arrays.clone();
             change(&mut changed.leaf_planes[5], scales.largest() / (1 << 24) as f32);
             are_valid(&changed, &triangles, &scales)
         };

@@ -43,11 +43,11 @@ impl KdTree {
         let bounds = Bounds { min: self.box_min().to_array(), max: self.box_max().to_array() };
         let fitting = Fitting { tree: self, triangles, n_entries: self.entries_below() };
         let slabs: Vec<Slabs> = fitting.patches(bounds).par_iter().map(|patch| fitting.slabs_of(patch)).collect();
-        let parts = &mut self.parts;
-        parts.slabs = vec![Slab::default(); parts.nodes.len()];
+        let arrays = &mut self.arrays;
+        arrays.slabs = vec![Slab::default(); arrays.nodes.len()];
         for (node, slab) in slabs.into_iter().flatten() {
-            parts.slabs[node as usize] = slab;
-            parts.nodes[node as usize].axis_and_child |= KD_HAS_SLAB;
+            arrays.slabs[node as usize] = slab;
+            arrays.nodes[node as usize].axis_and_child |= KD_HAS_SLAB;
         }
     }
 

@@ -65,7 +65,7 @@ impl BuildCell {
     }
 }
 
-/// Returns the reference's parts below and above a split of its cell.
+/// Returns the reference's pieces below and above a split of its cell.
 #[inline]
 pub fn split_reference(input: Input, reference: &Reference, cell: &Bounds, split: &Split) -> [Option<Reference>; 2] {
     if reference.bounds.max[split.axis] <= split.position {
@@ -75,11 +75,11 @@ pub fn split_reference(input: Input, reference: &Reference, cell: &Bounds, split
         return [None, Some(*reference)];
     }
     let triangle = &input.triangles[reference.triangle_ix as usize];
-    let parts = split_bounds(triangle, cell, (split.axis, split.position), input.scales.margin_of(triangle));
-    // The bounds of each part are rounded outwards. The intersection keeps them within the reference's own bounds, so
+    let pieces = split_bounds(triangle, cell, (split.axis, split.position), input.scales.margin_of(triangle));
+    // The bounds of each piece are rounded outwards. The intersection keeps them within the reference's own bounds, so
     // bounds never grow from a cell to its children.
     let limits = reference.bounds.split(split.axis, split.position);
-    [0, 1].map(|side| parts[side].map(|part| Reference { bounds: part.intersection(&limits[side]), ..*reference }))
+    [0, 1].map(|side| pieces[side].map(|piece| Reference { bounds: piece.intersection(&limits[side]), ..*reference }))
 }
 
 /// A subtree on its own. Node 0 is its root and node 1 is unused, as in a whole tree.

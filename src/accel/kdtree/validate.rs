@@ -84,8 +84,8 @@ impl KdTree {
         }
         Walk::new(self, triangles).run(root)?;
         coverage::check(self, triangles)?;
-        let are_the_hosts = self.leaf_planes() == planes_of(&self.parts, triangles, &scales);
-        let are_valid = are_the_hosts || planes::are_valid(&self.parts, triangles, &scales);
+        let are_the_hosts = self.leaf_planes() == planes_of(&self.arrays, triangles, &scales);
+        let are_valid = are_the_hosts || planes::are_valid(&self.arrays, triangles, &scales);
         if are_valid { Ok(()) } else { Err(Invalid::Planes) }
     }
 }

@@ -7,7 +7,7 @@ use super::{
     builds::Builds,
     report::{SetResult, Timing},
 };
-use crate::{accel::AccelKind, bench::rays::RayKind};
+use crate::{accel::AccelKind, bench::rays::RaySetKind};
 
 /// Numbers of rays of a frame, millions.
 pub const MRAYS: [u32; 4] = [1, 5, 20, 50];
@@ -16,7 +16,7 @@ pub const MRAYS: [u32; 4] = [1, 5, 20, 50];
 /// measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ChangingFrames {
-    pub rays: RayKind,
+    pub rays: RaySetKind,
     /// The structure.
     pub by: String,
     /// Time of the build, or of the refit, on the GPU, milliseconds.

@@ -27,7 +27,7 @@ use self::{
     report::{RasterResult, SetResult},
 };
 use super::{
-    rays::{RayKind, RaySet},
+    rays::{RaySet, RaySetKind},
     stage::Stage,
 };
 use crate::{
@@ -153,7 +153,7 @@ impl DeviceStage {
             }
             contenders.extend(kernels);
         }
-        let rasterizes = set.kind == RayKind::Primary;
+        let rasterizes = set.kind == RaySetKind::Primary;
         let trials = run_contest(&self.context, &contenders, n_times, |n_rounds| {
             let rasters = if rasterizes { &mut self.rasters[..] } else { &mut [] };
             rasters.iter_mut().try_for_each(|raster| raster.draw(n_rounds))

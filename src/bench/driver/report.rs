@@ -9,7 +9,7 @@ use crate::{
         Spread,
         chart::{BarChart, Scale, Series},
         difference::{DriverDifference, is_hit},
-        rays::RayKind,
+        rays::RaySetKind,
     },
 };
 
@@ -37,7 +37,7 @@ impl Timing {
 /// The results on one set of rays.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SetResult {
-    pub rays: RayKind,
+    pub rays: RaySetKind,
     pub n_rays: usize,
     /// Number of hits that the driver finds.
     pub n_hits: usize,
@@ -60,7 +60,7 @@ pub struct SearchResult {
 
 impl SetResult {
     /// Makes the result from all contenders' results on the same rays. The first one is the driver's.
-    pub fn new(rays: RayKind, trials: &[ContenderResult]) -> Self {
+    pub fn new(rays: RaySetKind, trials: &[ContenderResult]) -> Self {
         let (driver, rivals) = trials.split_first().expect("the driver's trial");
         let n_rays = driver.hits.len();
         let driver_timing = Timing::new(driver.ms, n_rays);
@@ -153,11 +153,14 @@ impl Report {
             name: format!("kdray, {}", rival.traversal),
             values: self.sets.iter().map(|set| rate(&set.kdray[rival_ix].timing)).collect(),
         }));
-        series.extend(self.raster.iter().map(|raster| Series {
-            name: format!("kdray, {}", raster.primary),
-            values:
-                (self.sets.iter()).map(|set| rate(&raster.timing).filter(|_| set.rays == RayKind::Primary)).collect(),
-        }));
+        series.extend(
+            self.raster.iter().map(|raster| Series {
+                name: format!("kdray, {}", raster.primary),
+                values: (self.sets.iter())
+                    .map(|set| rate(&raster.timing).filter(|_| set.rays == RaySetKind::Primary))
+                    .collect(),
+            }),
+        );
         BarChart {
             title: format!("{}, {} triangles, on {}", self.scene, self.n_triangles, self.device),
             unit: "Mrays/s".to_owned(),
@@ -189,7 +192,7 @@ mod tests {
         ContenderResult { name: name.to_owned(), ms: Spread::of([ms, 2.0 * ms, 3.0 * ms]), hits: hits.to_vec() }
     }
 
-    fn set(rays: RayKind) -> SetResult {
+    fn set(rays: RaySetKind) -> SetResult {
         let right = [hit(1.0), hit(2.0), MISS, hit(3.0)];
         let wrong = [hit(1.0), MISS, hit(9.0), hit(3.1)];
         SetResult::new(rays, &[trial("driver", 3.0, right), trial("mask", 2.0, right), trial("stack", 6.0, wrong)])
@@ -197,27 +200,27 @@ mod tests {
 
     #[test]
     fn speeds_are_ratios_of_medians_and_hits_are_held_against_the_drivers() {
-        let result = set(RayKind::Mirror);
+        let result = set(RaySetKind::Mirror);
         assert_eq!((result.n_rays, result.n_hits, result.driver.ms.unwrap().median), (4, 3, 6.0));
         let [mask, stack] = &result.kdray[..] else { panic!("two rivals") };
         assert!((mask.ratio.unwrap() - 1.5).abs() < 1e-12 && (stack.ratio.unwrap() - 0.5).abs() < 1e-12);
         assert_eq!(mask.apart, DriverDifference::default());
         assert_eq!(stack.apart, DriverDifference { n_hit_or_miss: 2, n_distance: 1 });
-        assert_eq!(set(RayKind::Shadow).kdray[1].apart, DriverDifference { n_hit_or_miss: 2, n_distance: 0 });
+        assert_eq!(set(RaySetKind::Shadow).kdray[1].apart, DriverDifference { n_hit_or_miss: 2, n_distance: 0 });
     }
 
     #[test]
     fn rasterized_rays_are_as_many_as_the_drivers() {
-        let raster = RasterResult::new("raster".into(), Vec::new(), Spread::of([0.75]), &set(RayKind::Primary));
+        let raster = RasterResult::new("raster".into(), Vec::new(), Spread::of([0.75]), &set(RaySetKind::Primary));
         assert!((raster.ratio.unwrap() - 8.0).abs() < 1e-12);
-        let unknown = RasterResult::new("raster".into(), Vec::new(), None, &set(RayKind::Primary));
+        let unknown = RasterResult::new("raster".into(), Vec::new(), None, &set(RaySetKind::Primary));
         assert_eq!((unknown.ratio, unknown.timing.mrays_per_s), (None, None));
     }
 
     #[test]
     fn no_rays_have_no_speed() {
         let nobody = |name: &str| ContenderResult { hits: Vec::new(), ..trial(name, 1.0, [hit(1.0); 4]) };
-        let result = SetResult::new(RayKind::Shadow, &[nobody("driver"), nobody("mask")]);
+        let result = SetResult::new(RaySetKind::Shadow, &[nobody("driver"), nobody("mask")]);
         assert_eq!(
             (result.n_rays, result.kdray[0].ratio, result.kdray[0].apart),
             (0, None, DriverDifference::default())
@@ -227,7 +230,7 @@ mod tests {
     #[test]
     fn without_timestamps_only_hits_are_compared() {
         let untimed = |name| ContenderResult { ms: None, ..trial(name, 1.0, [hit(1.0); 4]) };
-        let result = SetResult::new(RayKind::Primary, &[untimed("driver"), untimed("mask")]);
+        let result = SetResult::new(RaySetKind::Primary, &[untimed("driver"), untimed("mask")]);
         assert_eq!((result.kdray[0].ratio, result.kdray[0].apart), (None, DriverDifference::default()));
     }
 }

@@ -10,7 +10,7 @@ use kdray::{
             changing::{Ahead, ChangingFrames, MRAYS, changing_frames},
             report::{RasterResult, Report, SetResult, Timing},
         },
-        rays::{RayKind, ray_sets},
+        rays::{RaySetKind, ray_sets},
         stage::Stage,
     },
     engine::{
@@ -101,7 +101,7 @@ fn text(report: &Report) -> String {
                 .iter()
                 .map(|rival| cells(set, &rival.traversal, &rival.timing, rival.ratio, Some(rival.apart.n_differing()))),
         );
-        let rasters = if set.rays == RayKind::Primary { &report.raster[..] } else { &[] };
+        let rasters = if set.rays == RaySetKind::Primary { &report.raster[..] } else { &[] };
         rows.extend(rasters.iter().map(|raster| cells(set, &raster.primary, &raster.timing, raster.ratio, None)));
     }
     text += &table(["rays", "number", "hits", "by", "ms", "Mrays/s", "ratio", "differing"], &rows);
@@ -205,12 +205,12 @@ mod tests {
                 .map(|i| Hit { t: if i < n_wrong { 2.0 } else { 1.0 }, triangle_ix: 0, u: 0.0, v: 0.0 })
                 .collect(),
         };
-        let set = |kind: RayKind| {
-            let n_wrong = if kind == RayKind::Primary { n_wrong } else { 0 };
+        let set = |kind: RaySetKind| {
+            let n_wrong = if kind == RaySetKind::Primary { n_wrong } else { 0 };
             let grid = trial("grid", 1.0, 0);
             SetResult::new(kind, &[trial("driver", 4.0, 0), trial("mask", 2.0, 0), trial("stack", 4.0, n_wrong), grid])
         };
-        let sets = RayKind::ALL.map(set);
+        let sets = RaySetKind::ALL.map(set);
         let ms = |ms| Spread::of([ms]);
         let builds = Builds {
             tree_ms: 1234.5,

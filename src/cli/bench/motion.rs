@@ -1,7 +1,7 @@
 //! `kdray bench motion`: the frames of an animation, without a window and without files.
 
 use kdray::{
-    bench::motion::{Part, Report, measure, moments},
+    bench::motion::{Phase, Report, measure, moments},
     engine::{AnimatedWorld, Engine, Loaded, Opened},
     frame::RenderOptions,
     gpu::{ContextOptions, Device},
@@ -86,7 +86,7 @@ fn text(report: &Report) -> String {
     text += &format!("{}x{} by {} on {}", report.width, report.height, report.integrator, report.device);
     text += &report.driver.as_ref().map_or_else(String::new, |driver| format!(", {driver}"));
     text += &format!(", {} frames, {} a second of the animation\n\n", report.n_frames, report.fps);
-    let wall = Part { name: "wall clock", ms: report.wall_ms };
+    let wall = Phase { name: "wall clock", ms: report.wall_ms };
     text +=
         &table(["part", "median ms", "min", "max"], &report.parts.iter().chain([&wall]).map(cells).collect::<Vec<_>>());
     text += "\n";
@@ -95,7 +95,7 @@ fn text(report: &Report) -> String {
     text
 }
 
-fn cells(part: &Part) -> [String; 4] {
+fn cells(part: &Phase) -> [String; 4] {
     let ms = |of: fn(&kdray::bench::Spread) -> f64| decimal(part.ms.as_ref().map(of), 3);
     [part.name.to_owned(), ms(|it| it.median), ms(|it| it.min), ms(|it| it.max)]
 }

@@ -86,8 +86,16 @@ fn text(report: &Report) -> String {
     let mut text = format!("{}x{} on {}", report.width, report.height, report.device);
     text += &report.driver.as_ref().map_or_else(String::new, |driver| format!(", {driver}"));
     text += &format!(", `{}`, medians of {}\n\n", report.traversal, report.n_times);
-    let header =
-        ["triangles", report.parts(), "references", "build ms", "primary ns", "shadow ns", "mirror ns", "diffuse ns"];
+    let header = [
+        "triangles",
+        report.elements(),
+        "references",
+        "build ms",
+        "primary ns",
+        "shadow ns",
+        "mirror ns",
+        "diffuse ns",
+    ];
     text += &table(header, &report.rows.iter().map(cells).collect::<Vec<_>>());
     text += &format!(
         "\nA rippled knot in a closed room; ns: time of a ray. kd-trees are built on {} threads, grids on the \
@@ -117,7 +125,7 @@ fn cells(row: &Row) -> [String; 8] {
     };
     [
         row.n_triangles.to_string(),
-        row.accel.n_parts().to_string(),
+        row.accel.n_elements().to_string(),
         row.accel.n_references().to_string(),
         decimal(Some(row.build_ms), 1),
         ns(0),
@@ -147,7 +155,7 @@ mod tests {
             Statistics,
             kdtree::{BuildOptions, KdTree},
         },
-        bench::{Spread, difference::Difference, rays::RayKind, size::RayCost, traversal::StepsARay},
+        bench::{Spread, difference::Difference, rays::RaySetKind, size::RayCost, traversal::StepsARay},
     };
 
     use super::*;
@@ -161,7 +169,7 @@ mod tests {
             accel: Statistics::KdTree(
                 KdTree::build(&[], &BuildOptions::default()).statistics(0, &BuildOptions::default()),
             ),
-            rays: RayKind::ALL
+            rays: RaySetKind::ALL
                 .map(|rays| RayCost {
                     rays,
                     n_rays: 1000,

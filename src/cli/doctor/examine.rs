@@ -48,7 +48,7 @@ impl ScenePicture {
             None => None,
         };
         let begin = Instant::now();
-        let radiance = self.draw_part(engine, world, &options).map_err(|error| Problem::of_device(&error))?;
+        let radiance = self.draw_crop(engine, world, &options).map_err(|error| Problem::of_device(&error))?;
         if radiance.iter().flatten().any(|channel| !channel.is_finite()) {
             return Err(Problem::of_wrong_picture("numbers in the part of the scene's picture are not finite"));
         }
@@ -83,7 +83,7 @@ impl ScenePicture {
     }
 
     /// Draws the middle of the picture. Returns its radiance.
-    fn draw_part(&self, engine: &Engine, world: &World, options: &RenderOptions) -> Result<Vec<[f32; 4]>, GpuError> {
+    fn draw_crop(&self, engine: &Engine, world: &World, options: &RenderOptions) -> Result<Vec<[f32; 4]>, GpuError> {
         let (width, height) = (CROP.min(options.width), CROP.min(options.height));
         let (x0, y0) = ((options.width - width) / 2, (options.height - height) / 2);
         let crop = Some(Crop { x0, y0, x1: x0 + width, y1: y0 + height });

@@ -231,14 +231,13 @@ fn terms(material: &Material) -> Map<String, Value> {
     let stated = material.terms().into_iter().filter(|term| !term.is_default);
     let mut terms: Map<_, _> = stated.map(|term| (term.key.to_owned(), value(term.value))).collect();
     let (coat, sheen) = (material.clearcoat, material.sheen);
-    let layers = [
+    let coats = [
         ("clearcoat", coat.factor != 0.0, json!(coat.factor)),
         ("clearcoat_roughness", coat.roughness != 0.0, json!(coat.roughness)),
         ("sheen_color", sheen.colour.max_element() != 0.0, json!(sheen.colour.to_array())),
         ("sheen_roughness", sheen.roughness != 0.0, json!(sheen.roughness)),
     ];
-    terms
-        .extend(layers.into_iter().filter(|(_, is_there, _)| *is_there).map(|(key, _, value)| (key.to_owned(), value)));
+    terms.extend(coats.into_iter().filter(|(_, is_there, _)| *is_there).map(|(key, _, value)| (key.to_owned(), value)));
     terms
 }
 

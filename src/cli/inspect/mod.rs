@@ -239,19 +239,19 @@ impl Inspection {
 }
 
 /// Returns a vector with five digits of its largest number, which are enough to read. `--json` prints all digits.
-fn vector(parts: [f32; 3]) -> String {
-    rounded(parts, parts.iter().fold(0.0, |largest, x| largest.max(x.abs())))
+fn vector(components: [f32; 3]) -> String {
+    rounded(components, components.iter().fold(0.0, |largest, x| largest.max(x.abs())))
 }
 
 /// Returns a vector with the digits with which a number has five.
-fn rounded(parts: [f32; 3], number: f32) -> String {
+fn rounded(components: [f32; 3], number: f32) -> String {
     let n_decimals = (4.0 - f64::from(number).max(1e-30).log10().floor()).clamp(0.0, 34.0) as usize;
-    let part = |x: f32| {
+    let component = |x: f32| {
         let text = format!("{x:.n_decimals$}");
         let short = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
         if short == "-0" { "0".to_owned() } else { short.to_owned() }
     };
-    format!("({})", parts.map(part).join(", "))
+    format!("({})", components.map(component).join(", "))
 }
 
 #[cfg(test)]

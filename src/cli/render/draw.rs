@@ -25,7 +25,7 @@ use crate::cli::{
     args::RenderArgs,
     error::CliError,
     interrupt::{self, Unwritten},
-    progress::{Progress, StepProgress},
+    progress::{CountedProgress, Progress},
 };
 
 /// A camera, and the files of its picture.
@@ -168,10 +168,10 @@ fn draw_in_turn(
 ) -> Result<(Vec<WrittenView>, Duration), CliError> {
     let mut begin = Instant::now();
     let mut renderer = engine.renderer(world, common.options)?;
-    let mut steps = common.steps(stage, views.len() as u32, renderer.n_bands());
+    let mut items = common.counted(stage, views.len() as u32, renderer.n_bands());
     let (mut written, mut drawing) = (Vec::new(), Duration::ZERO);
     for view in views {
-        let drawn = draw_view(common, view, &mut renderer, &mut Bar(&mut steps))?;
+        let drawn = draw_view(common, view, &mut renderer, &mut Bar(&mut items))?;
         drawing += begin.elapsed();
         written.push(write_view(common, view, drawn)?);
         begin = Instant::now();
@@ -191,11 +191,11 @@ fn draw_frames_apart(
     let mut film = engine.film_renderer(world, common.options)?;
     let opening = begin.elapsed();
     // The film tells of each sample of a frame once, also if a device draws several bands.
-    let mut steps = common.steps(stage, views.len() as u32, 1);
+    let mut items = common.counted(stage, views.len() as u32, 1);
     let view = |frame_ix: u32| &views[frame_ix as usize];
     let written = film.draw(
         views.len() as u32,
-        &mut Bar(&mut steps),
+        &mut Bar(&mut items),
         |renderer, frame_ix, tell_sample| draw_view(common, view(frame_ix), renderer, &mut || tell_sample()),
         |frame_ix, drawn| write_view(common, view(frame_ix), drawn),
     )?;
@@ -266,19 +266,24 @@ impl Common<'_> {
     }
 
     /// Returns the counter of the samples of all bands of all views.
-    fn steps<'a>(&self, (progress, message): (&'a Progress, &str), n_views: u32, n_bands: u32) -> StepProgress<'a> {
+    fn counted<'a>(
+        &self,
+        (progress, message): (&'a Progress, &str),
+        n_views: u32,
+        n_bands: u32,
+    ) -> CountedProgress<'a> {
         let args = self.args;
         // A picture that ends at a noise counts as one sample.
         let n_drawn = if self.noise_goal.is_some() { 1 } else { self.n_drawn };
         let factors = [n_views, n_drawn, args.repeat.into(), n_bands];
-        let mut steps = match self.goal {
-            Goal::Samples(_) => progress.steps(message, factors.into_iter().fold(1, u32::saturating_mul)),
-            Goal::Time(time) => progress.steps_until(message, time),
+        let mut items = match self.goal {
+            Goal::Samples(_) => progress.counted(message, factors.into_iter().fold(1, u32::saturating_mul)),
+            Goal::Time(time) => progress.counted_until(message, time),
         };
         // Progress within a sample takes time, because the CPU waits for the device. Measured frames are drawn without
         // it.
-        steps.shows_parts &= args.profile.is_none() && args.trace.is_none() && args.repeat == 1;
-        steps
+        items.shows_item_progress &= args.profile.is_none() && args.trace.is_none() && args.repeat == 1;
+        items
     }
 }
 
@@ -399,19 +404,19 @@ fn part(common: &Common, sums: &SampleSums) -> Picture {
 }
 
 /// Moves the progress bar while a frame is drawn.
-struct Bar<'a, 'b>(&'a mut StepProgress<'b>);
+struct Bar<'a, 'b>(&'a mut CountedProgress<'b>);
 
 impl Watcher for Bar<'_, '_> {
-    fn sees_parts(&self) -> bool {
-        self.0.shows_parts
+    fn sees_sample_progress(&self) -> bool {
+        self.0.shows_item_progress
     }
 
-    fn part(&mut self, share: f32) {
-        self.0.part(share);
+    fn sample_progress(&mut self, share: f32) {
+        self.0.item_progress(share);
     }
 
     fn sample(&mut self) {
-        self.0.step();
+        self.0.finish_item();
     }
 }
 
@@ -436,12 +441,12 @@ impl<'a> Relay<'a> {
 }
 
 impl Watcher for &mut Relay<'_> {
-    fn sees_parts(&self) -> bool {
-        self.watcher.sees_parts()
+    fn sees_sample_progress(&self) -> bool {
+        self.watcher.sees_sample_progress()
     }
 
-    fn part(&mut self, share: f32) {
-        self.watcher.part(share);
+    fn sample_progress(&mut self, share: f32) {
+        self.watcher.sample_progress(share);
     }
 
     fn sample(&mut self) {

@@ -25,9 +25,9 @@ const PLACE: &str = "{}";
 /// # Errors
 /// Two scenes still have the same name with all of their folders before it.
 pub fn picture_names(scenes: &[PathBuf]) -> Result<Vec<String>, CliError> {
-    let mut levels = vec![0; scenes.len()];
+    let mut depths = vec![0; scenes.len()];
     loop {
-        let names: Vec<String> = scenes.iter().zip(&levels).map(|(scene, level)| name_at(scene, *level)).collect();
+        let names: Vec<String> = scenes.iter().zip(&depths).map(|(scene, depth)| name_at(scene, *depth)).collect();
         let mut groups: HashMap<String, Vec<usize>> = HashMap::new();
         names.iter().enumerate().for_each(|(ix, name)| groups.entry(name.to_lowercase()).or_default().push(ix));
         let equal: Vec<_> = groups.into_values().filter(|group| group.len() > 1).collect();
@@ -35,25 +35,25 @@ pub fn picture_names(scenes: &[PathBuf]) -> Result<Vec<String>, CliError> {
             return Ok(names);
         }
         for group in &equal {
-            let mut scenes_of = group.iter().map(|&ix| (&scenes[ix], levels[ix]));
-            if scenes_of.all(|(scene, level)| name_at(scene, level + 1) == name_at(scene, level) && level > 0) {
+            let mut scenes_of = group.iter().map(|&ix| (&scenes[ix], depths[ix]));
+            if scenes_of.all(|(scene, depth)| name_at(scene, depth + 1) == name_at(scene, depth) && depth > 0) {
                 return Err(equal_names(group.iter().map(|&ix| &scenes[ix])));
             }
         }
-        equal.iter().flatten().for_each(|&ix| levels[ix] += 1);
+        equal.iter().flatten().for_each(|&ix| depths[ix] += 1);
     }
 }
 
-/// Returns the name of a scene's picture: at level 0 the file's name without its ending, at level 1 the whole name, and
-/// at level n with n - 1 folders before it.
-fn name_at(scene: &Path, level: usize) -> String {
-    if level == 0 {
+/// Returns the name of a scene's picture: at depth 0 the file's name without its ending, at depth 1 the whole name, and
+/// at depth n with n - 1 folders before it.
+fn name_at(scene: &Path, depth: usize) -> String {
+    if depth == 0 {
         return output::stem_of(&Scene::name_of(scene));
     }
     let absolute = path::absolute(scene).unwrap_or_else(|_| scene.to_owned());
     let normal =
         |part| if let Component::Normal(name) = part { Some(name.to_string_lossy().into_owned()) } else { None };
-    let mut parts: Vec<_> = absolute.components().rev().filter_map(normal).take(level).collect();
+    let mut parts: Vec<_> = absolute.components().rev().filter_map(normal).take(depth).collect();
     parts.reverse();
     output::stem_of(&parts.join("-"))
 }

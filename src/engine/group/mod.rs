@@ -5,14 +5,14 @@
 //! work_queue   ranges of units of work for each device, according to its measured speed
 //! samples      one picture: a unit is a block of samples of all pixels, which costs the same everywhere; for paths
 //!              without `edge` or layers
-//! columns      one picture: a unit is a column of pixels, and a range of columns is a tile; for all other pictures
+//! columns      one picture: a unit is a column of pixels, and a range of columns is a strip; for all other pictures
 //! film         many pictures: a unit is a picture
 //! ```
 
 mod columns;
 mod film;
+mod noise_tiles;
 mod samples;
-mod tiles;
 mod work_queue;
 
 use std::{
@@ -43,7 +43,7 @@ pub struct RendererGroup {
     first_sample: u32,
     columns: WorkQueue,
     samples: WorkQueue,
-    tiles: WorkQueue,
+    noise_tiles: WorkQueue,
     /// The picture that was drawn last.
     picture: Picture,
 }
@@ -68,7 +68,7 @@ impl RendererGroup {
         let first = if may_share_samples {
             options.clone()
         } else {
-            // Buffers have room for the first device's first tile. Larger tiles get new buffers.
+            // Buffers have room for the first device's first strip. Larger strips get new buffers.
             let x1 = asked.x0 + asked.width().div_ceil(n_devices as u32);
             RenderOptions { crop: Some(Crop { x1, ..asked }), ..options.clone() }
         };
@@ -84,7 +84,7 @@ impl RendererGroup {
             first_sample: 0,
             columns: WorkQueue::new(n_devices, columns::chunking(contexts, options)),
             samples: WorkQueue::new(n_devices, of_samples),
-            tiles: WorkQueue::new(n_devices, tiles::chunking(contexts)),
+            noise_tiles: WorkQueue::new(n_devices, noise_tiles::chunking(contexts)),
             picture: Picture::default(),
         })
     }
@@ -174,7 +174,7 @@ impl RendererGroup {
     ///
     /// # Errors
     /// The picture exceeds a device's memory.
-    pub fn leave_tiles(&mut self) -> Result<(), GpuError> {
+    pub fn leave_noise_tiles(&mut self) -> Result<(), GpuError> {
         let asked = self.options.crop_or_whole();
         self.members.iter_mut().try_for_each(|member| member.renderer.set_crop(asked))
     }
@@ -347,7 +347,7 @@ impl WholeSamples {
         let n_whole = (self.n_done + 1e-6).floor() as u32;
         (self.n_told..n_whole).for_each(|_| watcher.sample());
         self.n_told = self.n_told.max(n_whole);
-        watcher.part((self.n_done - f64::from(self.n_told)).max(0.0) as f32);
+        watcher.sample_progress((self.n_done - f64::from(self.n_told)).max(0.0) as f32);
     }
 }
 

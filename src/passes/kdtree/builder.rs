@@ -6,7 +6,7 @@ use super::KdTreePasses;
 use crate::{
     accel::{
         self, DeviceBuild,
-        kdtree::{BuildOptions, Parts, Statistics},
+        kdtree::{BuildOptions, KdArrays, Statistics},
     },
     buffers::{KdTreeBuffers, KdTreeRoom, TreeBuffers},
     gpu::{Access, AnyBuffer, Buffer, BufferUse, CommandBuffer, Commands, Context, GpuError, Timer, TimerRow},
@@ -184,7 +184,7 @@ impl Target<'_> {
             iter::zip(from, sizes).zip(begins).map(|((from, (to, bytes)), (_, begin))| (from, to, begin, bytes));
         let more = self.more.iter().map(|it| (&it.from, &it.to.0, it.to.1, it.bytes));
         for (from, to, begin, bytes) in arrays.chain(more).filter(|(.., bytes)| *bytes > 0) {
-            commands.copy_buffer_part((from, 0), (to, begin as u64), bytes as u64);
+            commands.copy_buffer_range((from, 0), (to, begin as u64), bytes as u64);
         }
     }
 }
@@ -267,7 +267,7 @@ impl KdTreeBuilder {
     pub fn take(&self, from: &Buffer<Triangle>, (first, len): (usize, usize)) -> Result<(), GpuError> {
         let [first, len] = [first, len].map(|n| (n * size_of::<Triangle>()) as u64);
         self.submit("kdtree_take", |commands| {
-            commands.copy_buffer_part((from.any(), first), (self.triangles.any(), 0), len);
+            commands.copy_buffer_range((from.any(), first), (self.triangles.any(), 0), len);
         })
     }
 
@@ -313,15 +313,15 @@ impl KdTreeBuilder {
         })
     }
 
-    /// Copies the tree of the last build to the host. [`KdTree::from_parts`](crate::accel::kdtree::KdTree::from_parts)
-    /// validates it.
+    /// Copies the tree of the last build to the host.
+    /// [`KdTree::from_arrays`](crate::accel::kdtree::KdTree::from_arrays) validates it.
     ///
     /// # Errors
     /// Out of memory; a Vulkan call fails.
-    pub fn read_back(&self, built: &BuiltTree) -> Result<Parts, GpuError> {
+    pub fn read_back(&self, built: &BuiltTree) -> Result<KdArrays, GpuError> {
         let (n_nodes, n_entries) = (built.n_nodes as usize, built.n_entries as usize);
         let entries = self.buffers.leaf_triangles.download_first(n_entries)?;
-        Ok(Parts {
+        Ok(KdArrays {
             nodes: self.buffers.nodes.download_first(n_nodes)?,
             parents: self.buffers.parents.download_first(n_nodes / 2)?,
             leaf_triangles: entries.iter().map(|entry| entry.triangle_ix).collect(),
@@ -398,24 +398,24 @@ impl KdTreeBuilder {
     /// comes after.
     fn record(&self, n_triangles: u32, timer: Option<&Timer>) -> Result<Vec<CommandBuffer>, GpuError> {
         let record = |body: &dyn Fn(&Commands)| CommandBuffer::record(&self.context, "kdtree_build", timer, body);
-        let mut parts = vec![record(&|commands| {
+        let mut command_buffers = vec![record(&|commands| {
             commands.reset_timer();
             self.passes.setup(commands, &self.buffers, n_triangles);
         })?];
         let n_each = self.options.levels_per_submit.max(1);
         for first in (0..self.n_levels()).step_by(n_each as usize) {
-            parts.push(record(&|commands| {
+            command_buffers.push(record(&|commands| {
                 then(commands);
                 let end = (first + n_each).min(self.n_levels());
                 (first..end).for_each(|level_ix| self.passes.level(commands, &self.buffers, level_ix));
             })?);
         }
-        parts.push(record(&|commands| {
+        command_buffers.push(record(&|commands| {
             then(commands);
             commands.bind(self.buffers.set_of(0));
             self.finish(commands);
         })?);
-        Ok(parts)
+        Ok(command_buffers)
     }
 
     /// Records what comes after the last level. Needs the built nodes, and the references in leaves. Leaves the tree.

@@ -39,7 +39,7 @@ fn add_reflection(terms: &BsdfTerms, to_light: Vec3, half_vector: Vec3, sum: &mu
     sum.pdf += terms.choice.x * choice * reflection_pdf(terms.to_viewer, half_vector, terms.width);
 }
 
-/// Adds the reflection of the clear layer.
+/// Adds the reflection of the clear coat.
 fn add_clearcoat(terms: &BsdfTerms, to_light: Vec3, half_vector: Vec3, sum: &mut BsdfEval) {
     if !has_clearcoat(terms.material) || terms.coat_roughness == 0.0 {
         return;

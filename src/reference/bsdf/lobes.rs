@@ -35,7 +35,7 @@ pub(super) fn interface_width(material: &Material) -> f32 {
     if width < LEAST_ROUGH_WIDTH { 0.0 } else { width.min(1.0) }
 }
 
-/// The roughness of the clear layer; 0 if it is perfectly smooth.
+/// The roughness of the clear coat; 0 if it is perfectly smooth.
 pub(super) fn clearcoat_roughness(material: &Material) -> f32 {
     let roughness = material.clearcoat_roughness;
     if roughness * roughness < LEAST_ROUGH_WIDTH { 0.0 } else { roughness.min(1.0) }

@@ -1,5 +1,5 @@
 //! How surfaces of microfacets scatter light in the path tracer: the bidirectional scattering distribution function.
-//! Twin of `bsdf/bsdf.glsl`, which describes the layers.
+//! Twin of `bsdf/bsdf.glsl`, which describes the lobes.
 
 mod albedo;
 mod clearcoat;

@@ -86,7 +86,7 @@ fn sample_interface(terms: &BsdfTerms, u: Vec3) -> LobeSample {
     delta_lobe(refracted, terms.base_share * terms.eta * terms.eta * split.transmitted, probability)
 }
 
-/// Returns a sample of the clear layer.
+/// Returns a sample of the clear coat.
 fn sample_clearcoat(terms: &BsdfTerms, u: Vec2) -> LobeSample {
     let width = terms.coat_roughness * terms.coat_roughness;
     let half_vector = if width > 0.0 { sample_ggx(terms.to_viewer, width, u) } else { Vec3::Z };

@@ -1,4 +1,4 @@
-//! What all lobes need that depends on the material and the viewer: the layers' shares, and the probabilities with
+//! What all lobes need that depends on the material and the viewer: the lobes' shares, and the probabilities with
 //! which the lobes are chosen. Twin of `bsdf/terms.glsl`.
 
 use glam::{Vec3, Vec4};
@@ -36,7 +36,7 @@ pub struct BsdfTerms<'a> {
     pub(super) to_viewer: Vec3,
     /// Width of the interface's distribution of normals. It is 0 if the interface is perfectly smooth.
     pub(super) width: f32,
-    /// Roughness of the clear layer. It is 0 if the layer is perfectly smooth.
+    /// Roughness of the clear coat. It is 0 if the coat is perfectly smooth.
     pub(super) coat_roughness: f32,
     pub(super) sheen_roughness: f32,
     /// Index of refraction on the viewer's side, divided by that of the other side. 1: light passes unbent.
@@ -44,9 +44,9 @@ pub struct BsdfTerms<'a> {
     pub(super) is_solid: bool,
     /// Whether there is an interface. Without one, the base is Lambertian.
     pub(super) has_interface: bool,
-    /// Share of the light that the layers above leave to the sheen.
+    /// Share of the light that the lobes above leave to the sheen.
     pub(super) sheen_share: f32,
-    /// Share of the light that the layers above leave to the interface.
+    /// Share of the light that the lobes above leave to the interface.
     pub(super) base_share: f32,
     pub(super) sheen_bound: f32,
     /// Factor on what a sheet or a solid reflects and transmits, for the light that bounces between microfacets.
@@ -60,7 +60,7 @@ pub struct BsdfTerms<'a> {
     pub(super) between: Vec3,
     /// Probability that the interface's light is sampled as reflected if it passes straight, whatever the microfacet.
     pub(super) straight_choice: f32,
-    /// Probabilities of the lobes: interface, Lambertian, clear layer, sheen. Their sum is 1, or 0 for a black surface.
+    /// Probabilities of the lobes: interface, Lambertian, clear coat, sheen. Their sum is 1, or 0 for a black surface.
     pub(super) choice: Vec4,
 }
 
@@ -154,10 +154,10 @@ fn interface_albedo(terms: &BsdfTerms, albedo: GgxAlbedo) -> Vec3 {
     with_metal(material, || (1.0 - material.transmission) * opaque(), metal)
 }
 
-/// Sets the shares of the layers, and the probabilities of the lobes.
-fn set_layers(terms: &mut BsdfTerms, albedo: GgxAlbedo) {
+/// Sets the shares and the probabilities of the lobes.
+fn set_shares(terms: &mut BsdfTerms, albedo: GgxAlbedo) {
     let material = terms.material;
-    // A surface that is only Lambertian has the layers' shares already: what follows would compute the same.
+    // A surface that is only Lambertian has the lobes' shares already: what follows would compute the same.
     if !terms.has_interface && !has_clearcoat(material) && !has_sheen(material) {
         terms.choice = if mean_of(terms.below) > 0.0 { Vec4::Y } else { Vec4::ZERO };
         return;
@@ -273,7 +273,7 @@ pub fn bsdf_terms<'a>(material: &'a mut Material, surface: &Surface, to_viewer: 
         terms.clear_gain = 1.0 / (1.0 - clear_loss(&terms, albedo));
     }
     set_lambert(&mut terms, albedo, roughness);
-    set_layers(&mut terms, albedo);
+    set_shares(&mut terms, albedo);
     if material.flags & MATERIAL_UNLIT != 0 {
         terms.choice = Vec4::ZERO;
     }

@@ -154,7 +154,7 @@ fn furnace(material: &Material, surface: &Surface, to_viewer: Vec3) -> Vec3 {
     sum / n as f32
 }
 
-/// White surfaces scatter all light, within the error of the fits. Their layers share it.
+/// White surfaces scatter all light, within the error of the fits. Their lobes share it.
 #[test]
 fn white_surfaces_lose_no_light() {
     let mut materials = Vec::new();
@@ -285,7 +285,7 @@ fn reduced(material: &Material, to_viewer: Vec3, to_light: Vec3) -> Vec3 {
 #[test]
 fn scattering_is_reciprocal() {
     let coloured = Material { kd: vec3(0.8, 0.5, 0.2), ks: vec3(1.0, 0.6, 0.4), ..white(0.5) };
-    // The compensation of sheets, clear layers and sheen depend on the viewer alone.
+    // The compensation of sheets, clear coats and sheen depend on the viewer alone.
     let materials = [
         coloured,
         Material { metallic: 1.0, ..coloured },

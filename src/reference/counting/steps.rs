@@ -1,4 +1,4 @@
-//! Exact counts of a traversal's reads of the acceleration structure.
+//! Exact counts of a traversal's steps: its reads of the acceleration structure.
 
 use rayon::prelude::*;
 use serde::Serialize;

@@ -68,8 +68,8 @@ impl<'a, T, R> CountedSlice<'a, T, R> {
         Self { items, ..self }
     }
 
-    /// Returns a part of the slice, or of an empty slice nothing.
-    pub fn part(self, range: Range<usize>) -> Self {
+    /// Returns a range of the slice, or of an empty slice nothing.
+    pub fn slice(self, range: Range<usize>) -> Self {
         Self { items: self.items.get(range).unwrap_or_default(), ..self }
     }
 }

@@ -133,7 +133,7 @@ pub(super) fn support(scene: &Scene, near: &NearPart, from: DVec3, directions: [
 
 /// Returns a camera that sees a whole bounding box horizontally from outside: from the front, or from an `azimuth` to
 /// the right of it, in degrees.
-pub(crate) fn level_camera(bounds: (Vec3, Vec3), azimuth: u32, frame: &Frame) -> Camera {
+pub(crate) fn horizontal_camera(bounds: (Vec3, Vec3), azimuth: u32, frame: &Frame) -> Camera {
     View::new(&BoundingBox::new(bounds), Direction { azimuth, elevation: 0 }, frame).camera(frame)
 }
 

@@ -130,7 +130,7 @@ fn exit(ray: &Ray, half: Vec3) -> f32 {
 /// them are in bodies. `frames` are those of a camera outside and of one inside.
 pub(crate) fn camera(scene: &Scene, bounds: (Vec3, Vec3), [outside, inside]: [&Frame; 2]) -> Option<Camera> {
     match open_side(scene, bounds, outside) {
-        Some(azimuth) => Some(framing::level_camera(bounds, azimuth, outside)),
+        Some(azimuth) => Some(framing::horizontal_camera(bounds, azimuth, outside)),
         None => camera_inside(scene, bounds, inside),
     }
 }

@@ -132,8 +132,8 @@ fn set_lights(
         scene.background = BACKGROUND;
     }
     if !is_interior && scene.has_mirrors() {
-        let level = Lamp { azimuth: 0.0, elevation: 0.0, irradiance: 0.0 };
-        scene.studio = Some(lamp_towards(scene, axes, &level));
+        let horizontal = Lamp { azimuth: 0.0, elevation: 0.0, irradiance: 0.0 };
+        scene.studio = Some(lamp_towards(scene, axes, &horizontal));
     }
 }
 

@@ -19,7 +19,7 @@ use crate::scene::model::{Mesh, mesh::bounds_of};
 const SHARE: f32 = 2e-6;
 
 /// Faces of a file, in the order of the file.
-pub(crate) struct Part<'a> {
+pub(crate) struct FaceGroup<'a> {
     /// Three numbers a point.
     pub points: &'a [f32],
     /// Index of the point of each corner.
@@ -31,13 +31,13 @@ pub(crate) struct Part<'a> {
 
 /// What tells faces apart that look different.
 pub(crate) enum Looks<'a> {
-    /// All faces of the part have this material.
+    /// All faces of the group have this material.
     Material(Option<usize>),
     /// The faces are those of a mesh, with their slots and colours.
     Mesh(&'a Mesh),
 }
 
-impl Part<'_> {
+impl FaceGroup<'_> {
     /// Returns a number that differs for nearly all faces which look different.
     fn look(&self, face_ix: usize) -> u64 {
         match &self.looks {
@@ -66,7 +66,7 @@ impl Part<'_> {
     }
 }
 
-/// The faces of parts that are there several times.
+/// The faces of groups that are there several times.
 #[derive(Debug, Default)]
 pub(crate) struct Coincident {
     /// The faces that have an opposite one which looks different.
@@ -75,35 +75,35 @@ pub(crate) struct Coincident {
     repeated: Vec<FacePlace>,
 }
 
-/// The place of a face: the index of its part, and its first corner there.
+/// The place of a face: the index of its group, and its first corner there.
 type FacePlace = (usize, usize);
 
 impl Coincident {
     /// Finds the faces that are there several times and look different.
-    pub fn of(parts: &[Part]) -> Self {
+    pub fn of(groups: &[FaceGroup]) -> Self {
         let mut found = Self::default();
-        let can_differ = |part: &Part| match &part.looks {
-            Looks::Material(_) => part.look(0) != parts[0].look(0),
-            Looks::Mesh(mesh) => have_looks(mesh) && have_repeated_keys(part),
+        let can_differ = |group: &FaceGroup| match &group.looks {
+            Looks::Material(_) => group.look(0) != groups[0].look(0),
+            Looks::Mesh(mesh) => have_looks(mesh) && have_repeated_keys(group),
         };
-        if !parts.iter().any(can_differ) {
+        if !groups.iter().any(can_differ) {
             return found;
         }
-        let mut all: Vec<Face> = parts.par_iter().enumerate().flat_map_iter(faces_of).collect();
+        let mut all: Vec<Face> = groups.par_iter().enumerate().flat_map_iter(faces_of).collect();
         all.par_sort_unstable();
         for alike in all.chunk_by(|a, b| a.key == b.key).filter(|alike| alike.len() > 1) {
-            found.add(parts, alike);
+            found.add(groups, alike);
         }
         found
     }
 
     /// Adds those of a few faces, ordered by their places, that have the points of the first one.
-    fn add(&mut self, parts: &[Part], alike: &[Face]) {
-        let look = |face: &Face| parts[face.part_ix].look(face.face_ix);
-        let first = alike[0].polygon(parts);
+    fn add(&mut self, groups: &[FaceGroup], alike: &[Face]) {
+        let look = |face: &Face| groups[face.group_ix].look(face.face_ix);
+        let first = alike[0].polygon(groups);
         let (mut same, mut opposite) = (Vec::new(), Vec::new());
         for face in alike {
-            match is_turned(&first, &face.polygon(parts)) {
+            match is_turned(&first, &face.polygon(groups)) {
                 Some(false) => same.push(face),
                 Some(true) => opposite.push(face),
                 None => {}
@@ -118,26 +118,26 @@ impl Coincident {
     }
 }
 
-/// A face of a part.
+/// A face of a group.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Face {
     /// Sum over its corners, which does not depend on their order.
     key: u64,
-    part_ix: usize,
+    group_ix: usize,
     first_corner: usize,
     n_corners: usize,
-    /// Its index among the faces of the part.
+    /// Its index among the faces of the group.
     face_ix: usize,
 }
 
 impl Face {
     /// Returns its points.
-    fn polygon(&self, parts: &[Part]) -> Vec<Vec3> {
-        self.corners().map(|corner| parts[self.part_ix].point(corner)).collect()
+    fn polygon(&self, groups: &[FaceGroup]) -> Vec<Vec3> {
+        self.corners().map(|corner| groups[self.group_ix].point(corner)).collect()
     }
 
     fn place(&self) -> FacePlace {
-        (self.part_ix, self.first_corner)
+        (self.group_ix, self.first_corner)
     }
 
     fn corners(&self) -> Range<usize> {
@@ -150,22 +150,22 @@ fn have_looks(mesh: &Mesh) -> bool {
     !mesh.colours.is_empty() || mesh.slots.iter().any(|slot| *slot != mesh.slots[0])
 }
 
-/// Returns whether some triangles of a part have the same key. Most meshes end here, after less memory and time than
+/// Returns whether some triangles of a group have the same key. Most meshes end here, after less memory and time than
 /// their faces with all places would take.
-fn have_repeated_keys(part: &Part) -> bool {
-    let triangles: &[[u32; 3]] = part.corners.as_chunks().0;
-    let of_corner = |ix: u32| hash(Vec3::from_slice(&part.points[ix as usize * 3..]));
+fn have_repeated_keys(group: &FaceGroup) -> bool {
+    let triangles: &[[u32; 3]] = group.corners.as_chunks().0;
+    let of_corner = |ix: u32| hash(Vec3::from_slice(&group.points[ix as usize * 3..]));
     let key = |triangle: &[u32; 3]| triangle.iter().fold(0_u64, |sum, ix| sum.wrapping_add(of_corner(*ix)));
     let mut keys: Vec<u64> = triangles.par_iter().map(key).collect();
     keys.par_sort_unstable();
     keys.par_windows(2).any(|pair| pair[0] == pair[1])
 }
 
-fn faces_of<'a>((part_ix, part): (usize, &'a Part)) -> impl Iterator<Item = Face> + use<'a> {
-    part.faces().enumerate().map(move |(face_ix, (first_corner, n_corners))| {
-        let corners = (first_corner..first_corner + n_corners).map(|corner| hash(part.point(corner)));
+fn faces_of<'a>((group_ix, group): (usize, &'a FaceGroup)) -> impl Iterator<Item = Face> + use<'a> {
+    group.faces().enumerate().map(move |(face_ix, (first_corner, n_corners))| {
+        let corners = (first_corner..first_corner + n_corners).map(|corner| hash(group.point(corner)));
         let key = corners.fold(n_corners as u64, u64::wrapping_add);
-        Face { key, part_ix, first_corner, n_corners, face_ix }
+        Face { key, group_ix, first_corner, n_corners, face_ix }
     })
 }
 
@@ -208,16 +208,21 @@ impl CoincidentTriangles {
         Self { faces, triangles }
     }
 
-    /// Adds the triangles of a part. `first_triangle`: the index of the first one in the mesh. `corners`: the first
-    /// corner of each triangle in the part.
-    pub fn add(&mut self, (part_ix, part): (usize, &Part), first_triangle: usize, corners: impl Fn() -> Vec<usize>) {
+    /// Adds the triangles of a group. `first_triangle`: the index of the first one in the mesh. `corners`: the first
+    /// corner of each triangle in the group.
+    pub fn add(
+        &mut self,
+        (group_ix, group): (usize, &FaceGroup),
+        first_triangle: usize,
+        corners: impl Fn() -> Vec<usize>,
+    ) {
         if self.triangles.is_empty() {
             return;
         }
         // The first corner of the face to which each corner belongs.
-        let first_corners: Vec<usize> = part.faces().flat_map(|(first, n)| std::iter::repeat_n(first, n)).collect();
+        let first_corners: Vec<usize> = group.faces().flat_map(|(first, n)| std::iter::repeat_n(first, n)).collect();
         for (ix, corner) in corners().into_iter().enumerate() {
-            if let Some(triangles) = self.triangles.get_mut(&(part_ix, first_corners[corner])) {
+            if let Some(triangles) = self.triangles.get_mut(&(group_ix, first_corners[corner])) {
                 triangles.push(first_triangle + ix);
             }
         }
@@ -235,22 +240,22 @@ impl CoincidentTriangles {
     }
 }
 
-fn part_of<'a>(mesh: &'a Mesh, positions: &'a [Vec3]) -> Part<'a> {
+fn group_of<'a>(mesh: &'a Mesh, positions: &'a [Vec3]) -> FaceGroup<'a> {
     let (points, corners) = (bytemuck::cast_slice(positions), mesh.faces.as_flattened());
-    Part { points, corners, arities: &[], looks: Looks::Mesh(mesh) }
+    FaceGroup { points, corners, arities: &[], looks: Looks::Mesh(mesh) }
 }
 
 /// Whether triangles of a mesh are there several times and look different. `positions`: in place of the mesh's.
 pub(crate) fn has_several(mesh: &Mesh, positions: &[Vec3]) -> bool {
-    let found = Coincident::of(&[part_of(mesh, positions)]);
+    let found = Coincident::of(&[group_of(mesh, positions)]);
     !(found.two_sided.is_empty() && found.repeated.is_empty())
 }
 
 /// Separates the triangles of a mesh that are there several times and look different.
 pub(crate) fn separate(mesh: &mut Mesh) {
-    let part = part_of(mesh, &mesh.positions);
-    let mut found = CoincidentTriangles::new(Coincident::of(std::slice::from_ref(&part)));
-    found.add((0, &part), 0, || (0..mesh.faces.len()).map(|ix| 3 * ix).collect());
+    let group = group_of(mesh, &mesh.positions);
+    let mut found = CoincidentTriangles::new(Coincident::of(std::slice::from_ref(&group)));
+    found.add((0, &group), 0, || (0..mesh.faces.len()).map(|ix| 3 * ix).collect());
     found.separate(mesh);
 }
 

@@ -40,7 +40,7 @@ pub struct PathDefaults {
 }
 
 impl Default for PathDefaults {
-    /// Twelve levels of rays and 64 samples, without the noise filter.
+    /// Rays up to a depth of twelve and 64 samples, without the noise filter.
     fn default() -> Self {
         Self { max_depth: 12, samples: 64, denoise: Denoise::Off }
     }

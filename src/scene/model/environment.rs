@@ -53,18 +53,18 @@ impl Environment {
         if !(rotation_degrees.is_finite() && strength >= 0.0 && strength.is_finite()) {
             return Err(format!("a rotation of {rotation_degrees} degrees or a strength of {strength} is no number"));
         }
-        let usual = |part: &f32| *part >= 0.0 && *part <= MOST_RADIANCE;
-        let parts = colours.iter().flat_map(|colour| colour.to_array());
-        let greatest = parts.filter(usual).fold(0.0, f32::max);
+        let usual = |component: &f32| *component >= 0.0 && *component <= MOST_RADIANCE;
+        let components = colours.iter().flat_map(|colour| colour.to_array());
+        let greatest = components.filter(usual).fold(0.0, f32::max);
         let mut mended = MendedTexels::default();
         for colour in &mut colours {
-            let parts = colour.to_array();
-            mended.n_nan += usize::from(parts.iter().any(|part| part.is_nan()));
-            mended.n_negative += usize::from(parts.iter().any(|part| *part < 0.0));
-            mended.n_infinite += usize::from(parts.iter().any(|part| *part > MOST_RADIANCE));
+            let components = colour.to_array();
+            mended.n_nan += usize::from(components.iter().any(|component| component.is_nan()));
+            mended.n_negative += usize::from(components.iter().any(|component| *component < 0.0));
+            mended.n_infinite += usize::from(components.iter().any(|component| *component > MOST_RADIANCE));
             // The greatest of the other numbers stands for an infinite one.
-            let mend = |part: f32| if part > MOST_RADIANCE { greatest } else { part.max(0.0) };
-            *colour = (Vec3::from_array(parts.map(mend)) * strength).min(Vec3::splat(MOST_RADIANCE));
+            let mend = |component: f32| if component > MOST_RADIANCE { greatest } else { component.max(0.0) };
+            *colour = (Vec3::from_array(components.map(mend)) * strength).min(Vec3::splat(MOST_RADIANCE));
         }
         Ok((Self { size, colours: colours.into(), rotation_degrees }, mended))
     }

@@ -50,7 +50,7 @@ pub struct Material {
     /// Whether the camera sees both sides of the surface. If not, camera rays pass through its back faces: those whose
     /// corners turn clockwise as the camera sees them. All other rays meet both sides.
     pub is_double_sided: bool,
-    /// A clear layer above the surface. The path tracer alone shows it, with microfacets.
+    /// A clear coat above the surface. The path tracer alone shows it, with microfacets.
     pub clearcoat: Clearcoat,
     /// The sheen of cloth. The path tracer alone shows it, with microfacets.
     pub sheen: Sheen,
@@ -129,12 +129,12 @@ pub enum Alpha {
     Mask(f32),
 }
 
-/// A clear layer above a surface.
+/// A clear coat above a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Clearcoat {
-    /// Share of the surface that the layer covers, 0 to 1.
+    /// Share of the surface that the coat covers, 0 to 1.
     pub factor: f32,
-    /// Perceived roughness of the layer, 0 to 1.
+    /// Perceived roughness of the coat, 0 to 1.
     pub roughness: f32,
 }
 

@@ -182,15 +182,15 @@ pub(crate) fn normals_of(linear: DMat3) -> DMat3 {
     if linear.determinant() < 0.0 { -cofactors } else { cofactors }
 }
 
-/// The parts of a transform that are stated.
+/// The components of a transform that are stated.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Parts {
+struct Components {
     translation: Option<DVec3>,
     rotation: Option<DQuat>,
     scale: Option<DVec3>,
 }
 
-impl Parts {
+impl Components {
     fn transform(&self) -> Checked<Transform> {
         let Self { translation, rotation, scale } = *self;
         Transform::new(scale.unwrap_or(DVec3::ONE), rotation.unwrap_or_default(), translation.unwrap_or_default())
@@ -201,7 +201,7 @@ impl Parts {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct MovingTransform {
     /// What is stated beside the keys.
-    rest: Parts,
+    rest: Components,
     translation: Track<DVec3>,
     rotation: Track<DQuat>,
     scale: Track<DVec3>,
@@ -210,21 +210,22 @@ pub(crate) struct MovingTransform {
 }
 
 impl MovingTransform {
-    /// Joins keys in the order of their times, seconds. Each may state some parts of the transform. Errors name the
-    /// key.
+    /// Joins keys in the order of their times, seconds. Each may state some components of the transform. Errors name
+    /// the key.
     pub fn new(rest: &TransformSpec, keys: &[(f64, TransformSpec)]) -> Checked<Self> {
-        let mut moving = Self { rest: rest.parts()?, ..Self::default() };
+        let mut moving = Self { rest: rest.components()?, ..Self::default() };
         moving.rest.transform()?;
         for (number, (time, spec)) in (1..).zip(keys) {
-            let checked = spec.parts().and_then(|parts| parts.transform().map(|_| parts));
-            let parts = checked.map_err(|what| format!("key {number}: {what}"))?;
+            let checked = spec.components().and_then(|components| components.transform().map(|_| components));
+            let components = checked.map_err(|what| format!("key {number}: {what}"))?;
             let is_turned = |scale: DVec3, before: DVec3| scale.signum() != before.signum();
-            if parts.scale.zip(moving.scale.0.last()).is_some_and(|(scale, (_, before))| is_turned(scale, *before)) {
+            if components.scale.zip(moving.scale.0.last()).is_some_and(|(scale, (_, before))| is_turned(scale, *before))
+            {
                 return Err(format!("key {number}: its scale mirrors the mesh, which would be flat before this key"));
             }
-            moving.translation.0.extend(parts.translation.map(|it| (*time, it)));
-            moving.rotation.0.extend(parts.rotation.map(|it| (*time, it)));
-            moving.scale.0.extend(parts.scale.map(|it| (*time, it)));
+            moving.translation.0.extend(components.translation.map(|it| (*time, it)));
+            moving.rotation.0.extend(components.rotation.map(|it| (*time, it)));
+            moving.scale.0.extend(components.scale.map(|it| (*time, it)));
             moving.times.push(*time);
         }
         Ok(moving)
@@ -236,12 +237,12 @@ impl MovingTransform {
     /// Coordinates between keys are rounded to single precision, as those in a file are.
     pub fn at(&self, seconds: Option<f64>) -> Checked<Transform> {
         let single = |vector: DVec3| vector.as_vec3().as_dvec3();
-        let parts = Parts {
+        let components = Components {
             translation: at(&self.translation, self.rest.translation, seconds).map(single),
             rotation: at(&self.rotation, self.rest.rotation, seconds),
             scale: at(&self.scale, self.rest.scale, seconds).map(single),
         };
-        parts.transform()
+        components.transform()
     }
 
     /// Returns the times of the keys, ascending. A transform without keys does not move.
@@ -258,12 +259,12 @@ fn at<T: KeyValue>(track: &Track<T>, rest: Option<T>, seconds: Option<f64>) -> O
 }
 
 impl TransformSpec {
-    fn parts(&self) -> Checked<Parts> {
+    fn components(&self) -> Checked<Components> {
         let scale = self.scale.as_ref().map(|scale| match *scale {
             ScaleSpec::Uniform(factor) => [factor; 3],
             ScaleSpec::Axes(factors) => factors,
         });
-        Ok(Parts {
+        Ok(Components {
             translation: self.translate.map(|translate| finite("translate", translate)).transpose()?,
             rotation: self.rotate.as_ref().map(RotationSpec::rotation).transpose()?,
             scale: scale.map(|scale| finite("scale", scale)).transpose()?,

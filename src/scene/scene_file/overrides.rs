@@ -120,7 +120,7 @@ pub(crate) fn override_terms(material: &mut Material, spec: &MaterialSpec, state
     set(&mut material.is_unlit, stated.is_unlit, spec.unlit.is_some());
     override_opacity(material, spec, stated);
     override_microfacet(material, spec, stated);
-    override_layers(material, spec, stated);
+    override_coats(material, spec, stated);
     override_maps(material, spec, stated);
     let idle = [("Tf", spec.tf.is_some()), ("Ns", spec.ns.is_some()), ("illum", spec.illum.is_some())];
     match idle.into_iter().find(|(_, is_stated)| *is_stated && material.microfacet.is_some()) {
@@ -170,8 +170,8 @@ fn override_microfacet(material: &mut Material, spec: &MaterialSpec, stated: &Ma
     set(&mut terms.has_single_scattering, stated.has_single_scattering, spec.single_scattering.is_some());
 }
 
-/// Gives a material the clear layer and the sheen that `spec` states.
-fn override_layers(material: &mut Material, spec: &MaterialSpec, stated: &Material) {
+/// Gives a material the clear coat and the sheen that `spec` states.
+fn override_coats(material: &mut Material, spec: &MaterialSpec, stated: &Material) {
     set(&mut material.clearcoat.factor, stated.clearcoat.factor, spec.clearcoat.is_some());
     set(&mut material.clearcoat.roughness, stated.clearcoat.roughness, spec.clearcoat_roughness.is_some());
     set(&mut material.sheen.colour, stated.sheen.colour, spec.sheen_color.is_some());

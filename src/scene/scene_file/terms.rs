@@ -87,13 +87,13 @@ impl Material {
             // Both keys are needed, whatever the value.
             terms.push(Term { key: "conductor_k", value: TermValue::Colour(k), is_default: false });
         }
-        terms.extend(self.layer_terms());
+        terms.extend(self.coat_terms());
         terms.push(flag("single_scattering", microfacet.has_single_scattering, default.has_single_scattering));
         terms
     }
 
-    /// Returns the terms of the layers above the surface that differ from their defaults.
-    fn layer_terms(&self) -> impl Iterator<Item = Term> {
+    /// Returns the terms of the clear coat and the sheen that differ from their defaults.
+    fn coat_terms(&self) -> impl Iterator<Item = Term> {
         let (coat, sheen) = (self.clearcoat, self.sheen);
         let terms = [
             number("clearcoat", coat.factor, 0.0),

@@ -59,9 +59,9 @@ pub struct Edited {
     pub playback: Option<Playback>,
 }
 
-/// The parts of the overlay that are shown.
+/// The overlays that are shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Layers {
+pub struct Overlays {
     /// The panel of figures and controls.
     pub panel: bool,
     /// The list of keys.
@@ -74,8 +74,8 @@ pub struct Layers {
     pub start: bool,
 }
 
-impl Layers {
-    /// Returns whether any part is shown.
+impl Overlays {
+    /// Returns whether any overlay is shown.
     pub fn any(self) -> bool {
         self.panel || self.keys || self.hint || self.messages || self.start
     }
@@ -145,24 +145,24 @@ fn frame(ui: &Ui) -> Frame {
 }
 
 /// Lays out the overlay and applies the user's changes to `edited`.
-pub fn show(ui: &mut Ui, layers: Layers, edited: &mut Edited, facts: &Facts) {
+pub fn show(ui: &mut Ui, overlays: Overlays, edited: &mut Edited, facts: &Facts) {
     let frame = frame(ui);
-    if layers.panel {
+    if overlays.panel {
         legend::show(ui, frame, facts);
         panel(ui, frame, edited, facts);
         if let (Some(playback), Some(timeline)) = (&mut edited.playback, facts.timeline) {
             time::show(ui, frame, playback, timeline);
         }
-    } else if layers.messages {
+    } else if overlays.messages {
         message_alone(ui, frame, facts);
     }
-    if layers.start {
+    if overlays.start {
         start(ui, facts);
     }
-    if layers.keys {
+    if overlays.keys {
         keys::show(ui, frame);
-    } else if layers.hint {
-        keys::hint(ui, frame, if layers.panel { facts.below() } else { 0.0 });
+    } else if overlays.hint {
+        keys::hint(ui, frame, if overlays.panel { facts.below() } else { 0.0 });
     }
 }
 

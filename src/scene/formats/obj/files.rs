@@ -5,7 +5,7 @@ use std::path::Path;
 use super::{
     maps::{MapKind, MapOptions},
     statement::{split_keyword, statements, without_comment},
-    tiles::files_of_map,
+    udim::files_of_map,
 };
 use crate::scene::{files::SourceFile, model::error::Checked};
 

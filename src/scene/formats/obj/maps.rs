@@ -2,7 +2,7 @@
 
 use glam::Vec2;
 
-use super::{statement::split_keyword, tiles};
+use super::{statement::split_keyword, udim};
 use crate::scene::{
     formats::image_files::{Images, View},
     model::{Alpha, Channel, Encoding, Material, Texture, Wrap, error::Checked},
@@ -92,7 +92,7 @@ impl MapOptions {
     /// Returns the options of the map for a tile, whose image does not repeat. The tiles lie where the coordinates of
     /// the faces say, so that nothing moves them.
     pub fn for_tile(&self, tile: u32) -> Self {
-        let (u, v) = tiles::corner(tile);
+        let (u, v) = udim::corner(tile);
         Self { scale: Vec2::ONE, offset: -Vec2::new(u, v), clamp: true, ..self.clone() }
     }
 

@@ -9,7 +9,7 @@ mod model;
 mod mtl;
 mod polypaint;
 mod statement;
-mod tiles;
+mod udim;
 
 use std::{collections::HashMap, path::Path};
 

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::scene::{
     meshes::{
-        coincident::{Coincident, CoincidentTriangles, Looks, Part},
+        coincident::{Coincident, CoincidentTriangles, FaceGroup, Looks},
         polygon::Triangulator,
         smooth::{Shading, crease_normals},
     },
@@ -101,8 +101,8 @@ impl<'a> Model<'a> {
     }
 
     /// Returns its faces, as far as it matters whether some of them are there several times.
-    fn faces(&self) -> Part<'_> {
-        Part {
+    fn faces(&self) -> FaceGroup<'_> {
+        FaceGroup {
             points: &self.positions,
             corners: &self.corners[0],
             arities: &self.arities,
@@ -189,7 +189,7 @@ pub fn mesh(
     let mut mesh = Mesh::default();
     let mut to_smooth = Vec::new();
     let mut triangulator = Triangulator::default();
-    let faces: Vec<Part> = models.iter().map(Model::faces).collect();
+    let faces: Vec<FaceGroup> = models.iter().map(Model::faces).collect();
     let mut coincident = CoincidentTriangles::new(Coincident::of(&faces));
     for (model_ix, model) in models.iter().enumerate() {
         let triangles = model.triangles(&mut triangulator);

@@ -12,7 +12,7 @@ use super::{
     files::{library_files, own_library},
     maps::{MapKind, MapOptions, Term, set_map},
     statement::{split_keyword, statements, words},
-    tiles::{TOKEN, Tiles, files_of_map},
+    udim::{TOKEN, UdimMaterials, files_of_map},
 };
 use crate::{
     scene::{
@@ -68,7 +68,7 @@ pub fn load_libraries(
     obj: &SourceFile,
     (libraries, uses_materials): (&[(usize, String)], bool),
     images: &mut Images,
-) -> Result<(Vec<Material>, Tiles), SceneError> {
+) -> Result<(Vec<Material>, UdimMaterials), SceneError> {
     let mut described = Vec::new();
     let mut read = HashSet::new();
     for (line, rest) in libraries {
@@ -102,8 +102,8 @@ pub fn load_libraries(
 
 /// Adds a copy of a material for each tile of its images. The copies have its name and precede it. Since the last of
 /// several materials with one name counts, the name means the material itself, which shows no image in tiles.
-fn with_tiles(described: Vec<Described>) -> (Vec<Described>, Tiles) {
-    let (mut all, mut tiles) = (Vec::new(), Tiles::default());
+fn with_tiles(described: Vec<Described>) -> (Vec<Described>, UdimMaterials) {
+    let (mut all, mut tiles) = (Vec::new(), UdimMaterials::default());
     for Described { spec, name, path, more } in described {
         let numbers: BTreeSet<u32> = more.maps.iter().filter_map(|map| map.tile).collect();
         let base = all.len() + numbers.len();

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{RendererGroup, share, work_queue::Chunking};
 use crate::{
-    frame::{DrawnTiles, TileSamples},
+    frame::{DrawnNoiseTiles, NoiseTileSamples},
     gpu::{Context, GpuError},
 };
 
@@ -21,13 +21,13 @@ pub fn chunking(contexts: &[Arc<Context>]) -> Chunking {
 
 impl RendererGroup {
     /// Draws samples of tiles, as
-    /// [`BandedRenderer::draw_tiles`](crate::render::BandedRenderer::draw_tiles) does.
-    pub fn draw_tiles(&mut self, tiles: &[TileSamples]) -> Result<DrawnTiles, GpuError> {
+    /// [`BandedRenderer::draw_noise_tiles`](crate::render::BandedRenderer::draw_noise_tiles) does.
+    pub fn draw_noise_tiles(&mut self, tiles: &[NoiseTileSamples]) -> Result<DrawnNoiseTiles, GpuError> {
         let units = 0..tiles.len() as u32;
-        let parts = share(&mut self.members, &mut self.tiles, units, &mut || (), |renderer, units, _| {
-            renderer.draw_tiles(&tiles[units.start as usize..units.end as usize])
+        let parts = share(&mut self.members, &mut self.noise_tiles, units, &mut || (), |renderer, units, _| {
+            renderer.draw_noise_tiles(&tiles[units.start as usize..units.end as usize])
         })?;
-        let mut all = DrawnTiles::default();
+        let mut all = DrawnNoiseTiles::default();
         parts.into_iter().for_each(|(_, part)| all.append(part));
         all.drawn.profile.device = self.device_names();
         Ok(all)

@@ -1,15 +1,15 @@
-// Parts of triangles near their leaves. Needs nothing before it; includes slab_build.glsl.
+// Pieces of triangles near their leaves. Needs nothing before it; includes slab_build.glsl.
 //
 // Triangles are clipped by Sutherland and Hodgman's algorithm, in f32, in scaled units from the centre of the leaf's
 // cell. Let D be the largest coordinate there of the triangle's corners and of the cell, and u = 2^-24. On each axis,
 // a corner is off by u D to begin with. A new corner `a + t (b - a)` is off by 10 u |b - a| + u D <= 21 u D more: 8 for
 // t, of which the division has 5 (2.5 units in the last place), one each for the difference and the product, and u D
-// for the sum. A part is cut six times, so its corners are off by at most 127 u D on each axis. A point of the exact
-// part, which is inside of a face, can thus be at most that far outside by the computed corners. So each face is moved
+// for the sum. A piece is cut six times, so its corners are off by at most 127 u D on each axis. A point of the exact
+// piece, which is inside of a face, can thus be at most that far outside by the computed corners. So each face is moved
 // outwards by SLACK * D. The height of a corner along a unit normal is off by sqrt(3) * 127 u D + 6 u D = 226 u D.
-// Rounding may also bend a part, by no more than its corners are off. SLACK covers twice the sum: 512 u = 2^-15.
-#ifndef KDRAY_SLAB_PARTS
-#define KDRAY_SLAB_PARTS
+// Rounding may also bend a piece, by no more than its corners are off. SLACK covers twice the sum: 512 u = 2^-15.
+#ifndef KDRAY_SLAB_PIECES
+#define KDRAY_SLAB_PIECES
 
 #include "kdtree/slab_build.glsl"
 
@@ -26,7 +26,7 @@ const float SLACK = 0.000030517578;
 // far less than a slab's reach, which is at least 2^-33.
 const float LEAST_COORDINATE = 8.6736174e-19;
 
-// The corners of the part, in their order round it.
+// The corners of the piece, in their order round it.
 vec3 corners[MAX_CORNERS];
 uint n_corners;
 
@@ -39,7 +39,7 @@ float along(vec3 v, uint axis) {
 }
 
 // Cuts off what is above a position on an axis (`side` 1) or below it (-1). Returns whether there was room for the
-// corners: more than MAX_CORNERS come only from a part that rounding has bent.
+// corners: more than MAX_CORNERS come only from a piece that rounding has bent.
 bool clip(uint axis, float side, float position) {
     bool is_cut = false;
     for (uint i = 0u; i < n_corners; ++i) is_cut = is_cut || side * (along(corners[i], axis) - position) > 0.0;
@@ -81,9 +81,9 @@ uint scale_of_triangle(LeafTriangle triangle) {
     return scale_of_length(greatest(max(abs(triangle.v0), max(abs(triangle.v1), abs(triangle.v2)))));
 }
 
-// Finds the corners of an entry's part: `corners` and `n_corners`, scaled, from the centre of the cell. Returns D. If
-// there is no room for the corners, the part is the whole triangle. triangle_scale: that of the triangle.
-float find_part(LeafTriangle triangle, uint triangle_scale, KdSlabPatch leaf) {
+// Finds the corners of an entry's piece: `corners` and `n_corners`, scaled, from the centre of the cell. Returns D. If
+// there is no room for the corners, the piece is the whole triangle. triangle_scale: that of the triangle.
+float find_piece(LeafTriangle triangle, uint triangle_scale, KdSlabPatch leaf) {
     float scale = world_scale();
     vec3 centre = scaled_centre(leaf.cell_min, leaf.cell_max);
     vec3 v0 = snapped(scale * triangle.v0 - centre);
@@ -104,8 +104,8 @@ float find_part(LeafTriangle triangle, uint triangle_scale, KdSlabPatch leaf) {
     return reach;
 }
 
-// The area vector of the part, whose length is twice the area.
-vec3 area_of_part() {
+// The area vector of the piece, whose length is twice the area.
+vec3 area_of_piece() {
     vec3 area = vec3(0.0);
     for (uint i = 2u; i < n_corners; ++i) area += cross(corners[i - 1u] - corners[0], corners[i] - corners[0]);
     return area;

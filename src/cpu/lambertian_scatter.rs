@@ -1,5 +1,5 @@
-//! One step of sixteen paths at [Lambertian surfaces](super::lambertian_surfaces). It does the operations of the
-//! reference's `step_path` for such a surface, in the same order, so that the results are the same bit for bit.
+//! One bounce of sixteen paths at [Lambertian surfaces](super::lambertian_surfaces). It does the operations of the
+//! reference's `scatter_path` for such a surface, in the same order, so that the results are the same bit for bit.
 
 use std::f32::consts::PI;
 
@@ -37,7 +37,7 @@ pub struct Samples {
 /// The shadow rays to lights, and the rays with which paths go on.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(64))]
-pub struct LambertianSteps {
+pub struct LambertianScatter {
     shadow_ray_origin: Vec3sSoa,
     shadow_ray_direction: Vec3sSoa,
     shadow_ray_light: Vec3sSoa,
@@ -59,7 +59,7 @@ impl Samples {
     }
 }
 
-impl LambertianSteps {
+impl LambertianScatter {
     #[inline(always)]
     pub fn shadow_ray(&self, lane: usize, source_triangle: u32) -> ShadowRay {
         ShadowRay {
@@ -143,7 +143,7 @@ pub struct BounceConstants<'a> {
 /// other area lights.
 #[inline(always)]
 fn set_shadow_rays<S: Simd>(
-    steps: &mut LambertianSteps,
+    scattered: &mut LambertianScatter,
     bounce: &BounceConstants,
     surfaces: &Surfaces<S>,
     (throughput, samples): (Vec3x16<S>, &Samples),
@@ -166,22 +166,22 @@ fn set_shadow_rays<S: Simd>(
     let arriving = throughput.times(value).times(light) * share;
     let arriving = arriving.min(f32x16::splat(simd, bounce.clamp));
     exist &= value.any_positive() & arriving.all_below(f32::INFINITY) & arriving.any_positive();
-    steps.have_shadow_ray = exist.to_bitmask() as LaneMask;
+    scattered.have_shadow_ray = exist.to_bitmask() as LaneMask;
     let offset = surfaces.offset(direction);
     let to_light = direction * distance - offset;
     let length = to_light.dot(to_light).sqrt();
     let is_far = distance.simd_eq(f32::INFINITY);
-    steps.shadow_ray_origin = (surfaces.point_world + offset).to_arrays();
-    steps.shadow_ray_direction = Vec3x16::select(is_far, direction, to_light / length).to_arrays();
+    scattered.shadow_ray_origin = (surfaces.point_world + offset).to_arrays();
+    scattered.shadow_ray_direction = Vec3x16::select(is_far, direction, to_light / length).to_arrays();
     let bounded = arriving.max(f32x16::splat(simd, 0.0)).min(f32x16::splat(simd, MOST_ADDED_LIGHT));
-    steps.shadow_ray_light = bounded.to_arrays();
-    steps.shadow_ray_t_max = is_far.select(distance, length * SHADOW_RAY_SHARE).to_array();
+    scattered.shadow_ray_light = bounded.to_arrays();
+    scattered.shadow_ray_t_max = is_far.select(distance, length * SHADOW_RAY_SHARE).to_array();
 }
 
 /// Writes the rays with which the paths go on. `choices`: the random numbers of Russian roulette.
 #[inline(always)]
 fn set_rays<S: Simd>(
-    steps: &mut LambertianSteps,
+    scattered: &mut LambertianScatter,
     depth: u32,
     surfaces: &Surfaces<S>,
     (throughput, local, choices): (Vec3x16<S>, Vec3x16<S>, f32x16<S>),
@@ -199,11 +199,11 @@ fn set_rays<S: Simd>(
         throughput = throughput / survival;
         go_on &= choices.simd_lt(survival);
     }
-    steps.origin = (surfaces.point_world + surfaces.offset(direction)).to_arrays();
-    steps.direction = direction.to_arrays();
-    steps.throughput = throughput.to_arrays();
-    steps.pdf = pdf.to_array();
-    steps.go_on = go_on.to_bitmask() as LaneMask;
+    scattered.origin = (surfaces.point_world + surfaces.offset(direction)).to_arrays();
+    scattered.direction = direction.to_arrays();
+    scattered.throughput = throughput.to_arrays();
+    scattered.pdf = pdf.to_array();
+    scattered.go_on = go_on.to_bitmask() as LaneMask;
 }
 
 /// Returns directions in the frame of the surface, as `sample_lambert` does.
@@ -216,21 +216,21 @@ fn lambert_samples<S: Simd>(simd: S, [ux, uy]: &PairsSoa) -> Vec3x16<S> {
     Vec3x16([radius * cosines, radius * sines, z])
 }
 
-/// Returns the steps of the paths.
+/// Returns the scattered of the paths.
 #[inline(always)]
-pub fn lambertian_steps<S: Simd>(
+pub fn lambertian_scatter<S: Simd>(
     simd: S,
     bounce: &BounceConstants,
     (hits, surfaces): (&LambertianHits, &LambertianSurfaces),
     (samples, random_pairs): (&Samples, &[PairsSoa; PAIRS_OF_HIT]),
-) -> LambertianSteps {
+) -> LambertianScatter {
     let surfaces = Surfaces::load(simd, hits, surfaces);
     let throughput = Vec3x16::load(simd, &hits.throughput);
     let [_, choices, to_next, _] = random_pairs;
     let local = lambert_samples(simd, to_next);
-    let mut steps = LambertianSteps::default();
-    set_shadow_rays(&mut steps, bounce, &surfaces, (throughput, samples));
+    let mut scattered = LambertianScatter::default();
+    set_shadow_rays(&mut scattered, bounce, &surfaces, (throughput, samples));
     let choices = f32x16::load_array_ref(simd, &choices[1]);
-    set_rays(&mut steps, bounce.depth, &surfaces, (throughput, local, choices));
-    steps
+    set_rays(&mut scattered, bounce.depth, &surfaces, (throughput, local, choices));
+    scattered
 }

@@ -1,4 +1,4 @@
-//! Tests that a sample drawn in parts is the same, bit for bit, as one drawn at once, and is not visible before it is
+//! Tests that a sample drawn in batches is the same, bit for bit, as one drawn at once, and is not visible before it is
 //! complete.
 
 use glam::uvec2;
@@ -13,22 +13,22 @@ use super::{
     studio::{assert_silent, device, identical, options, world_of},
 };
 
-fn options_of_parts() -> RenderOptions {
+fn options_of_batches() -> RenderOptions {
     options(32, 24, 5)
 }
 
-/// Draws `n_samples` samples in parts. Returns the picture and the number of parts.
-fn in_parts(renderer: &mut GpuRenderer, n_samples: u32) -> (Picture, u32) {
-    let mut n_parts = 0;
+/// Draws `n_samples` samples in batches. Returns the picture and the number of batches.
+fn in_batches(renderer: &mut GpuRenderer, n_samples: u32) -> (Picture, u32) {
+    let mut n_batches = 0;
     while renderer.n_samples() < n_samples {
         assert_eq!(renderer.progress() > 0.0, renderer.is_pending());
-        n_parts += 1;
-        if let Some(profile) = renderer.draw_batch().expect("a part") {
+        n_batches += 1;
+        if let Some(profile) = renderer.draw_batch().expect("a batch") {
             assert_eq!(profile.bounces[0].n_rays, 32 * 24);
         }
     }
     assert!(!renderer.is_pending());
-    (renderer.picture().expect("a picture"), n_parts)
+    (renderer.picture().expect("a picture"), n_batches)
 }
 
 fn at_once(renderer: &mut GpuRenderer, n_samples: u32) -> Picture {
@@ -38,19 +38,19 @@ fn at_once(renderer: &mut GpuRenderer, n_samples: u32) -> Picture {
 }
 
 #[test]
-fn parts_make_the_same_picture() {
+fn batches_make_the_same_picture() {
     let (scene, context) = (glass_in_glass(), device());
     let world = world_of(&scene);
-    let mut renderer = GpuRenderer::new(context.clone(), &world, &options_of_parts()).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), &world, &options_of_batches()).expect("a renderer");
     let whole = [1, 3].map(|n_samples| at_once(&mut renderer, n_samples));
-    for (most_pixels, n_parts) in [(None, 1), (Some(768), 1), (Some(767), 2), (Some(100), 8)] {
+    for (most_pixels, n_batches) in [(None, 1), (Some(768), 1), (Some(767), 2), (Some(100), 8)] {
         renderer.limit_batches(most_pixels).expect("batches");
         for (n_samples, whole) in [1, 3].into_iter().zip(&whole) {
             renderer.reset_samples();
-            let (picture, n) = in_parts(&mut renderer, n_samples);
+            let (picture, n) = in_batches(&mut renderer, n_samples);
             assert!(identical(&picture, whole), "{most_pixels:?}, {n_samples} samples");
-            // There are more parts if a queue overflowed.
-            assert!(n >= n_samples * n_parts, "{most_pixels:?}: {n} parts");
+            // There are more batches if a queue overflowed.
+            assert!(n >= n_samples * n_batches, "{most_pixels:?}: {n} batches");
         }
         assert!(identical(&at_once(&mut renderer, 3), &whole[1]));
     }
@@ -59,67 +59,67 @@ fn parts_make_the_same_picture() {
 
 #[test]
 fn what_is_dropped_half_way_leaves_no_trace() {
-    let (scene, context, options) = (glass_in_glass(), device(), options_of_parts());
+    let (scene, context, options) = (glass_in_glass(), device(), options_of_batches());
     let world = world_of(&scene);
     let mut renderer = GpuRenderer::new(context.clone(), &world, &options).expect("a renderer");
     let whole = at_once(&mut renderer, 3);
     renderer.limit_batches(Some(200)).expect("batches");
     for n_before in 0..3 {
         renderer.reset_samples();
-        in_parts(&mut renderer, n_before);
-        assert!(renderer.draw_batch().expect("a part").is_none() && renderer.is_pending());
-        // The sample is begun again, in other parts.
+        in_batches(&mut renderer, n_before);
+        assert!(renderer.draw_batch().expect("a batch").is_none() && renderer.is_pending());
+        // The sample is begun again, in other batches.
         renderer.limit_batches(Some(300 + n_before)).expect("batches");
         assert!(!renderer.is_pending());
-        assert!(identical(&in_parts(&mut renderer, 3).0, &whole), "after {n_before} samples");
+        assert!(identical(&in_batches(&mut renderer, 3).0, &whole), "after {n_before} samples");
     }
-    assert!(renderer.draw_batch().expect("a part").is_none());
+    assert!(renderer.draw_batch().expect("a batch").is_none());
     let brighter = RenderOptions { exposure: 2.0, ..options.clone() };
     renderer.set_options(&brighter).expect("options");
     assert!(!renderer.is_pending() && renderer.n_samples() == 3);
-    assert!(!identical(&in_parts(&mut renderer, 4).0, &at_once(&mut renderer, 3)));
+    assert!(!identical(&in_batches(&mut renderer, 4).0, &at_once(&mut renderer, 3)));
     renderer.set_options(&options).expect("options");
     assert!(identical(&at_once(&mut renderer, 3), &whole));
     assert_silent(&context);
 }
 
 #[test]
-fn parts_that_overflow_are_drawn_anew() {
+fn batches_that_overflow_are_drawn_anew() {
     let (scene, context) = (glass_in_glass(), device());
     let world = world_of(&scene);
     let new = |capacity| {
-        GpuRenderer::with_queue_capacity(context.clone(), &world, &options_of_parts(), capacity).expect("a renderer")
+        GpuRenderer::with_queue_capacity(context.clone(), &world, &options_of_batches(), capacity).expect("a renderer")
     };
     let whole = at_once(&mut new(100_000), 3);
-    assert!(identical(&in_parts(&mut new(600), 3).0, &whole));
+    assert!(identical(&in_batches(&mut new(600), 3).0, &whole));
     assert_silent(&context);
 }
 
 #[test]
-fn the_picture_changes_with_the_last_part() {
+fn the_picture_changes_with_the_last_batch() {
     let (scene, context) = (glass_in_glass(), device());
     let world = world_of(&scene);
-    let mut renderer = GpuRenderer::new(context.clone(), &world, &options_of_parts()).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), &world, &options_of_batches()).expect("a renderer");
     assert_eq!(renderer.displayed(), None);
     renderer.limit_batches(Some(400)).expect("batches");
-    assert!(renderer.draw_batch().expect("a part").is_none());
+    assert!(renderer.draw_batch().expect("a batch").is_none());
     assert_eq!(renderer.displayed(), None);
-    assert!(renderer.draw_batch().expect("a part").is_some());
+    assert!(renderer.draw_batch().expect("a batch").is_some());
     let seen_from = |camera: Camera, size| Some(Displayed { size, camera });
     assert_eq!(renderer.displayed(), seen_from(scene.camera, (32, 24)));
     let elsewhere = Camera { projection: Projection::Perspective { vertical_fov_degrees: 20.0 }, ..scene.camera };
     renderer.set_camera(&elsewhere);
     let before = renderer.displayed_picture().expect("a picture");
-    assert!(renderer.draw_batch().expect("a part").is_none());
+    assert!(renderer.draw_batch().expect("a batch").is_none());
     assert_eq!(renderer.displayed(), seen_from(scene.camera, (32, 24)), "what is seen is still the one before");
     assert_eq!(renderer.displayed_picture().expect("a picture"), before);
-    assert!(renderer.draw_batch().expect("a part").is_some());
+    assert!(renderer.draw_batch().expect("a batch").is_some());
     assert_eq!(renderer.displayed(), seen_from(elsewhere, (32, 24)));
     renderer.resize(16, 12).expect("a size");
-    assert!(renderer.draw_batch().expect("a part").is_some());
+    assert!(renderer.draw_batch().expect("a batch").is_some());
     assert_eq!(renderer.displayed(), seen_from(elsewhere, (16, 12)));
     renderer.resize(32, 24).expect("a size");
-    assert!(renderer.draw_batch().expect("a part").is_none());
+    assert!(renderer.draw_batch().expect("a batch").is_none());
     assert_eq!(renderer.displayed(), seen_from(elsewhere, (16, 12)), "what is seen is still the small one");
     let small = renderer.displayed_picture().expect("a picture").expect("one is shown");
     assert_eq!((small.width, small.height, small.display.len()), (16, 12, 16 * 12));
@@ -129,20 +129,20 @@ fn the_picture_changes_with_the_last_part() {
 }
 
 #[test]
-fn steps_make_the_same_picture() {
+fn recordings_make_the_same_picture() {
     let (scene, context) = (glass_in_glass(), device());
     let world = world_of(&scene);
-    let mut renderer = GpuRenderer::new(context.clone(), &world, &options_of_parts()).expect("a renderer");
+    let mut renderer = GpuRenderer::new(context.clone(), &world, &options_of_batches()).expect("a renderer");
     let whole = at_once(&mut renderer, 2);
     renderer.reset_samples();
     for _ in 0..2 {
         let mut shares = vec![0.0];
-        while renderer.draw_part().expect("a step").is_none() {
+        while renderer.draw_next().expect("a recording").is_none() {
             shares.push(renderer.progress());
         }
-        // There are steps that begin and end the frame, and steps for its bounces and their light. There are more
-        // where rays can be suspended.
-        assert!(shares.len() >= options_of_parts().max_depth as usize + 3);
+        // There are recordings that begin and end the frame, and recordings for its bounces and their light. There are
+        // more where rays can be suspended.
+        assert!(shares.len() >= options_of_batches().max_depth as usize + 3);
         assert!(shares.is_sorted_by(|a, b| a < b) && shares.iter().all(|share| *share < 1.0), "{shares:?}");
     }
     assert!(identical(&renderer.picture().expect("a picture"), &whole));
@@ -155,7 +155,7 @@ fn steps_make_the_same_picture() {
 fn views_of_first_hits_trace_primary_rays_only() {
     let (scene, context) = (glass_in_glass(), device());
     let world = world_of(&scene);
-    let options = RenderOptions { pixel_aovs: true, ..options_of_parts() };
+    let options = RenderOptions { pixel_aovs: true, ..options_of_batches() };
     let new = || GpuRenderer::new(context.clone(), &world, &options).expect("a renderer");
     let (mut whole, mut renderer) = (new(), new());
     let picture = at_once(&mut whole, 2);
@@ -164,7 +164,7 @@ fn views_of_first_hits_trace_primary_rays_only() {
     for (view, most_pixels) in [(View::Depth, None), (View::Normal, Some(200)), (View::Id, None)] {
         renderer.limit_batches(most_pixels).expect("batches");
         assert!(renderer.set_view(view, 1.0));
-        assert!(renderer.draw_batch().expect("a part").is_some() == most_pixels.is_none());
+        assert!(renderer.draw_batch().expect("a batch").is_some() == most_pixels.is_none());
         renderer.reset_samples();
         let profile = renderer.draw_sample().expect("a sample");
         let names: Vec<_> = profile.passes.iter().map(|pass| pass.name).collect();
@@ -181,7 +181,7 @@ fn views_of_first_hits_trace_primary_rays_only() {
         // Back in the picture's view, the picture and the AOVs with all rays are the same.
         renderer.set_view(View::Picture, 1.0);
         assert_eq!(renderer.n_samples(), 0, "no sample of the picture is there yet");
-        assert!(identical(&in_parts(&mut renderer, 2).0, &picture), "after {view}");
+        assert!(identical(&in_batches(&mut renderer, 2).0, &picture), "after {view}");
         renderer.draw().expect("a frame");
         assert_eq!(renderer.pixel_aovs().expect("pixel_aovs"), pixel_aovs);
     }

@@ -8,7 +8,7 @@ use crate::layout::{KdNode, Plane, Slab, Triangle};
 
 /// Arrays of a kd-tree and the cell of its root.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Parts {
+pub struct KdArrays {
     /// The nodes. Node 0 is the root, and node 1 is unused (an empty leaf). The two children of a split are
     /// neighbours, the first one at an even index. The order is depth-first: a pair of children, then all nodes below
     /// the first, then all nodes below the second.
@@ -32,7 +32,7 @@ pub struct Parts {
     pub depth: u32,
 }
 
-impl Parts {
+impl KdArrays {
     /// Returns the node at an index, decoded.
     pub fn node(&self, node_ix: u32) -> Node {
         self.nodes[node_ix as usize].into()
@@ -44,51 +44,51 @@ impl KdTree {
     ///
     /// # Errors
     /// The first of [`KdTree::validate`]'s invariants that does not hold.
-    pub fn from_parts(parts: Parts, triangles: &[Triangle]) -> Result<Self, Invalid> {
+    pub fn from_arrays(arrays: KdArrays, triangles: &[Triangle]) -> Result<Self, Invalid> {
         let scales = Scales::new(triangles, &Bounds::of_all(triangles));
-        let tree = Self { parts, n_triangles: triangles.len(), scales };
+        let tree = Self { arrays, n_triangles: triangles.len(), scales };
         tree.validate(triangles)?;
         Ok(tree)
     }
 
-    /// Returns the tree's arrays. [`KdTree::from_parts`] makes them a tree again.
-    pub fn into_parts(self) -> Parts {
-        self.parts
+    /// Returns the tree's arrays. [`KdTree::from_arrays`] makes them a tree again.
+    pub fn into_arrays(self) -> KdArrays {
+        self.arrays
     }
 
-    /// [`Parts::nodes`].
+    /// [`KdArrays::nodes`].
     pub fn nodes(&self) -> &[KdNode] {
-        &self.parts.nodes
+        &self.arrays.nodes
     }
 
-    /// [`Parts::parents`].
+    /// [`KdArrays::parents`].
     pub fn parents(&self) -> &[u32] {
-        &self.parts.parents
+        &self.arrays.parents
     }
 
-    /// [`Parts::leaf_triangles`].
+    /// [`KdArrays::leaf_triangles`].
     pub fn leaf_triangles(&self) -> &[u32] {
-        &self.parts.leaf_triangles
+        &self.arrays.leaf_triangles
     }
 
-    /// [`Parts::leaf_planes`].
+    /// [`KdArrays::leaf_planes`].
     pub fn leaf_planes(&self) -> &[Plane] {
-        &self.parts.leaf_planes
+        &self.arrays.leaf_planes
     }
 
-    /// [`Parts::slabs`].
+    /// [`KdArrays::slabs`].
     pub fn slabs(&self) -> &[Slab] {
-        &self.parts.slabs
+        &self.arrays.slabs
     }
 
     /// The least corner of the root's cell, world units.
     pub fn box_min(&self) -> Vec3 {
-        self.parts.box_min
+        self.arrays.box_min
     }
 
     /// The greatest corner of the root's cell, world units.
     pub fn box_max(&self) -> Vec3 {
-        self.parts.box_max
+        self.arrays.box_max
     }
 
     /// The least and the greatest corner of the root's cell, which holds all triangles, world units.
@@ -96,9 +96,9 @@ impl KdTree {
         [self.box_min(), self.box_max()]
     }
 
-    /// [`Parts::depth`].
+    /// [`KdArrays::depth`].
     pub fn depth(&self) -> u32 {
-        self.parts.depth
+        self.arrays.depth
     }
 
     /// The number of triangles that the tree was built from.
@@ -108,6 +108,6 @@ impl KdTree {
 
     /// Returns the node at an index, decoded.
     pub fn node(&self, node_ix: u32) -> Node {
-        self.parts.node(node_ix)
+        self.arrays.node(node_ix)
     }
 }

@@ -63,13 +63,13 @@ fn files_of_tiles(obj: &SourceFile, folder: &Path, name: &str) -> Vec<(u32, Sour
 
 /// The indices of materials for tiles, by the index of the material without such maps and the number of the tile.
 #[derive(Debug, Default)]
-pub struct Tiles {
+pub struct UdimMaterials {
     by_tile: HashMap<(u32, u32), u32>,
     /// Materials that have tiles.
     bases: BTreeSet<u32>,
 }
 
-impl Tiles {
+impl UdimMaterials {
     /// Adds the material of a tile.
     pub fn add(&mut self, base: usize, tile: u32, material: usize) {
         self.bases.insert(base as u32);

@@ -1,4 +1,5 @@
-//! Which kinds of surfaces a scene has. Kernels over a scene are made without the code for kinds that it lacks.
+//! Which features the surfaces of a scene have. Kernels over a scene are made without the code for features that it
+//! lacks.
 
 use rayon::prelude::*;
 
@@ -11,9 +12,9 @@ use crate::{
     world::{FlatScene, path_materials},
 };
 
-/// The kinds of surfaces of a scene.
+/// The features of the surfaces of a scene.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct SurfaceKinds {
+pub struct SurfaceFeatures {
     /// Whether some materials are not those of MTL: of microfacets, or unlit.
     has_microfacets: bool,
     /// Whether the scene has textures, or colours or opacity at corners.
@@ -52,8 +53,8 @@ fn lobes_of(material: &Material) -> u32 {
     .fold(0, |lobes, (lobe, is_present)| if is_present { lobes | lobe } else { lobes })
 }
 
-impl SurfaceKinds {
-    /// Returns the kinds of a scene.
+impl SurfaceFeatures {
+    /// Returns the features of a scene.
     pub fn of(scene: &FlatScene) -> Self {
         let is_microfacet = |flags: u32| flags & (MATERIAL_MICROFACET | MATERIAL_UNLIT) != 0;
         Self {
