@@ -4,7 +4,7 @@ use std::{path::Path, sync::Arc};
 
 use glam::{DMat4, Vec3};
 use kdray::{
-    accel::{Accel, kdtree::Traversal},
+    accel::{Accel, AccelOptions, kdtree::Traversal},
     engine::{
         Caster, Engine, LoadRequest, Opened, Source, Work,
         choices::{Request, Workload},
@@ -28,6 +28,10 @@ const EXPECTED_RAYS: u64 = 1 << 24;
 /// Batches of fewer rays or points are cast by the CPU, also where the scene has a GPU: a submission and the copies of
 /// rays and hits take longer.
 const SMALL_BATCH: usize = 4096;
+
+/// Number of small batches that a GPU casts if it builds the structure itself: the CPU would first build its own, which
+/// takes as long as some thousand submissions.
+const BATCHES_BEFORE_BUILD: u32 = 1000;
 
 /// The mask of geometries that all rays meet.
 const ALL: u8 = 0xff;
@@ -61,6 +65,8 @@ pub struct Ready {
     traversal: Traversal,
     on_device: Option<Caster<'static>>,
     on_cpu: Option<Caster<'static>>,
+    /// Number of small batches so far that the device has cast.
+    n_small: u32,
     /// Whether each geometry has a structure of its own.
     keeps: bool,
     shapes_at: u64,
@@ -289,7 +295,8 @@ impl State {
             }
         };
         let (shapes_at, places_at) = (self.shapes_at, self.places_at);
-        Ok(Ready { world, places, traversal, on_device: None, on_cpu: None, keeps, shapes_at, places_at })
+        let (on_device, on_cpu, n_small) = Default::default();
+        Ok(Ready { world, places, traversal, on_device, on_cpu, n_small, keeps, shapes_at, places_at })
     }
 
     /// Makes a world of which nothing is there.
@@ -339,11 +346,15 @@ impl Ready {
         (geometry.shaped_at <= self.shapes_at).then_some(mesh_ix)
     }
 
-    /// Returns what casts `n` rays: the device, or the CPU if they are few. It is made at the first use.
+    /// Returns what casts `n` rays: the device, or the CPU if they are few and its structure costs little or has been
+    /// waited for. It is made at the first use.
     fn caster(&mut self, [engine, cpu]: [&Engine; 2], n: usize) -> PyResult<(&mut Caster<'static>, Placed<'_>)> {
-        let Self { world, places, traversal, on_device, on_cpu, .. } = self;
+        let Self { world, places, traversal, on_device, on_cpu, n_small, .. } = self;
         let is_small = engine.device().is_some_and(|device| !device.is_software()) && n < SMALL_BATCH;
-        let caster = if engine.device().is_none() || is_small {
+        let lacks_structure = on_cpu.is_none() && matches!(world.accel_options(), AccelOptions::LazyTree(_));
+        let stays_on_device = is_small && lacks_structure && *n_small < BATCHES_BEFORE_BUILD;
+        *n_small += u32::from(stays_on_device);
+        let caster = if engine.device().is_none() || is_small && !stays_on_device {
             made(on_cpu, || cpu.caster_of_world(world, Traversal::OF_CPU))
         } else {
             made(on_device, || engine.caster_of_world(world, *traversal))
