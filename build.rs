@@ -199,7 +199,7 @@ fn modules() -> Vec<Module> {
 /// without masked or blended materials are spared it, and flat worlds are spared what is for instances.
 fn searching_modules(kernel: &str, has_alpha_test: bool, path: &Path) -> Vec<Module> {
     let of_search = |search: &str| {
-        let traversal = ("TRAVERSAL", Some(format!("TRAVERSAL_{}", search.to_uppercase())));
+        let traversal = ("TRAVERSAL", Some(traversal_of(search)));
         let module = |kind: &str, macros| Module {
             name: format!("{kernel}_{search}{kind}.comp"),
             path: path.to_owned(),
@@ -213,6 +213,11 @@ fn searching_modules(kernel: &str, has_alpha_test: bool, path: &Path) -> Vec<Mod
         iter::once(module("", with(Vec::new()))).chain(of_alpha).chain([of_instances]).collect::<Vec<_>>()
     };
     SEARCH_MODULES.into_iter().flat_map(of_search).collect()
+}
+
+/// Returns the value of the macro `TRAVERSAL` for a search.
+fn traversal_of(search: &str) -> String {
+    format!("TRAVERSAL_{}", search.to_uppercase())
 }
 
 /// Generates a Rust table of the modules of all kernels that find hits, each with its SPIR-V.
@@ -271,6 +276,10 @@ fn options(macros: &[(&str, Option<String>)]) -> shaderc::CompileOptions<'static
     options.set_warnings_as_errors();
     for (name, value) in macros {
         options.add_macro_definition(name, value.as_deref());
+    }
+    // Values of the macro `TRAVERSAL`: the algorithm that takes rays through the kd-tree, or the grid.
+    for (ix, search) in SEARCH_MODULES.into_iter().enumerate() {
+        options.add_macro_definition(&traversal_of(search), Some(&format!("{ix}u")));
     }
     options.set_include_callback(|include, _, _, _| {
         let path = Path::new("glsl/shared").join(include);

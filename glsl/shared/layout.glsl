@@ -108,17 +108,6 @@
 // The cosine from which on these rays start at the triangle itself. In between, the start moves linearly.
 #define PLANE_START_COSINE 0.2
 
-// Values of the macro `TRAVERSAL`, one in each module of a kernel that finds hits (build.rs): the algorithm that takes
-// rays through the kd-tree, or the grid.
-#define TRAVERSAL_MASK 0u
-#define TRAVERSAL_STACK 1u
-#define TRAVERSAL_BRUTE 2u
-#define TRAVERSAL_RESTART 3u
-#define TRAVERSAL_SHORT_STACK 4u
-#define TRAVERSAL_MASK_BOXES 5u
-#define TRAVERSAL_BACKTRACK 6u
-#define TRAVERSAL_ROPES 7u
-#define TRAVERSAL_GRID 8u
 // The most triangles that brute force accepts.
 #define BRUTE_MAX_TRIANGLES 65000u
 
