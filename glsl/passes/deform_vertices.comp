@@ -47,10 +47,12 @@ float dot_in_order(vec3 a, vec3 b) {
 // iteration begins with a reciprocal that is off by an eighth. On the border of the square, where two codes stand for
 // each direction, the one with the larger other half is returned. Twin of src/layout/normal.rs.
 uint encode_exactly(vec3 v) {
-    precise vec3 scaled = v * scale_to_one(largest_of(v));
+    float largest = largest_of(v);
+    precise vec3 scaled = v * scale_to_one(largest);
     precise float sum = abs(scaled.x) + abs(scaled.y) + abs(scaled.z);
-    const float infinity = uintBitsToFloat(0x7f800000u);
-    if (!(sum >= 1.0 && sum < infinity)) return FLAT_NORMAL;
+    // Smaller vectors, of less than 2^-100, may have parts that the device flushes to zero.
+    const float least = uintBitsToFloat(27u << 23), infinity = uintBitsToFloat(0x7f800000u);
+    if (!(largest >= least && sum < infinity)) return FLAT_NORMAL;
     precise float reciprocal = uintBitsToFloat(0x7ef311c7u - floatBitsToUint(sum));
     for (uint i = 0u; i < 4u; ++i) {
         precise float next = reciprocal * (2.0 - sum * reciprocal);

@@ -2,6 +2,7 @@
 //! region with some room. If a geometry is deformed, its tree alone is built again and put into its region.
 
 use std::{
+    borrow::Cow,
     ops::Range,
     sync::{Arc, Mutex, MutexGuard, PoisonError, Weak},
 };
@@ -117,8 +118,11 @@ impl<'a> Geometries<'a> {
         &self.two.structures()[ix]
     }
 
-    pub fn triangles(&self, ix: usize) -> &'a [Triangle] {
-        self.instances.ranges[ix].of(self.geometry.triangles())
+    pub fn triangles(&self, ix: usize) -> Cow<'a, [Triangle]> {
+        match self.poses.get(ix) {
+            Some(posed) => posed.triangles().into(),
+            None => self.instances.ranges[ix].of(self.geometry.triangles()).into(),
+        }
     }
 
     fn lazy(&self) -> impl Iterator<Item = (usize, &'a LazyTree)> {
@@ -303,7 +307,7 @@ impl DeviceTrees {
         let sizes = of_host.first().map(|(_, tree)| (tree.nodes().len(), tree.leaf_triangles().len()));
         let Some(sizes) = sizes.filter(|sizes| region.holds(*sizes)) else { return Ok(None) };
         let own = all.triangles(ix);
-        let triangles = Buffer::with(context, "new triangles", own, BufferUse::Storage)?;
+        let triangles = Buffer::with(context, "new triangles", &own, BufferUse::Storage)?;
         let own_corners = arrays.corners_of(region.first_row, own.len());
         let corners = Buffer::with(context, "new corners", own_corners, BufferUse::Storage)?;
         let more = arrays.copies((&triangles, own.len()), (&corners, own_corners.len()), region);
@@ -332,7 +336,11 @@ impl DeviceTrees {
             parents.resize(n_nodes / 2, 0);
             parents.extend(tree.parents().iter().map(|parent| parent + place.first_node));
             entries.resize(n_entries, LeafTriangle::default());
-            let entry = |triangle_ix: &u32| leaf_triangle(all.geometry.triangles(), place.first_row + triangle_ix);
+            let triangles = all.triangles(ix);
+            let entry = |&triangle_ix: &u32| LeafTriangle {
+                triangle_ix: place.first_row + triangle_ix,
+                ..leaf_triangle(&triangles, triangle_ix)
+            };
             entries.extend(tree.leaf_triangles().iter().map(entry));
             planes.resize(n_entries, Plane::default());
             planes.extend(tree.leaf_planes());

@@ -18,7 +18,7 @@ use crate::{
         deform::{Deform, DeformedMesh},
         kdtree::{BuiltTree, KdTreeBuilder, KdTreeBuilderOptions},
     },
-    scene::deformation::PosedMesh,
+    scene::deformation::{Deformation, PosedMesh},
 };
 
 /// Builds trees of geometries, one after the other.
@@ -34,16 +34,16 @@ pub(super) struct TreeBuilder {
     deformed: HashMap<usize, Deformed>,
 }
 
-/// A mesh that the device deforms.
+/// A mesh that the device deforms, and what it has been made of.
 struct Deformed {
-    /// A moment of the mesh.
-    of: Arc<PosedMesh>,
+    deformation: Arc<Deformation>,
+    faces: Arc<[[u32; 3]]>,
     mesh: DeformedMesh,
 }
 
 impl Deformed {
     fn is_of(&self, other: &PosedMesh) -> bool {
-        Arc::ptr_eq(self.of.deformation(), other.deformation()) && Arc::ptr_eq(self.of.faces(), other.faces())
+        Arc::ptr_eq(&self.deformation, other.deformation()) && Arc::ptr_eq(&self.faces, other.faces())
     }
 }
 
@@ -63,7 +63,7 @@ impl TreeBuilder {
     }
 
     /// Puts the triangles of a geometry into the builder, and what textures need at their corners. Returns the number
-    /// of words that this is; 0 if it has not changed.
+    /// of words of corners there; 0 if those of the arrays stay.
     pub fn take(&mut self, arrays: &Arrays, (all, ix): (&Geometries, usize)) -> Result<usize, GpuError> {
         let first_row = all.instances.ranges[ix].first_row as usize;
         if let Some(posed) = all.poses.get(ix) {
@@ -73,7 +73,7 @@ impl TreeBuilder {
             }
         }
         let triangles = all.triangles(ix);
-        self.kernels.upload(triangles)?;
+        self.kernels.upload(&triangles)?;
         let corners = arrays.corners_of(first_row, triangles.len());
         self.corners.upload_at(0, corners)?;
         Ok(corners.len())
@@ -96,7 +96,8 @@ impl TreeBuilder {
             let corners = (arrays.n_corner_words() > 0).then_some((self.corners.any(), 0));
             let target = DeformTarget { triangles: self.kernels.triangles().any(), first_row: 0, corners };
             let mesh = deform.mesh((posed.deformation(), posed.faces()), target)?;
-            self.deformed.insert(ix, Deformed { of: posed.clone(), mesh });
+            let (deformation, faces) = (posed.deformation().clone(), posed.faces().clone());
+            self.deformed.insert(ix, Deformed { deformation, faces, mesh });
         }
         let mesh = &self.deformed[&ix].mesh;
         let has_corners = mesh.buffers.mesh.first_corner_word != NO_WORDS;

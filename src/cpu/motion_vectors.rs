@@ -47,6 +47,7 @@ pub fn motion_vectors(
         // Zero has no sign.
         [way.x as f32, 0.0 - way.y as f32]
     };
+    worlds.iter().for_each(|world| world.triangles.make());
     pixel_aovs.par_iter().enumerate().map(vector).collect()
 }
 

@@ -90,9 +90,14 @@ impl AnimatedWorld {
         let before = (self.scene.instances.clone(), self.scene.lights.clone());
         // Its warnings are those of the first moment.
         let pose = |poser: &mut Poser| with_default(&Dispatch::none(), || poser.pose(seconds, &mut self.scene));
-        let Some(deformed) = self.poser.as_mut().map(pose).transpose()?.flatten() else {
-            return self.read_again(seconds);
+        let deformed = match self.poser.as_mut().map(pose).transpose() {
+            Ok(deformed) => deformed.flatten(),
+            Err(error) => {
+                (self.scene.instances, self.scene.lights) = before;
+                return Err(error.into());
+            }
         };
+        let Some(deformed) = deformed else { return self.read_again(seconds) };
         let posed = Instant::now();
         for (mesh_ix, pose) in deformed {
             match pose.clone() {

@@ -19,10 +19,15 @@ struct Value<T> {
 }
 
 impl<T> Shared<T> {
-    /// A value that is made when it is first read or changed. Several threads may make it then; the first result is
-    /// kept.
+    /// A value that is made when it is first read or changed. Threads do not wait for one another then, and the first
+    /// result is kept: who reads the value in parallel calls [`Shared::make`] before.
     pub fn lazy(make: impl Fn() -> T + Send + Sync + 'static) -> Self {
         Self(Arc::new(Value { made: OnceLock::new(), make: Some(Box::new(make)) }))
+    }
+
+    /// Makes the value if it is not made.
+    pub fn make(&self) {
+        let _: &T = self;
     }
 
     /// Whether the value is made.
@@ -53,7 +58,7 @@ impl<T> Deref for Shared<T> {
 
 impl<T: Clone> DerefMut for Shared<T> {
     fn deref_mut(&mut self) -> &mut T {
-        let _: &T = self;
+        self.make();
         if Arc::get_mut(&mut self.0).is_none() {
             *self = Self::from(T::clone(self));
         }

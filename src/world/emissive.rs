@@ -27,6 +27,8 @@ pub(super) fn emissive_triangles(scene: &FlatScene) -> Vec<(usize, f64)> {
     if !emissive.contains(&true) {
         return Vec::new();
     }
+    scene.triangles.make();
+    scene.textures.corners.make();
     let of_triangle = |ix: usize| {
         let material_ix = scene.material_ix_of(ix) as usize;
         let area = area_of(&scene.triangle(ix));

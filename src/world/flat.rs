@@ -280,8 +280,9 @@ impl FlatScene {
     /// Returns the smallest and the largest coordinates of all triangles, world units; with instances, those of boxes
     /// around them. Without triangles these are infinity and minus infinity.
     pub fn bounds(&self) -> (Vec3, Vec3) {
-        let Some(instances) = &self.instances else { return bounds_of(&self.triangles) };
-        let boxes: Vec<_> = instances.ranges.par_iter().map(|range| bounds_of(range.of(&self.triangles))).collect();
+        let triangles = &self.triangles[..];
+        let Some(instances) = &self.instances else { return bounds_of(triangles) };
+        let boxes: Vec<_> = instances.ranges.par_iter().map(|range| bounds_of(range.of(triangles))).collect();
         instances.bounds(&boxes)
     }
 }

@@ -37,8 +37,14 @@ use crate::{
 #[derive(Clone, Debug, Default)]
 pub struct Poses {
     of_geometries: BTreeMap<usize, Arc<PosedMesh>>,
-    /// Stored triangles and corners. Those of posed meshes are of other moments.
-    base: (Shared<Vec<Triangle>>, Shared<Vec<[CornerSurface; 3]>>),
+    base: Base,
+}
+
+/// Stored triangles, and what textures need at their corners. Those of posed meshes are of other moments.
+#[derive(Clone, Debug, Default)]
+struct Base {
+    triangles: Shared<Vec<Triangle>>,
+    corners: Shared<Vec<[CornerSurface; 3]>>,
 }
 
 impl Poses {
@@ -60,6 +66,7 @@ impl World {
     pub fn posed(&self, scene: &Scene, deformed: &ChangedMeshes) -> Result<Option<Self>, Mismatch> {
         let (Some(before), Accel::TwoLevel(two)) = (&self.scene().instances, self.accel()) else { return Ok(None) };
         let Some(geometry_of) = self.geometries_of(scene) else { return Ok(None) };
+        scene.camera.check().map_err(|what| Mismatch::Scene(format!("camera: {what}")))?;
         let mut flat = FlatScene {
             lights: flat_lights(scene),
             area_lights: area_lights(scene),
@@ -77,7 +84,7 @@ impl World {
             poses.of_geometries.remove(geometry_ix);
         }
         if poses.of_geometries.is_empty() || changed.iter().any(|(_, _, pose)| pose.is_none()) {
-            poses.base = (flat.triangles.clone(), flat.textures.corners.clone());
+            poses.base = Base { triangles: flat.triangles.clone(), corners: flat.textures.corners.clone() };
         }
         for (_, geometry_ix, pose) in &changed {
             let Some(pose) = pose else { continue };
@@ -87,26 +94,31 @@ impl World {
             poses.of_geometries.insert(*geometry_ix, pose.clone());
         }
         if changed.iter().any(|(_, _, pose)| pose.is_some()) {
-            flat.take(&poses, &before.ranges);
+            flat.pose(&poses, &before.ranges);
         }
         let structure = |&(_, geometry_ix, pose): &(usize, usize, &Option<Arc<PosedMesh>>)| {
             let range = before.ranges[geometry_ix];
             let of_pose = |pose: &Arc<PosedMesh>| {
                 BottomLevel::of_corners(pose.faces().len(), |ix| pose.corners(ix), self.accel_options())
             };
-            let of_triangles =
-                || BottomLevel::build(range.of(&flat.triangles), self.accel_options(), &Progress::default());
-            (geometry_ix, pose.as_ref().and_then(of_pose).unwrap_or_else(of_triangles))
+            let build =
+                |triangles: &[Triangle]| BottomLevel::build(triangles, self.accel_options(), &Progress::default());
+            let structure = match pose {
+                Some(pose) => of_pose(pose).unwrap_or_else(|| build(&pose.triangles())),
+                None => build(range.of(&flat.triangles)),
+            };
+            (geometry_ix, structure)
         };
         let structures: Vec<(usize, BottomLevel)> = changed.par_iter().map(structure).collect();
         let Some(instances) = placed((before, two), scene, &structures) else { return Ok(None) };
         let accel = Accel::TwoLevel(Box::new(two.deformed(structures, &instances.list)));
         flat.instances = Some(instances);
-        Ok(Some(self.of_pose(flat, accel, poses)))
+        Ok(Some(self.with_pose(flat, accel, poses)))
     }
 
-    /// Joins the parts of another pose. What light samplers know of lights that do not depend on it stays.
-    fn of_pose(&self, scene: FlatScene, accel: Accel, poses: Poses) -> Self {
+    /// Makes the world of another pose. The ambient approximations stay if nothing shines within the scene: they do not
+    /// depend on its bounds then.
+    fn with_pose(&self, scene: FlatScene, accel: Accel, poses: Poses) -> Self {
         let mut parts = super::Parts {
             scene,
             accel,
@@ -158,7 +170,7 @@ impl World {
                 let corners = posed.faces().as_flattened().iter().map(|ix| posed.positions()[*ix as usize]);
                 corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)))
             }
-            None => bounds_of(range.of(&poses.base.0)),
+            None => bounds_of(range.of(&poses.base.triangles)),
         };
         let boxes: Vec<_> = instances.ranges.par_iter().enumerate().map(of_geometry).collect();
         instances.bounds(&boxes)
@@ -214,11 +226,11 @@ impl FlatScene {
         Ok(true)
     }
 
-    /// Takes the triangles of posed meshes, and the tangents of their corners, which are made when they are needed.
-    fn take(&mut self, poses: &Poses, ranges: &[StoredRange]) {
+    /// Gives posed meshes their triangles, and the tangents of their corners, which are made when they are needed.
+    fn pose(&mut self, poses: &Poses, ranges: &[StoredRange]) {
         let posed: Vec<(StoredRange, Arc<PosedMesh>)> =
             poses.of_geometries.iter().map(|(ix, posed)| (ranges[*ix], posed.clone())).collect();
-        let (triangles, corners) = poses.base.clone();
+        let Base { triangles, corners } = poses.base.clone();
         let has_tangents = |(_, posed): &(_, Arc<PosedMesh>)| !posed.deformation().tangents.is_empty();
         if !corners.is_empty() && posed.iter().any(has_tangents) {
             let with_tangents: Vec<_> = posed.iter().filter(|it| has_tangents(it)).cloned().collect();

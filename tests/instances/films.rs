@@ -12,7 +12,7 @@ use kdray::{
     frame::{Integrator, RenderOptions},
     render::GpuRenderer,
     scene::{
-        Instance, Light, Mesh, PictureChoices, Scene,
+        AnimationChoice, Instance, Light, Mesh, PictureChoices, Scene, Transform,
         deformation::{ChangedMeshes, Deformation, Influence, JointMatrix, MorphDelta, Pose, PosedMesh},
     },
     world::{FlatScene, World},
@@ -244,6 +244,33 @@ fn play(kind: Kind, on_device: bool) {
     assert_silent(&context);
 }
 
+/// A file whose mesh has no weights until an animation sets them, and another animation.
+#[test]
+fn an_animation_that_ends_leaves_no_pose() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("film.gltf");
+    let mut file = file(Kind { is_skinned: true, ..MORPHED });
+    file["nodes"][0].as_object_mut().expect("a node").remove("skin");
+    let all = file["animations"][0]["channels"].as_array().expect("channels").clone();
+    let (of_weights, others): (Vec<Value>, Vec<Value>) = all.into_iter().partition(|it| it["target"]["node"] == 0);
+    let samplers = file["animations"][0]["samplers"].clone();
+    file["animations"] = json!([
+        { "name": "wave", "channels": of_weights, "samplers": samplers },
+        { "name": "turn", "channels": others, "samplers": samplers },
+    ]);
+    fs::write(&path, file.to_string()).expect("a file");
+    let request = LoadRequest::pictures(PictureChoices::default());
+    let scene = Opened::read(path.as_path(), &request).expect("a scene").scene;
+    let first = lazy(&scene);
+    let mut animated = AnimatedWorld::new(&path, &request, scene, &first);
+    animated.set_animation(AnimationChoice::Named("wave".to_owned()));
+    let waving = animated.at(1.0).expect("a moment").0;
+    assert!(waving.scene().triangles != first.scene().triangles && waving.poses().get(0).is_some());
+    animated.set_animation(AnimationChoice::Named("turn".to_owned()));
+    let turning = animated.at(1.0).expect("a moment").0;
+    compare::exact(&first.scene().triangles, &turning.scene().triangles).expect("the mesh at rest");
+}
+
 #[test]
 fn skinned_meshes_are_deformed_by_the_device() {
     play(SKINNED, true);
@@ -265,12 +292,19 @@ fn what_kernels_cannot_do_is_done_by_the_host() {
     play(Kind { has_double: true, ..SKINNED }, false);
 }
 
-/// A scene of two large meshes, of which the second one is larger.
+/// A scene of two large meshes, of which the second one is larger and also stands mirrored, and a small one, whose tree
+/// the host builds.
 fn cubes() -> Scene {
     let mut scene = scene_of(&meshes::cube(19, 0.9), &transforms(2.5)[..4]);
     scene.meshes.push(mesh_of(&meshes::cube(23, 0.2)));
     let place = transform(DVec3::splat(0.7), 0.5, DVec3::new(3.0, 2.0, -1.0));
-    scene.instances.push(Instance { mesh_ix: 1, transform: place, materials: vec![0], ..Instance::default() });
+    let mut push = |mesh_ix: usize, transform: Transform| {
+        scene.instances.push(Instance { mesh_ix, transform, materials: vec![0], ..Instance::default() });
+    };
+    push(1, place);
+    push(1, transform(DVec3::new(-0.5, 0.6, 0.5), 0.2, DVec3::new(-2.0, 1.0, 2.0)));
+    push(2, transform(DVec3::splat(0.8), 0.3, DVec3::new(1.0, 2.5, 1.0)));
+    scene.meshes.push(mesh_of(&meshes::cube(3, 0.5)));
     scene.camera.eye = vec3(3.0, 2.0, 14.0);
     scene.camera.target = vec3(3.0, 0.0, 1.0);
     scene
@@ -357,7 +391,8 @@ fn poses_and_arrays_take_turns() {
     let first = lazy(&cubes.scene);
     let mut film = renderer(&context, &first, Integrator::Whitted);
     let mut world = first;
-    for (weight, by_host) in [(0.5, [false, false]), (0.2, [true, false]), (0.9, [false, true]), (0.4, [true, true])] {
+    let [no, yes] = [false, true];
+    for (weight, by_host) in [(0.5, [no; 3]), (0.2, [yes, no, no]), (0.9, [no, yes, yes]), (0.4, [yes; 3])] {
         let mut changed = cubes.deform(weight);
         changed.iter_mut().filter(|(ix, _)| by_host[**ix]).for_each(|(_, pose)| *pose = None);
         world = next(&world, &cubes.scene, &changed);

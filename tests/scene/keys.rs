@@ -292,6 +292,35 @@ fn the_worlds_of_a_scene_file_are_those_of_its_scenes() {
     assert_eq!(told(&all).iter().map(|it| it.n_moved).collect::<Vec<_>>(), [2, 1]);
 }
 
+/// At a moment, the light has no direction. What has moved until then moves with the next moment.
+#[test]
+fn a_moment_that_cannot_be_shown_is_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, bytes) in beside() {
+        fs::write(folder.path().join(name), bytes).unwrap();
+    }
+    let path = folder.path().join("turn.toml");
+    let light = "[[light]]\nkind = 'directional'\ndirection = [1, 0, 0]\nirradiance = [1, 1, 1]\n\
+                 keys = [{ time = 0, direction = [1, 0, 0] }, { time = 2, direction = [-1, 0, 0] }]\n";
+    let keys = "keys = [{ time = 0 }, { time = 1, translate = [0, 0, 3] }]";
+    fs::write(&path, mesh(keys) + light).unwrap();
+    let request = |at: f64| {
+        let pictures = LoadRequest::pictures(PictureChoices::default());
+        LoadRequest { scene: LoadOptions { at: Some(at), ..pictures.scene.clone() }, ..pictures }
+    };
+    let world_at = |at: f64| {
+        let scene = Opened::read(path.as_path(), &request(at)).unwrap().scene;
+        (World::of_flat(FlatScene::with_instances(&scene).unwrap(), &BuildOptions::default()).unwrap(), scene)
+    };
+    let (first, scene) = world_at(0.0);
+    let mut animated = AnimatedWorld::new(&path, &request(0.0), scene, &first);
+    let error = animated.at(1.0).unwrap_err().to_string();
+    assert!(error.contains("direction"), "{error}");
+    let found = animated.at(1.5).unwrap().0;
+    assert_eq!(found.scene().instances, world_at(1.5).0.scene().instances);
+    assert_eq!(found.scene().lights, world_at(1.5).0.scene().lights);
+}
+
 /// The worlds of a file that plays are those of its scenes, whose instances are kept or not. `shares`: whether nothing
 /// moves but instances, so that trees are shared.
 pub fn check_worlds(path: &Path, keeps: bool, shares: bool) {

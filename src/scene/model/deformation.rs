@@ -80,10 +80,8 @@ impl PosedMesh {
     /// Computes the positions on the current rayon pool.
     ///
     /// # Panics
-    /// The pose lacks a joint, a vertex lacks influences, or a face names a vertex that there is not.
+    /// The pose lacks a joint, or a vertex lacks influences.
     pub fn new(deformation: Arc<Deformation>, faces: Arc<[[u32; 3]]>, pose: Pose) -> Self {
-        let n = deformation.positions.len();
-        assert!(faces.as_flattened().par_iter().all(|ix| (*ix as usize) < n), "the vertices of all faces");
         let positions = deformation.positions_at(&pose);
         Self { deformation, faces, pose, positions }
     }
@@ -109,6 +107,9 @@ impl PosedMesh {
     }
 
     /// Returns the positions of a face's corners.
+    ///
+    /// # Panics
+    /// The face names a vertex that there is not.
     pub fn corners(&self, face_ix: usize) -> [Vec3; 3] {
         self.faces[face_ix].map(|ix| self.positions[ix as usize])
     }
@@ -116,6 +117,15 @@ impl PosedMesh {
     /// Returns all vertices.
     pub fn vertices(&self) -> Vec<Vertex> {
         self.deformation.vertices(&self.pose)
+    }
+
+    /// Returns the triangles of all faces, object space.
+    ///
+    /// # Panics
+    /// A face names a vertex that there is not.
+    pub fn triangles(&self) -> Vec<Triangle> {
+        let vertices = self.vertices();
+        self.faces.par_iter().map(|face| triangle_of(face, &vertices).0).collect()
     }
 
     /// Gives a mesh that has these faces the positions, normals and tangents of the pose.

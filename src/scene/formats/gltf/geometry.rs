@@ -16,7 +16,7 @@ use super::{
     accessor::Accessor,
     deform::{Added, Morph, Skin, TargetAttributes, Weights},
     document::{Document, LEFT_OUT},
-    draco,
+    draco, has_targets,
     rest::Rest,
 };
 use crate::scene::{
@@ -105,7 +105,8 @@ pub(super) fn mesh(document: &Document, part: &Part, reading: Reading, n_read: &
         mesh.colours = corners(&faces, &found).unwrap_or_default();
     }
     mesh.faces = faces;
-    Ok(Some(Rest { mesh, deformation: deformation.into(), is_skinned, ..Rest::default() }))
+    let (deformation, has_targets) = (deformation.into(), has_targets(primitive));
+    Ok(Some(Rest { mesh, deformation, is_skinned, has_targets, ..Rest::default() }))
 }
 
 /// The attributes of a primitive.

@@ -1,8 +1,8 @@
 //! glTF 2.0: `.gltf` and `.glb`.
 //!
 //! A glTF mesh becomes a mesh, each of its primitives one slot of it. A node with a mesh becomes an instance. Skins and
-//! morph targets are shown in the pose that the file gives, or that its animations have at a moment; their vertices are
-//! moved here, so that such a mesh has a copy for each pose. Points and lines are not shown.
+//! morph targets are shown in the pose that the file gives, or that its animations have at a moment: such a mesh has a
+//! copy for each pose. Points and lines are not shown.
 //!
 //! The crate `gltf` parses the JSON. All indices, sizes and offsets are checked here, since its own readers panic on
 //! files that are wrong. Errors name the JSON path.
@@ -193,6 +193,10 @@ struct LoadedPose {
     read: Arc<ReadMesh>,
 }
 
+fn has_targets(primitive: &Primitive) -> bool {
+    primitive.targets.as_ref().is_some_and(|targets| !targets.is_empty())
+}
+
 /// Loads the meshes of a scene's nodes.
 struct Loader<'a> {
     document: &'a Document,
@@ -335,6 +339,7 @@ impl<'a> Loader<'a> {
     ) -> Checked<Option<Known>> {
         let document = self.document;
         let primitives = &document.root.meshes[mesh_ix].primitives;
+        self.note_morphs(mesh_ix);
         let skin = node.skin.map(|skin| match primitives.iter().any(deform::has_joints) {
             true => self.skin(skin.value(), node_ix),
             false => Err(format!("nodes[{node_ix}].skin: meshes[{mesh_ix}] has no joints")),
@@ -346,9 +351,9 @@ impl<'a> Loader<'a> {
             return Ok(None);
         }
         let (is_skinned, materials) = (read.rest.is_skinned, read.materials.clone());
-        let (mut mesh, origin) = match posed(read.clone(), (weights, skin.as_ref())) {
+        let (mut mesh, origin) = match posed(read, (weights, skin.as_ref())) {
             Posed::Mesh(mesh, origin) => (mesh, origin),
-            Posed::Pose(posed, origin) => {
+            Posed::Pose { posed, read, origin } => {
                 self.poses.insert(self.meshes.len(), LoadedPose { posed: posed.into(), key, read });
                 (Mesh::default(), origin)
             }
@@ -395,7 +400,6 @@ impl<'a> Loader<'a> {
         let mut read = ReadMesh::default();
         for (ix, primitive) in primitives.iter().enumerate() {
             let path = format!("meshes[{mesh_ix}].primitives[{ix}]");
-            self.note_morphs(primitive, &path);
             let material = if self.has_materials { self.materials.index(primitive.material, &path) } else { 0 };
             let targets = document.morph_targets.of(mesh_ix, ix);
             let part = Part { primitive, targets, path, slot: read.materials.len() as u32, whole };
@@ -428,8 +432,10 @@ impl<'a> Loader<'a> {
         Skin::new(self.document, skin_ix, joints)
     }
 
-    fn note_morphs(&self, primitive: &Primitive, path: &str) {
-        if !self.nodes.is_posed && primitive.targets.as_ref().is_some_and(|targets| !targets.is_empty()) {
+    fn note_morphs(&self, mesh_ix: usize) {
+        let primitives = &self.document.root.meshes[mesh_ix].primitives;
+        for (ix, _) in primitives.iter().enumerate().filter(|(_, it)| !self.nodes.is_posed && has_targets(it)) {
+            let path = format!("meshes[{mesh_ix}].primitives[{ix}]");
             self.document.note("morph targets, which are shown with their default weights", path);
         }
     }

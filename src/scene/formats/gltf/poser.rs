@@ -7,7 +7,7 @@ use glam::DVec3;
 use hashbrown::HashMap;
 
 use super::{
-    Document, Known, LoadedBefore, LoadedPose, Loader, MeshKey, Nodes, cameras, lights, pointers, read,
+    Document, Known, LoadedBefore, LoadedPose, Loader, MeshKey, Nodes, cameras, has_targets, lights, pointers, read,
     rest::{ReadMesh, ReadMeshes},
 };
 use crate::scene::{
@@ -33,13 +33,13 @@ pub(crate) struct Poser {
     options: LoadOptions,
     /// The meshes at the first moment.
     meshes: Vec<Mesh>,
-    /// Those of them that no skin and no morph target deforms.
+    /// Those of them without skins and morph targets.
     rigid: HashMap<MeshKey, Option<Known>>,
     /// What has been read of the others.
     read: ReadMeshes,
-    /// The meshes of the scene of which only positions, normals and tangents change, which the host computes for nobody
-    /// else: what has been read of them, and their last poses.
+    /// What has been read of those meshes of the scene whose moments are poses.
     posed: BTreeMap<usize, Arc<ReadMesh>>,
+    /// The last poses of these meshes.
     poses: BTreeMap<usize, Arc<PosedMesh>>,
     /// The number of the file's instances.
     n_instances: usize,
@@ -77,19 +77,22 @@ impl Poser {
         let fits = first.len() <= scene.instances.len() && scene.instances.iter().zip(&first).all(is_same);
         let has_lights = lights::lights(&document, &nodes, scene.origin) == scene.lights;
         let camera_ix = scene.cameras.iter().position(|(_, camera)| *camera == scene.camera);
-        let rigid = known.into_iter().filter(|((_, skin, _, weights), _)| skin.is_none() && weights.is_empty());
+        let has_targets = |mesh_ix: usize| document.root.meshes[mesh_ix].primitives.iter().any(has_targets);
+        let rigid = known.into_iter().filter(|((mesh_ix, skin, ..), _)| skin.is_none() && !has_targets(*mesh_ix));
         let (rigid, options, n_instances) = (rigid.collect(), options.clone(), first.len());
         if !fits {
             return None;
         }
         let mut read = read.unwrap_or_default();
         let (mut posed, mut poses) = (BTreeMap::new(), BTreeMap::new());
-        for (now, before) in first.iter().zip(&scene.instances) {
-            let Some(it) = loaded.get(&now.mesh_ix) else { continue };
+        let mesh_ixs: BTreeMap<usize, usize> =
+            first.iter().zip(&scene.instances).map(|(of_file, of_scene)| (of_scene.mesh_ix, of_file.mesh_ix)).collect();
+        for (scene_ix, mesh_ix) in mesh_ixs {
+            let Some(it) = loaded.get(&mesh_ix) else { continue };
             // The scene may have tangents that the file lacks.
-            if posed.contains_key(&before.mesh_ix) || it.makes(&scene.meshes[before.mesh_ix]) {
-                posed.insert(before.mesh_ix, it.read.clone());
-                poses.insert(before.mesh_ix, it.posed.clone());
+            if it.makes(&scene.meshes[scene_ix]) {
+                posed.insert(scene_ix, it.read.clone());
+                poses.insert(scene_ix, it.posed.clone());
             } else {
                 read.insert(it.key, Some(Arc::new(ReadMesh { faces: None, ..ReadMesh::clone(&it.read) })));
             }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use hashbrown::HashMap;
 
 use super::deform::Skin;
@@ -24,6 +24,8 @@ pub(super) struct Rest {
     pub deformation: Arc<Deformation>,
     /// Whether a skin moves some of them.
     pub is_skinned: bool,
+    /// Whether it has morph targets, also those that change nothing or have not been read.
+    pub has_targets: bool,
     /// The point of the mesh's space that is the origin of the vertices.
     pub origin: DVec3,
 }
@@ -36,6 +38,7 @@ impl Rest {
         self.mesh.append(other.mesh);
         Arc::make_mut(&mut self.deformation).append(Arc::unwrap_or_clone(other.deformation));
         self.is_skinned |= other.is_skinned;
+        self.has_targets |= other.has_targets;
     }
 
     /// Moves vertices near the origin, if a skin moves them and they are so far from it that single precision is
@@ -69,37 +72,47 @@ pub(super) type ReadMeshes = HashMap<RestKey, Option<Arc<ReadMesh>>>;
 /// A mesh in a pose, and the point of world space that is its origin.
 pub(super) enum Posed {
     Mesh(Mesh, DVec3),
-    Pose(PosedMesh, DVec3),
+    /// What its arrays are made of, and what has been read of it.
+    Pose {
+        posed: PosedMesh,
+        read: Arc<ReadMesh>,
+        origin: DVec3,
+    },
 }
 
 /// Returns a mesh in a pose: its arrays, unless more poses follow.
 pub(super) fn posed(read: Arc<ReadMesh>, (weights, skin): (&[f32], Option<&Skin>)) -> Posed {
-    if !read.rest.deformation.is_deformed() {
+    // The normals of a mesh with targets are the same whether their weights are 0 or none is read.
+    if !(read.rest.deformation.is_deformed() || read.rest.has_targets) {
         let Rest { mut mesh, deformation, .. } = Arc::unwrap_or_clone(read).rest;
         Arc::unwrap_or_clone(deformation).rest(&mut mesh);
         coincident::separate(&mut mesh);
         return Posed::Mesh(mesh, DVec3::ZERO);
     }
-    let Rest { mesh, deformation, is_skinned, origin: rest_origin } = &read.rest;
+    let Rest { mesh, deformation, is_skinned, origin: rest_origin, .. } = &read.rest;
     let pose_at = |origin: DVec3| {
         let joints = skin.map(|skin| skin.joints(*rest_origin, origin)).unwrap_or_default();
         Pose { weights: weights.to_vec(), joints }
     };
-    let near = pose_at(DVec3::ZERO);
-    let far = if *is_skinned { MeshOrigin::Near.second(&deformation.positions_at(&near)) } else { None };
-    let (pose, origin) = far.map_or((near, DVec3::ZERO), |origin| (pose_at(origin), origin));
-    match &read.faces {
-        Some(faces) => Posed::Pose(PosedMesh::new(deformation.clone(), faces.clone(), pose), origin),
-        None => {
-            let mut mesh = mesh.clone();
-            deformation.deform(&pose, &mut mesh);
-            // Faces that are in one place at rest are so in all poses. Others may meet for a moment.
-            if coincident::has_several(&mesh, &deformation.positions) {
-                coincident::separate(&mut mesh);
-            }
-            Posed::Mesh(mesh, origin)
-        }
+    let origin_of = |positions: &[Vec3]| MeshOrigin::Near.second(positions).filter(|_| *is_skinned);
+    if let Some(faces) = &read.faces {
+        let posed_at = |origin: DVec3| PosedMesh::new(deformation.clone(), faces.clone(), pose_at(origin));
+        let near = posed_at(DVec3::ZERO);
+        let far = origin_of(near.positions()).map(|origin| (posed_at(origin), origin));
+        let (posed, origin) = far.unwrap_or((near, DVec3::ZERO));
+        return Posed::Pose { posed, read, origin };
     }
+    let mut mesh = mesh.clone();
+    deformation.deform(&pose_at(DVec3::ZERO), &mut mesh);
+    let origin = origin_of(&mesh.positions).unwrap_or_default();
+    if origin != DVec3::ZERO {
+        deformation.deform(&pose_at(origin), &mut mesh);
+    }
+    // Faces that are in one place at rest are so in all poses. Others may meet for a moment.
+    if coincident::has_several(&mesh, &deformation.positions) {
+        coincident::separate(&mut mesh);
+    }
+    Posed::Mesh(mesh, origin)
 }
 
 impl ReadMesh {
