@@ -292,18 +292,14 @@ fn the_worlds_of_a_scene_file_are_those_of_its_scenes() {
     assert_eq!(told(&all).iter().map(|it| it.n_moved).collect::<Vec<_>>(), [2, 1]);
 }
 
-/// At a moment, the light has no direction. What has moved until then moves with the next moment.
+/// At a moment, the camera is where it looks. What has moved until then moves with the next moment.
 #[test]
 fn a_moment_that_cannot_be_shown_is_left_out() {
     let folder = tempfile::tempdir().unwrap();
-    for (name, bytes) in beside() {
-        fs::write(folder.path().join(name), bytes).unwrap();
-    }
-    let path = folder.path().join("turn.toml");
-    let light = "[[light]]\nkind = 'directional'\ndirection = [1, 0, 0]\nirradiance = [1, 1, 1]\n\
-                 keys = [{ time = 0, direction = [1, 0, 0] }, { time = 2, direction = [-1, 0, 0] }]\n";
-    let keys = "keys = [{ time = 0 }, { time = 1, translate = [0, 0, 3] }]";
-    fs::write(&path, mesh(keys) + light).unwrap();
+    let path = folder.path().join("through.toml");
+    let moved = mesh("keys = [{ time = 0, translate = [0, 0, 0] }, { time = 1, translate = [0, 0, 3] }]");
+    let through = "keys = [{ time = 0, eye = [0, 0, 30] }, { time = 2, eye = [0, 0, -30] }]\n";
+    fs::write(&path, moved.replacen("target = [0, 0, 0]\n", &format!("target = [0, 0, 0]\n{through}"), 1)).unwrap();
     let request = |at: f64| {
         let pictures = LoadRequest::pictures(PictureChoices::default());
         LoadRequest { scene: LoadOptions { at: Some(at), ..pictures.scene.clone() }, ..pictures }
@@ -315,10 +311,8 @@ fn a_moment_that_cannot_be_shown_is_left_out() {
     let (first, scene) = world_at(0.0);
     let mut animated = AnimatedWorld::new(&path, &request(0.0), scene, &first);
     let error = animated.at(1.0).unwrap_err().to_string();
-    assert!(error.contains("direction"), "{error}");
-    let found = animated.at(1.5).unwrap().0;
-    assert_eq!(found.scene().instances, world_at(1.5).0.scene().instances);
-    assert_eq!(found.scene().lights, world_at(1.5).0.scene().lights);
+    assert!(error.contains("camera"), "{error}");
+    assert_eq!(animated.at(1.5).unwrap().0.scene().instances, world_at(1.5).0.scene().instances);
 }
 
 /// The worlds of a file that plays are those of its scenes, whose instances are kept or not. `shares`: whether nothing
