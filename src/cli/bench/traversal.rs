@@ -65,7 +65,7 @@ fn variants(asked: &[Search], on_cpu: bool) -> Result<Vec<Search>, CliError> {
         return Ok(Search::all(on_cpu));
     }
     if asked.contains(&Search::Wide) && !on_cpu {
-        return Err(CliError::Usage(format!("--variants {}: only the CPU has it, with --cpu", Search::Wide)));
+        return CliError::refuse(format!("--variants {}: only the CPU has it, with --cpu", Search::Wide));
     }
     let mut variants = Vec::new();
     for variant in asked {
