@@ -23,6 +23,7 @@ use super::{
     print,
     progress::Progress,
     render::{report_validation, set_threads},
+    report::write_json,
 };
 
 /// Runs `kdray cast`: loads the scene, builds its structure, casts the rays batch by batch, writes and reports.
@@ -78,9 +79,7 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
         build_ms,
         cast_ms,
     };
-    if let Some(path) = &args.json {
-        output::write(path, &report.json())?;
-    }
+    write_json(args.json.as_ref(), &report)?;
     if !args.quiet {
         print(&report.text())?;
     }

@@ -20,7 +20,7 @@ use super::{
     print, print_line,
     progress::Progress,
     render::set_threads,
-    report::SCHEMA,
+    report::{SCHEMA, write_json},
     view_args::{Switch, ViewArgs},
 };
 
@@ -71,11 +71,8 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
         },
     )?;
     let tell = || {
-        if let Some(path) = &args.profile {
-            let profile =
-                Profile { schema: SCHEMA, scene: &scene_name, budget_ms: args.budget_ms, vsync, view: &report };
-            output::write(path, &json(&profile))?;
-        }
+        let profile = Profile { schema: SCHEMA, scene: &scene_name, budget_ms: args.budget_ms, vsync, view: &report };
+        write_json(args.profile.as_ref(), &profile)?;
         if let Some(choices) = report.choices.as_ref().filter(|_| !args.quiet) {
             print(&format!("{choices}\n"))?;
         }
@@ -183,12 +180,6 @@ struct Profile<'a> {
     vsync: bool,
     #[serde(flatten)]
     view: &'a ViewReport,
-}
-
-fn json(profile: &Profile) -> Vec<u8> {
-    let mut json = serde_json::to_vec_pretty(profile).expect("plain structs of numbers and words");
-    json.push(b'\n');
-    json
 }
 
 /// Refuses options that choose a part of the scene's file if there is none.

@@ -22,7 +22,14 @@ use self::{
     lighting::Lighting,
     text::{cut_table, shortened},
 };
-use super::{args::InspectArgs, error::CliError, print, print_raw, progress::Progress, report::SCHEMA, table::table};
+use super::{
+    args::InspectArgs,
+    error::CliError,
+    print, print_raw,
+    progress::Progress,
+    report::{SCHEMA, json},
+    table::table,
+};
 
 /// Loads the scene, builds its structure and describes both.
 pub fn run(args: &InspectArgs) -> Result<(), CliError> {
@@ -66,12 +73,7 @@ pub fn run(args: &InspectArgs) -> Result<(), CliError> {
         build_ms,
         scene: scene.name.clone(),
     };
-    if args.json {
-        let json = serde_json::to_string_pretty(&inspection).expect("plain structs of numbers and words");
-        print_raw(&format!("{json}\n"))
-    } else {
-        print(&inspection.text())
-    }
+    if args.json { print_raw(&json(&inspection)) } else { print(&inspection.text()) }
 }
 
 /// The description, as it is printed.
