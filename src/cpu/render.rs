@@ -149,11 +149,20 @@ impl CpuRenderer {
         }
     }
 
+    /// Returns a renderer of the same world by other options, with the same camera and batches.
+    #[cfg(feature = "view")]
+    pub fn with_options(&self, options: &RenderOptions) -> Self {
+        self.remade(&self.world, options)
+    }
+
+    fn remade(&self, world: &World, options: &RenderOptions) -> Self {
+        Self { camera: self.camera, ..Self::new(world, options, self.batching) }
+    }
+
     /// Draws another world from now on. The next sample is the first of a new picture.
     pub fn set_world(&mut self, world: &World) {
         if !world.shares_geometries(&self.world) {
-            let (options, batching, camera) = (self.options.clone(), self.batching, self.camera);
-            *self = Self { camera, ..Self::new(world, &options, batching) };
+            *self = self.remade(world, &self.options);
             return;
         }
         self.frame.set_light_of(&world.frame_constants(&self.options));
@@ -261,6 +270,11 @@ impl CpuRenderer {
         self.pixel_layers.resize(n_layers * n_pixels, [0.0; 4]);
         self.pixel_display.resize(n_pixels, [0; 4]);
         self.pixel_aovs.resize(if self.options.pixel_aovs { n_pixels } else { 0 }, PixelAovs::default());
+    }
+
+    #[cfg(feature = "view")]
+    pub fn camera(&self) -> &Camera {
+        &self.camera
     }
 
     /// Moves the camera. The next sample is the first of a new picture.
