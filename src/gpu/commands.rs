@@ -334,11 +334,7 @@ impl Commands<'_> {
         self.transition(
             ids,
             (vk::PipelineStageFlags2::COMPUTE_SHADER, vk::AccessFlags2::NONE, vk::ImageLayout::UNDEFINED),
-            (
-                vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT,
-                vk::AccessFlags2::COLOR_ATTACHMENT_WRITE,
-                vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
-            ),
+            DRAWN_COLOR,
         );
         let depth_access =
             vk::AccessFlags2::DEPTH_STENCIL_ATTACHMENT_READ | vk::AccessFlags2::DEPTH_STENCIL_ATTACHMENT_WRITE;
@@ -351,24 +347,13 @@ impl Commands<'_> {
 
     /// Makes drawn IDs visible to kernels.
     pub fn color_to_compute(&self, ids: &Arc<Target>) {
-        self.transition(
-            ids,
-            (
-                vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT,
-                vk::AccessFlags2::COLOR_ATTACHMENT_WRITE,
-                vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
-            ),
-            (vk::PipelineStageFlags2::COMPUTE_SHADER, vk::AccessFlags2::SHADER_STORAGE_READ, vk::ImageLayout::GENERAL),
-        );
+        self.transition(ids, DRAWN_COLOR, READ_BY_KERNELS);
     }
 
     /// Prepares an ID target for kernels and discards its contents.
     pub fn discard_for_compute(&self, ids: &Arc<Target>) {
-        self.transition(
-            ids,
-            (vk::PipelineStageFlags2::NONE, vk::AccessFlags2::NONE, vk::ImageLayout::UNDEFINED),
-            (vk::PipelineStageFlags2::COMPUTE_SHADER, vk::AccessFlags2::SHADER_STORAGE_READ, vk::ImageLayout::GENERAL),
-        );
+        let before = (vk::PipelineStageFlags2::NONE, vk::AccessFlags2::NONE, vk::ImageLayout::UNDEFINED);
+        self.transition(ids, before, READ_BY_KERNELS);
     }
 
     fn transition(&self, target: &Arc<Target>, from: LayoutState, to: LayoutState) {
@@ -510,3 +495,14 @@ pub(super) const COLOR_RANGE: vk::ImageSubresourceRange = vk::ImageSubresourceRa
 
 /// Stages, accesses and image layout on one side of a layout transition.
 type LayoutState = (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout);
+
+/// A colour image that rendering writes, or has written.
+pub(super) const DRAWN_COLOR: LayoutState = (
+    vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT,
+    vk::AccessFlags2::COLOR_ATTACHMENT_WRITE,
+    vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
+);
+
+/// An image that kernels read.
+const READ_BY_KERNELS: LayoutState =
+    (vk::PipelineStageFlags2::COMPUTE_SHADER, vk::AccessFlags2::SHADER_STORAGE_READ, vk::ImageLayout::GENERAL);

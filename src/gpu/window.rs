@@ -3,7 +3,11 @@
 use ash::vk;
 use bytemuck::Pod;
 
-use super::{BindingSet, Commands, RasterPipeline, WindowImage, commands::COLOR_RANGE, swapchain::SwapchainImage};
+use super::{
+    BindingSet, Commands, RasterPipeline, WindowImage,
+    commands::{COLOR_RANGE, DRAWN_COLOR},
+    swapchain::SwapchainImage,
+};
 
 impl Commands<'_> {
     /// Prepares the image for drawing and begins rendering to it, which clears it to black.
@@ -29,11 +33,8 @@ impl Commands<'_> {
     pub(super) fn end_window(&self, image: &SwapchainImage) {
         // SAFETY: `begin_window` has begun the rendering.
         unsafe { self.device.raw.cmd_end_rendering(self.raw) };
-        let output = vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT;
-        let written = vk::AccessFlags2::COLOR_ATTACHMENT_WRITE;
-        let drawn = (output, written, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL);
-        let shown = (output, vk::AccessFlags2::NONE, vk::ImageLayout::PRESENT_SRC_KHR);
-        self.transition_image(image.raw, COLOR_RANGE, drawn, shown);
+        let shown = (DRAWN_COLOR.0, vk::AccessFlags2::NONE, vk::ImageLayout::PRESENT_SRC_KHR);
+        self.transition_image(image.raw, COLOR_RANGE, DRAWN_COLOR, shown);
     }
 
     /// Draws one triangle that covers the window, as a pass of the pipeline's name.
