@@ -2,7 +2,7 @@
 
 use kdray::{
     bench::motion::{Phase, Report, measure, moments},
-    engine::{AnimatedWorld, Engine, Loaded, Opened},
+    engine::{AnimatedWorld, Engine, Loaded},
     frame::RenderOptions,
     gpu::{ContextOptions, Device},
 };
@@ -25,8 +25,7 @@ pub fn run(args: &MotionArgs) -> Result<(), CliError> {
     let mut request = args.load.pictures(&args.picture, &args.look, Default::default());
     let first = request.scene.at;
     request.scene.at = first.or(Some(0.0));
-    let (opened, _) = progress.stage(&format!("loading {scene}"), || Opened::read(&args.scene, &request));
-    let opened = opened?;
+    let opened = progress.read(&args.scene, &request)?;
     if !args.load.plays(&opened.scene.animations) {
         return CliError::refuse(format!("{scene}: nothing moves, so there are no frames to measure"));
     }

@@ -9,7 +9,7 @@ use kdray::{
     accel::Statistics,
     buffers::{PathQueue, Pixels},
     engine::{
-        Builder, LoadError, Loaded, Opened, Work,
+        Builder, LoadError, Loaded, Work,
         choices::{BuildPolicy, Processor, Request},
     },
     layout::{LIGHT_DIRECTIONAL, LIGHT_SPOT, Light},
@@ -34,10 +34,7 @@ use super::{
 /// Loads the scene, builds its structure and describes both.
 pub fn run(args: &InspectArgs) -> Result<(), CliError> {
     let progress = Progress::new(false, 2);
-    let request = args.load.scene(Default::default());
-    let (opened, _) =
-        progress.stage(&format!("loading {}", args.scene.display()), || Opened::read(&args.scene, &request));
-    let opened = opened?;
+    let opened = progress.read(&args.scene, &args.load.scene(Default::default()))?;
     let scene = &opened.scene;
     let contents = Contents::from(scene);
     let lighting = Lighting::from(scene);
