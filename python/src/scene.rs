@@ -1,7 +1,7 @@
 //! The class `Core`: a scene behind a lock.
 
 use std::{
-    mem,
+    mem, ops,
     sync::{Mutex, MutexGuard, PoisonError},
     thread::{self, ThreadId},
 };
@@ -102,9 +102,9 @@ impl<'a> Rows<'a> {
     }
 
     /// Returns the rays from `first` on, `n` at most.
-    fn rays(&self, first: usize, n: usize) -> Vec<Ray> {
-        let mut rays = vec![Ray::zeroed(); n.min(self.len() - first)];
-        self.write(first, &mut rays);
+    fn rays(&self, range: ops::Range<usize>) -> Vec<Ray> {
+        let mut rays = vec![Ray::zeroed(); range.len()];
+        self.write(range.start, &mut rays);
         rays
     }
 }
@@ -172,38 +172,32 @@ impl Core {
         let pool = pool(n_threads)?;
         self.with(py, |state| pool.install(|| f(state)))
     }
-}
 
-/// The queries of a call.
-struct Queries<'a> {
-    n: usize,
-    /// How many are made between two looks at Ctrl-C.
-    at_once: usize,
-    mask: u8,
-    pool: &'a rayon::ThreadPool,
-}
-
-/// Sees to what casts the queries, and calls `chunk` on the pool with the first of each `at_once` of them. In between,
-/// the caller's own thread lets Python raise KeyboardInterrupt.
-fn in_chunks(
-    state: &mut State,
-    Queries { n, at_once, mask, pool }: Queries,
-    mut chunk: impl FnMut(usize, (&mut Caster<'static>, Placed)) -> PyResult<()> + Send,
-) -> PyResult<()> {
-    if n > 0 {
-        watched(pool, |progress| state.prepare(n, progress), |_| Ok(()))?;
+    /// Sees to what casts `n` queries, and calls `chunk` on a pool of threads for each `at_once` of them: the first
+    /// number is for GPUs, the second for others. In between, the caller's own thread lets Python raise
+    /// KeyboardInterrupt.
+    fn in_chunks(
+        &self,
+        py: Python,
+        (n, at_once): (usize, [usize; 2]),
+        (mask, n_threads): (u8, usize),
+        mut chunk: impl FnMut(ops::Range<usize>, (&mut Caster<'static>, Placed)) -> PyResult<()> + Send,
+    ) -> PyResult<()> {
+        let pool = pool(n_threads)?;
+        self.with(py, |state| {
+            if n > 0 {
+                watched(&pool, |progress| state.prepare(n, progress), |_| Ok(()))?;
+            }
+            let at_once = at_once[usize::from(!state.has_gpu())];
+            for first in (0..n).step_by(at_once) {
+                if first > 0 {
+                    Python::attach(|py| py.check_signals())?;
+                }
+                pool.install(|| chunk(first..n.min(first + at_once), state.caster(n, mask)?))?;
+            }
+            Ok(())
+        })
     }
-    for first in (0..n).step_by(at_once) {
-        if first > 0 {
-            Python::attach(|py| py.check_signals())?;
-        }
-        pool.install(|| chunk(first, state.caster(n, mask)?))?;
-    }
-    Ok(())
-}
-
-fn of_processor([gpu, others]: [usize; 2], state: &State) -> usize {
-    if state.has_gpu() { gpu } else { others }
 }
 
 #[pymethods]
@@ -331,23 +325,15 @@ impl Core {
     ) -> PyResult<()> {
         let rows = Rows::new(&rays, &range)?;
         let mut columns = columns_of(&mut outputs)?;
-        let pool = pool(n_threads)?;
-        self.with(py, |state| {
-            let at_once = of_processor(RAYS_AT_ONCE, state);
-            in_chunks(state, Queries { n: rows.len(), at_once, mask, pool: &pool }, |first, (caster, placed)| {
-                let n = at_once.min(rows.len() - first);
-                let chunks: Vec<_> = columns
-                    .split_off_chunks(n, RAYS_PER_CHUNK)
-                    .into_iter()
-                    .map(|chunk| Mutex::new(Some(chunk)))
-                    .collect();
-                let take = |begin: usize, hits: &[Hit]| {
-                    let chunk = locked(&chunks[begin / RAYS_PER_CHUNK]).take().expect("each chunk is taken once");
-                    chunk.write(placed, hits);
-                };
-                let make = |begin: usize, rays: &mut [Ray]| rows.write(first + begin, rays);
-                caster.cast_stream(n, Query::Closest, make, take).map_err(failed)
-            })
+        self.in_chunks(py, (rows.len(), RAYS_AT_ONCE), (mask, n_threads), |range, (caster, placed)| {
+            let chunks = columns.split_off_chunks(range.len(), RAYS_PER_CHUNK);
+            let chunks: Vec<_> = chunks.into_iter().map(|chunk| Mutex::new(Some(chunk))).collect();
+            let take = |begin: usize, hits: &[Hit]| {
+                let chunk = locked(&chunks[begin / RAYS_PER_CHUNK]).take().expect("each chunk is taken once");
+                chunk.write(placed, hits);
+            };
+            let make = |begin: usize, rays: &mut [Ray]| rows.write(range.start + begin, rays);
+            caster.cast_stream(range.len(), Query::Closest, make, take).map_err(failed)
         })
     }
 
@@ -363,19 +349,14 @@ impl Core {
     ) -> PyResult<()> {
         let rows = Rows::new(&rays, &range)?;
         let output = output.as_slice_mut()?;
-        let pool = pool(n_threads)?;
-        self.with(py, |state| {
-            let at_once = of_processor(RAYS_AT_ONCE, state);
-            in_chunks(state, Queries { n: rows.len(), at_once, mask, pool: &pool }, |first, (caster, _)| {
-                let n = at_once.min(rows.len() - first);
-                let chunks: Vec<_> = output[first..][..n].chunks_mut(RAYS_PER_CHUNK).map(Mutex::new).collect();
-                let take = |begin: usize, hits: &[Hit]| {
-                    let mut chunk = locked(&chunks[begin / RAYS_PER_CHUNK]);
-                    chunk.iter_mut().zip(hits).for_each(|(out, hit)| *out = hit.triangle_ix != NO_TRIANGLE);
-                };
-                let make = |begin: usize, rays: &mut [Ray]| rows.write(first + begin, rays);
-                caster.cast_stream(n, Query::Any, make, take).map_err(failed)
-            })
+        self.in_chunks(py, (rows.len(), RAYS_AT_ONCE), (mask, n_threads), |range, (caster, _)| {
+            let chunks: Vec<_> = output[range.clone()].chunks_mut(RAYS_PER_CHUNK).map(Mutex::new).collect();
+            let take = |begin: usize, hits: &[Hit]| {
+                let mut chunk = locked(&chunks[begin / RAYS_PER_CHUNK]);
+                chunk.iter_mut().zip(hits).for_each(|(out, hit)| *out = hit.triangle_ix != NO_TRIANGLE);
+            };
+            let make = |begin: usize, rays: &mut [Ray]| rows.write(range.start + begin, rays);
+            caster.cast_stream(range.len(), Query::Any, make, take).map_err(failed)
         })
     }
 
@@ -391,15 +372,10 @@ impl Core {
     ) -> PyResult<()> {
         let rows = Rows::new(&rays, &range)?;
         let output = output.as_slice_mut()?;
-        let pool = pool(n_threads)?;
-        self.with(py, |state| {
-            let at_once = of_processor(QUERIES_AT_ONCE, state);
-            in_chunks(state, Queries { n: rows.len(), at_once, mask, pool: &pool }, |first, (caster, _)| {
-                let rays = rows.rays(first, at_once);
-                let counts = caster.count_hits(&rays).map_err(failed)?;
-                output[first..].iter_mut().zip(&counts).for_each(|(out, count)| *out = *count as i32);
-                Ok(())
-            })
+        self.in_chunks(py, (rows.len(), QUERIES_AT_ONCE), (mask, n_threads), |range, (caster, _)| {
+            let counts = caster.count_hits(&rows.rays(range.clone())).map_err(failed)?;
+            output[range].iter_mut().zip(&counts).for_each(|(out, count)| *out = *count as i32);
+            Ok(())
         })
     }
 
@@ -414,29 +390,24 @@ impl Core {
         n_threads: usize,
     ) -> PyResult<Lists<'py>> {
         let rows = Rows::new(&rays, &range)?;
-        let pool = pool(n_threads)?;
         let (mut splits, mut ray_ids, mut t_hit) = (vec![0_u32], Vec::new(), Vec::new());
         let (mut geometry_ids, mut primitive_ids, mut uvs) = (Vec::new(), Vec::new(), Vec::new());
-        self.with(py, |state| {
-            let at_once = of_processor(QUERIES_AT_ONCE, state);
-            in_chunks(state, Queries { n: rows.len(), at_once, mask, pool: &pool }, |first, (caster, placed)| {
-                let rays = rows.rays(first, at_once);
-                let all = caster.all_hits(&rays, most_per_ray).map_err(failed)?;
-                let before = t_hit.len() as u64;
-                if before + all.hits.len() as u64 > u64::from(u32::MAX) {
-                    return Err(PyRuntimeError::new_err("rays: there are more than 2^32 - 1 hits"));
-                }
-                splits.extend(all.ray_splits[1..].iter().map(|end| (before + end) as u32));
-                for (ix, ends) in all.ray_splits.windows(2).enumerate() {
-                    ray_ids.extend((ends[0]..ends[1]).map(|_| (first + ix) as u32));
-                }
-                let found: Vec<_> = all.hits.par_iter().with_min_len(1024).map(|hit| Found::of(placed, hit)).collect();
-                t_hit.extend(all.hits.iter().map(|hit| hit.t));
-                geometry_ids.extend(found.iter().map(|it| it.geometry_id));
-                primitive_ids.extend(found.iter().map(|it| it.primitive_id));
-                uvs.extend(found.iter().flat_map(|it| it.uv));
-                Ok(())
-            })
+        self.in_chunks(py, (rows.len(), QUERIES_AT_ONCE), (mask, n_threads), |range, (caster, placed)| {
+            let all = caster.all_hits(&rows.rays(range.clone()), most_per_ray).map_err(failed)?;
+            let before = t_hit.len() as u64;
+            if before + all.hits.len() as u64 > u64::from(u32::MAX) {
+                return Err(PyRuntimeError::new_err("rays: there are more than 2^32 - 1 hits"));
+            }
+            splits.extend(all.ray_splits[1..].iter().map(|end| (before + end) as u32));
+            for (ix, ends) in range.zip(all.ray_splits.windows(2)) {
+                ray_ids.extend((ends[0]..ends[1]).map(|_| ix as u32));
+            }
+            let found: Vec<_> = all.hits.par_iter().with_min_len(1024).map(|hit| Found::of(placed, hit)).collect();
+            t_hit.extend(all.hits.iter().map(|hit| hit.t));
+            geometry_ids.extend(found.iter().map(|it| it.geometry_id));
+            primitive_ids.extend(found.iter().map(|it| it.primitive_id));
+            uvs.extend(found.iter().flat_map(|it| it.uv));
+            Ok(())
         })?;
         Ok((
             splits.into_pyarray(py),
@@ -459,17 +430,12 @@ impl Core {
     ) -> PyResult<()> {
         let points: &[[f32; 3]] = cast_slice(points.as_slice()?);
         let mut columns = columns_of(&mut outputs)?;
-        let pool = pool(n_threads)?;
-        self.with(py, |state| {
-            let at_once = of_processor(QUERIES_AT_ONCE, state);
-            in_chunks(state, Queries { n: points.len(), at_once, mask, pool: &pool }, |first, (caster, placed)| {
-                let end = points.len().min(first + at_once);
-                let query = |p: &[f32; 3]| QueryPoint { position: Vec3::from(*p), t_max: f32::INFINITY };
-                let queries: Vec<_> = points[first..end].par_iter().with_min_len(1024).map(query).collect();
-                let hits = caster.closest_points(&queries, 1).map_err(failed)?.hits;
-                columns.split_off(hits.len()).write(placed, &hits);
-                Ok(())
-            })
+        self.in_chunks(py, (points.len(), QUERIES_AT_ONCE), (mask, n_threads), |range, (caster, placed)| {
+            let query = |p: &[f32; 3]| QueryPoint { position: Vec3::from(*p), t_max: f32::INFINITY };
+            let queries: Vec<_> = points[range].par_iter().with_min_len(1024).map(query).collect();
+            let hits = caster.closest_points(&queries, 1).map_err(failed)?.hits;
+            columns.split_off(hits.len()).write(placed, &hits);
+            Ok(())
         })
     }
 }

@@ -9,14 +9,10 @@ use std::{
 use clap::{Parser, Subcommand, value_parser};
 use kdray::{
     accel::{AccelKind, Query, kdtree::Traversal},
-    engine::{
-        NoiseGoal,
-        choices::{BuildPolicy, Request},
-    },
+    engine::{NoiseGoal, choices::Request},
     frame::{Aov, Crop, Denoise, Integrator, RenderOptions, SampleRange},
     gpu::DeviceSelector,
     scene::{Scene, packed_path},
-    world::instances::Instancing,
 };
 
 #[cfg(feature = "bench")]
@@ -31,11 +27,7 @@ use super::{
     load_args::LoadArgs,
     look_args::LookArgs,
     openjd::ProgressKind,
-    or_auto::OrAuto,
-    picture_args::{
-        PictureArgs, accel_help, accel_long_help, build_help, build_long_help, check_accel, check_build,
-        instances_help, listed, traversal_help, traversal_long_help, with_words,
-    },
+    picture_args::{PictureArgs, StructureArgs, accel_help, accel_long_help, listed, with_words},
     render::{Seed, Shutter},
 };
 
@@ -234,19 +226,8 @@ pub struct CastArgs {
     #[arg(long, value_name = "K", num_args = 0..=1, conflicts_with_all = ["any", "count", "repeat"])]
     #[arg(value_parser = value_parser!(u32).range(1..))]
     pub all: Option<Option<u32>>,
-    /// Whether a mesh that occurs several times is stored once: auto, flatten or keep
-    #[arg(long, value_name = "KIND", long_help = instances_help(), default_value_t)]
-    pub instances: Instancing,
-    #[arg(long, value_name = "KIND", help = accel_help(), long_help = accel_long_help(), default_value_t)]
-    #[arg(hide_default_value = true)]
-    pub accel: AccelKind,
-    #[arg(long, value_name = "ALGORITHM")]
-    #[arg(help = traversal_help(), long_help = traversal_long_help())]
-    #[arg(default_value = "auto", hide_default_value = true)]
-    pub traversal: OrAuto<Traversal>,
-    #[arg(long, value_name = "TREE", default_value_t = BuildPolicy::Auto)]
-    #[arg(help = build_help(), long_help = build_long_help(), hide_default_value = true)]
-    pub build: BuildPolicy,
+    #[command(flatten)]
+    pub structure: StructureArgs,
     /// Number of times to cast the rays, 1 to 10000; the report shows the minimum, median and maximum time
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u16).range(1..=10_000))]
     pub repeat: u16,
@@ -378,16 +359,13 @@ impl RenderArgs {
 
     /// Refuses arguments that contradict each other.
     pub fn check(&self) -> Result<(), CliError> {
-        self.picture.check()?;
-        check_build(self.picture.build, self.cpu)?;
+        self.picture.check(self.cpu)?;
         if self.trace.is_some() && (self.spp.is_some_and(|n| n > 1) || self.is_film()) {
-            return Err(CliError::Usage(
-                "--trace cannot be combined with --spp or with films: it shows a single sample".into(),
-            ));
+            return CliError::refuse("--trace cannot be combined with --spp or with films: it shows a single sample");
         }
         let is_exr = |path: &PathBuf| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("exr"));
         if self.samples.is_some() && !self.output.as_ref().is_some_and(is_exr) {
-            return Err(CliError::Usage("--samples needs --output FILE.exr: `kdray merge` joins .exr files".into()));
+            return CliError::refuse("--samples needs --output FILE.exr: `kdray merge` joins .exr files");
         }
         Ok(())
     }
@@ -405,7 +383,7 @@ impl RenderArgs {
             (self.trace.is_some(), "--trace"),
         ];
         match refused.iter().find(|(is_given, _)| *is_given) {
-            Some((_, name)) => Err(CliError::Usage(format!("{name} is for a single scene, without --list"))),
+            Some((_, name)) => CliError::refuse(format!("{name} is for a single scene, without --list")),
             None => Ok(()),
         }
     }
@@ -425,7 +403,7 @@ impl RenderArgs {
     pub fn check_devices(&self, n_devices: usize) -> Result<(), CliError> {
         let refused = [(self.time.is_some(), "--time"), (self.trace.is_some(), "--trace")];
         match refused.iter().find(|(is_given, _)| *is_given && n_devices > 1) {
-            Some((_, name)) => Err(CliError::Usage(format!("{name} needs a single device, and there are {n_devices}"))),
+            Some((_, name)) => CliError::refuse(format!("{name} needs a single device, and there are {n_devices}")),
             None => Ok(()),
         }
     }
@@ -444,17 +422,16 @@ impl RenderArgs {
     /// which nothing is decided.
     pub fn noise_goal(&self, scene: &Scene, options: &RenderOptions) -> Result<Option<NoiseGoal>, CliError> {
         let Some(noise) = self.noise else { return Ok(None) };
-        let refused = |what: &str| Err(CliError::Usage(what.to_owned()));
         if options.integrator != Integrator::Path {
-            return refused("--noise needs --integrator path: other pictures have no noise");
+            return CliError::refuse("--noise needs --integrator path: other pictures have no noise");
         }
         if options.denoise != Denoise::Off {
-            return refused("--noise needs --denoise off: tiles that are drawn apart cannot be filtered");
+            return CliError::refuse("--noise needs --denoise off: tiles that are drawn apart cannot be filtered");
         }
         let most_samples = self.samples(scene);
         if !most_samples.is_power_of_two() || most_samples < NoiseGoal::FEWEST {
             let fewest = NoiseGoal::FEWEST;
-            return refused(&format!(
+            return CliError::refuse(format!(
                 "--noise decides at powers of two from {fewest} on, and --spp {most_samples} is none of them"
             ));
         }
@@ -466,25 +443,23 @@ impl RenderArgs {
     pub fn some_samples(&self, scene: &Scene, options: &RenderOptions) -> Result<Option<SampleRange>, CliError> {
         let Some(range) = self.samples else { return Ok(None) };
         if options.integrator != Integrator::Path {
-            return Err(CliError::Usage(
-                "--samples needs --integrator path: only the path tracer's samples can be joined".into(),
-            ));
+            return CliError::refuse("--samples needs --integrator path: only the path tracer's samples can be joined");
         }
         if options.denoise != Denoise::Off {
-            return Err(CliError::Usage(
-                "--samples needs --denoise off: the noise filter would mix pixels before all samples are joined".into(),
-            ));
+            return CliError::refuse(
+                "--samples needs --denoise off: the noise filter would mix pixels before all samples are joined",
+            );
         }
         let n_samples = self.samples(scene);
         if range.end > n_samples {
-            return Err(CliError::Usage(format!(
+            return CliError::refuse(format!(
                 "--samples {range} reaches beyond the picture's {n_samples} samples, whose number --spp sets"
-            )));
+            ));
         }
         if !range.is_part_of(n_samples) {
-            return Err(CliError::Usage(format!(
+            return CliError::refuse(format!(
                 "--samples {range}: both numbers must be multiples of 16, or the second one the picture's {n_samples}"
-            )));
+            ));
         }
         Ok((range != SampleRange::whole(n_samples)).then_some(range))
     }
@@ -493,10 +468,10 @@ impl RenderArgs {
     pub fn refuse_to_move(&self, scene: &Path) -> Result<(), CliError> {
         let (scene, needed) = (scene.display(), "--path FILE or --turntable N");
         match (self.is_film(), self.shutter) {
-            (true, _) => Err(CliError::Usage(format!("{scene}: nothing moves, so --frames needs {needed}"))),
-            (false, Some(_)) => Err(CliError::Usage(format!(
+            (true, _) => CliError::refuse(format!("{scene}: nothing moves, so --frames needs {needed}")),
+            (false, Some(_)) => CliError::refuse(format!(
                 "{scene}: nothing moves, so --shutter needs animations, or --frames with {needed}"
-            ))),
+            )),
             (false, None) => Ok(()),
         }
     }
@@ -508,7 +483,7 @@ impl RenderArgs {
             Some(_) if options.noise_filter() != Denoise::Off => "--denoise off: the noise filter would blur edges",
             _ => return Ok(()),
         };
-        Err(CliError::Usage(format!("--shutter needs {what}")))
+        CliError::refuse(format!("--shutter needs {what}"))
     }
 
     /// Sets the options of the command that are not those of every picture. Refuses a crop beyond the picture.
@@ -519,19 +494,15 @@ impl RenderArgs {
             None => self.crop,
         };
         if let Some(crop) = crop.filter(|crop| crop.x1 > width || crop.y1 > height) {
-            return Err(CliError::Usage(format!(
-                "--crop {crop} reaches beyond the picture of {width}x{height} pixels"
-            )));
+            return CliError::refuse(format!("--crop {crop} reaches beyond the picture of {width}x{height} pixels"));
         }
         if options.denoise == Denoise::Edge && options.integrator != Integrator::Path {
-            return Err(CliError::Usage(
-                "--denoise edge needs --integrator path: it removes the noise of random samples".into(),
-            ));
+            return CliError::refuse("--denoise edge needs --integrator path: it removes the noise of random samples");
         }
         if let Some(aov) = self.aov.iter().find(|aov| aov.is_of_paths() && options.integrator != Integrator::Path) {
             let reason =
                 if aov.is_of_light() { "it is a layer of the light of paths" } else { "it is about random samples" };
-            return Err(CliError::Usage(format!("--aov {aov} needs --integrator path: {reason}")));
+            return CliError::refuse(format!("--aov {aov} needs --integrator path: {reason}"));
         }
         // Passes are timed only if some output shows the times.
         let profile = !self.quiet || self.profile.is_some() || self.trace.is_some();
@@ -546,11 +517,9 @@ impl RenderArgs {
 impl CastArgs {
     /// Refuses arguments that contradict each other.
     pub fn check(&self) -> Result<(), CliError> {
-        check_accel(self.accel, self.traversal, self.build)?;
-        check_build(self.build, self.cpu)?;
-        if self.closest && self.accel != AccelKind::KdTree {
-            let reason = "--closest searches kd-trees: use --accel kdtree";
-            return Err(CliError::Usage(reason.to_owned()));
+        self.structure.check(self.cpu)?;
+        if self.closest && self.structure.accel != AccelKind::KdTree {
+            return CliError::refuse("--closest searches kd-trees: use --accel kdtree");
         }
         require_ending(&self.output, "npz", "a file of hits")
     }
@@ -558,13 +527,8 @@ impl CastArgs {
     /// Returns the user's choice of structure, build and traversal. The search for closest points keeps what is pending
     /// as the traversal `stack` does.
     pub fn request(&self) -> Request {
-        Request {
-            accel: self.accel,
-            build: self.build,
-            traversal: if self.closest { Some(Traversal::Stack) } else { self.traversal.pinned() },
-            primary: None,
-            instances: self.instances,
-        }
+        let asked = self.structure.request();
+        if self.closest { Request { traversal: Some(Traversal::Stack), ..asked } } else { asked }
     }
 
     /// Returns what is cast, in the plural.
@@ -680,10 +644,7 @@ impl Tile {
     fn crop(self, width: u32, height: u32) -> Result<Crop, CliError> {
         let Self { ix, n } = self;
         if n > height {
-            return Err(CliError::Usage(format!(
-                "--tile {}/{n}: the picture has {height} rows, fewer than tiles",
-                ix + 1
-            )));
+            return CliError::refuse(format!("--tile {}/{n}: the picture has {height} rows, fewer than tiles", ix + 1));
         }
         let row = |ix: u32| (u64::from(ix) * u64::from(height) / u64::from(n)) as u32;
         Ok(Crop { x0: 0, y0: row(ix), x1: width, y1: row(ix + 1) })

@@ -8,7 +8,7 @@ use kdray::{
     cast::{
         CastResult, Hit, HitListWriter, HitWriter, NO_TRIANGLE, PointReader, RAYS_PER_BATCH, RayReader, count_invalid,
     },
-    engine::{Caster, Engine, Loaded, Opened, Work, choices::Choices},
+    engine::{Caster, Engine, Loaded, Work, choices::Choices},
     gpu::ContextOptions,
     output,
     world::FlatScene,
@@ -23,6 +23,7 @@ use super::{
     print,
     progress::Progress,
     render::{report_validation, set_threads},
+    report::write_json,
 };
 
 /// Runs `kdray cast`: loads the scene, builds its structure, casts the rays batch by batch, writes and reports.
@@ -37,14 +38,12 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
 
     let queries = Queries::open(args)?;
     let progress = Progress::new(args.quiet, 3);
-    let loading = format!("loading {}", args.mesh.display());
-    let (opened, load_ms) = progress.stage(&loading, || Opened::read(&args.mesh, &args.load.rays()));
-    let opened = opened?;
+    let opened = progress.read(&args.mesh, &args.load.rays())?;
     let options = ContextOptions::new(args.device.clone(), args.validate);
     let device = if args.cpu { None } else { Some(open_device(&options, &progress)?) };
 
     let engine = device.clone().map_or_else(Engine::on_cpu, Engine::on_device).with_request(args.request());
-    let n_triangles = opened.scene.n_triangles();
+    let (n_triangles, load_ms) = (opened.scene.n_triangles(), opened.load_ms);
     let building = engine.builder().describe(&opened.scene);
     let (built, _) = progress.stage(&building, || engine.build(opened, &Work::Rays(queries.n())));
     let (Loaded { world, accel, build_ms, .. }, methods) = built?;
@@ -78,9 +77,7 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
         build_ms,
         cast_ms,
     };
-    if let Some(path) = &args.json {
-        output::write(path, &report.json())?;
-    }
+    write_json(args.json.as_ref(), &report)?;
     if !args.quiet {
         print(&report.text())?;
     }

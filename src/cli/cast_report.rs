@@ -95,12 +95,6 @@ impl CastReport {
             self.hits.display()
         )
     }
-
-    pub fn json(&self) -> Vec<u8> {
-        let mut json = serde_json::to_vec_pretty(self).expect("plain structs of numbers and words");
-        json.push(b'\n');
-        json
-    }
 }
 
 #[cfg(test)]

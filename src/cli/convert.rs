@@ -21,7 +21,7 @@ pub fn run(args: &ConvertArgs) -> Result<(), CliError> {
     roles.write("OUT", &args.output)?;
     // A link that leads nowhere exists, too.
     if args.output.symlink_metadata().is_ok() && !args.force {
-        return Err(CliError::Usage(format!("`{path}` exists: --force replaces it")));
+        return CliError::refuse(format!("`{path}` exists: --force replaces it"));
     }
     output::check(&args.output)?;
     let options = LoadOptions { look: args.look.look(), ..args.load.options_of_pictures() };

@@ -55,6 +55,11 @@ pub enum CliError {
 }
 
 impl CliError {
+    /// Refuses arguments. `what`: a line that names them and says why.
+    pub fn refuse<T>(what: impl Into<String>) -> Result<T, Self> {
+        Err(Self::Usage(what.into()))
+    }
+
     /// Returns the exit code: 2 for usage; 3 for scene, rays or parts, also if they need more memory or time than there
     /// is; 4 for the device; 5 for output.
     pub fn exit_code(&self) -> u8 {

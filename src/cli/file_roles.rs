@@ -19,7 +19,7 @@ pub fn require_ending(path: &Path, ending: &str, what: &str) -> Result<(), CliEr
         true => Ok(()),
         false => {
             let path = path.display();
-            Err(CliError::Usage(format!("cannot write `{path}`: the name of {what} must end in .{ending}")))
+            CliError::refuse(format!("cannot write `{path}`: the name of {what} must end in .{ending}"))
         }
     }
 }
@@ -68,10 +68,10 @@ impl FileRoles {
                 Ok(())
             }
             Some(Role { name: other, is_read: false }) => {
-                Err(CliError::Usage(format!("{other} and {name} name the same file, `{}`", path.display())))
+                CliError::refuse(format!("{other} and {name} name the same file, `{}`", path.display()))
             }
             Some(Role { name: other, is_read: true }) => {
-                Err(CliError::Usage(format!("{name} would overwrite `{}`, which is read as {other}", path.display())))
+                CliError::refuse(format!("{name} would overwrite `{}`, which is read as {other}", path.display()))
             }
         }
     }

@@ -55,22 +55,52 @@ pub struct PictureArgs {
     /// that of the camera's target]
     #[arg(long, value_name = "D", value_parser = positive, requires = "aperture")]
     pub focus: Option<f32>,
+    #[command(flatten)]
+    pub structure: StructureArgs,
+    #[arg(long, value_name = "METHOD", default_value = "auto", hide_default_value = true)]
+    #[arg(help = with_words(PRIMARY, Some("auto"), &format!("{}, auto", Primary::words())))]
+    #[arg(long_help = primary_long_help())]
+    pub primary: OrAuto<Primary>,
+}
+
+/// Arguments that choose the acceleration structure, and how rays go through it.
+#[derive(Clone, clap::Args)]
+pub struct StructureArgs {
     /// Whether a mesh that occurs several times is stored once: auto, flatten or keep
     #[arg(long, value_name = "KIND", long_help = instances_help(), default_value_t)]
     pub instances: Instancing,
     #[arg(long, value_name = "KIND", help = accel_help(), long_help = accel_long_help(), default_value_t)]
     #[arg(hide_default_value = true)]
     pub accel: AccelKind,
-    #[arg(long, value_name = "ALGORITHM")]
-    #[arg(help = traversal_help(), long_help = traversal_long_help())]
-    #[arg(default_value = "auto", hide_default_value = true)]
+    #[arg(long, value_name = "ALGORITHM", default_value = "auto", hide_default_value = true)]
+    #[arg(help = with_words(TRAVERSAL, Some("auto"), &format!("{}, auto", Traversal::words())))]
+    #[arg(long_help = traversal_long_help())]
     pub traversal: OrAuto<Traversal>,
-    #[arg(long, value_name = "METHOD", help = primary_help(), long_help = primary_long_help())]
-    #[arg(default_value = "auto", hide_default_value = true)]
-    pub primary: OrAuto<Primary>,
     #[arg(long, value_name = "TREE", default_value_t = BuildPolicy::Auto, hide_default_value = true)]
-    #[arg(help = build_help(), long_help = build_long_help())]
+    #[arg(help = with_words(BUILD, Some("auto"), &BuildPolicy::words()))]
+    #[arg(long_help = listed(BUILD, "auto", &BuildPolicy::descriptions()))]
     pub build: BuildPolicy,
+}
+
+impl StructureArgs {
+    /// Refuses arguments for kd-trees if the structure is a grid, and a tree of devices if there is none.
+    pub fn check(&self, on_cpu: bool) -> Result<(), CliError> {
+        let &Self { accel, build, .. } = self;
+        check_traversal(accel, self.traversal.pinned())?;
+        if accel != AccelKind::KdTree && build != BuildPolicy::Auto {
+            return CliError::refuse(format!("--build chooses a kd-tree: with --accel {accel}, a grid is built"));
+        }
+        if on_cpu && build == BuildPolicy::Gpu {
+            return CliError::refuse("--build gpu lets the device build the kd-tree: with --cpu, there is none");
+        }
+        Ok(())
+    }
+
+    /// Returns the user's choice of structure, build and traversal.
+    pub fn request(&self) -> Request {
+        let &Self { instances, accel, build, traversal } = self;
+        Request { accel, build, traversal: traversal.pinned(), primary: None, instances }
+    }
 }
 
 /// Returns a short help text: the option's description `what`, the words that it accepts, and its default.
@@ -97,7 +127,7 @@ const PRIMARY: &str = "How primary rays find their triangles";
 const BUILD: &str = "Which kd-tree is built";
 
 /// Returns the help text of `--instances` with all words explained.
-pub fn instances_help() -> String {
+fn instances_help() -> String {
     format!("Whether a mesh that occurs several times is stored once:\n{}", Instancing::descriptions())
 }
 
@@ -111,11 +141,6 @@ pub fn accel_long_help() -> String {
     listed(ACCEL, "kdtree", &AccelKind::descriptions())
 }
 
-/// Returns the help text of `--primary`.
-fn primary_help() -> String {
-    with_words(PRIMARY, Some("auto"), &format!("{}, auto", Primary::words()))
-}
-
 /// Returns the help text of `--primary` with all words explained.
 fn primary_long_help() -> String {
     let auto = "- auto: what suits the device, the scene and the picture's size, or what a measurement has found to be \
@@ -123,43 +148,19 @@ fn primary_long_help() -> String {
     listed(PRIMARY, "auto", &format!("{}\n{auto}", Primary::descriptions()))
 }
 
-/// Refuses arguments for kd-trees if the structure is a grid.
-pub fn check_accel(accel: AccelKind, traversal: OrAuto<Traversal>, build: BuildPolicy) -> Result<(), CliError> {
-    check_traversal(accel, traversal.pinned())?;
-    if accel != AccelKind::KdTree && build != BuildPolicy::Auto {
-        return Err(CliError::Usage(format!("--build chooses a kd-tree: with --accel {accel}, a grid is built")));
-    }
-    Ok(())
-}
-
-/// Refuses a tree of devices if there is none.
-pub fn check_build(build: BuildPolicy, on_cpu: bool) -> Result<(), CliError> {
-    match (build, on_cpu) {
-        (BuildPolicy::Gpu, true) => {
-            Err(CliError::Usage("--build gpu lets the device build the kd-tree: with --cpu, there is none".to_owned()))
-        }
-        _ => Ok(()),
-    }
-}
-
 /// Refuses a kd-tree traversal if the structure is a grid.
 pub fn check_traversal(accel: AccelKind, traversal: Option<Traversal>) -> Result<(), CliError> {
     if accel != AccelKind::KdTree && traversal.is_some() {
-        return Err(CliError::Usage(format!(
+        return CliError::refuse(format!(
             "--traversal names an algorithm for the kd-tree: with --accel {accel}, rays go through a grid, for which \
              there is one algorithm"
-        )));
+        ));
     }
     Ok(())
 }
 
-/// Returns the help text of `--traversal`.
-pub fn traversal_help() -> String {
-    with_words(TRAVERSAL, Some("auto"), &format!("{}, auto", Traversal::words()))
-}
-
 /// Returns the help text of `--traversal` with all words explained.
-pub fn traversal_long_help() -> String {
+fn traversal_long_help() -> String {
     let auto = format!(
         "- auto: {} on GPUs, {} on software drivers, {} with --cpu, or what a measurement on this GPU and scene has \
          found to be quicker",
@@ -188,16 +189,6 @@ fn default_traversals() -> String {
     format!("{}, with --cpu {}", traversals_of_devices(), Traversal::OF_CPU)
 }
 
-/// Returns the help text of `--build`.
-pub fn build_help() -> String {
-    with_words(BUILD, Some("auto"), &BuildPolicy::words())
-}
-
-/// Returns the help text of `--build` with all words explained.
-pub fn build_long_help() -> String {
-    listed(BUILD, "auto", &BuildPolicy::descriptions())
-}
-
 /// Returns the default traversals of GPUs and software drivers, as a phrase of a help text.
 #[cfg(feature = "bench")]
 pub fn traversals_of_devices() -> String {
@@ -206,24 +197,18 @@ pub fn traversals_of_devices() -> String {
 
 impl PictureArgs {
     /// Refuses arguments that contradict each other.
-    pub fn check(&self) -> Result<(), CliError> {
-        check_accel(self.accel, self.traversal, self.build)?;
+    pub fn check(&self, on_cpu: bool) -> Result<(), CliError> {
+        self.structure.check(on_cpu)?;
         if let (Some(word @ (DenoiseWord::Off | DenoiseWord::Edge)), Some(_)) = (self.denoise, self.denoise_threshold) {
             let word = if word == DenoiseWord::Off { "off" } else { "edge" };
-            return Err(CliError::Usage(format!("--denoise-threshold has no meaning with --denoise {word}")));
+            return CliError::refuse(format!("--denoise-threshold has no meaning with --denoise {word}"));
         }
         Ok(())
     }
 
     /// Returns the user's choice of structure, build, traversal and primary visibility.
     pub fn request(&self) -> Request {
-        Request {
-            accel: self.accel,
-            build: self.build,
-            traversal: self.traversal.pinned(),
-            primary: self.primary.pinned(),
-            instances: self.instances,
-        }
+        Request { primary: self.primary.pinned(), ..self.structure.request() }
     }
 
     /// Returns what the user sets in place of the scene's options. Traversal and primary visibility depend on the

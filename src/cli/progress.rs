@@ -3,15 +3,20 @@
 
 use std::{
     io::{self, IsTerminal},
+    path::Path,
     sync::{Arc, Mutex, PoisonError},
     time::{Duration, Instant},
 };
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use kdray::util::{
-    progress::{self, Observer, Work},
-    text::one_line,
+use kdray::{
+    engine::{LoadRequest, Opened},
+    scene::SceneError,
+    util::{
+        progress::{self, Observer, Work},
+        text::one_line,
+    },
 };
 
 use super::{
@@ -157,6 +162,11 @@ impl Progress {
             meter.set_position(begin + BAR_POSITIONS);
         }
         (made, start.elapsed().as_secs_f64() * 1e3)
+    }
+
+    /// Reads a scene as a stage of its own.
+    pub fn read(&self, scene: &Path, request: &LoadRequest) -> Result<Opened, SceneError> {
+        self.stage(&format!("loading {}", scene.display()), || Opened::read(scene, request)).0
     }
 
     /// Returns the observer of a stage that consists of pieces of `work`, which share its part of the bar. It is none

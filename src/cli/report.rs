@@ -6,10 +6,14 @@ use kdray::{
     accel::{DeviceBuild, Statistics},
     engine::{MomentWork, choices::Choices},
     frame::{Denoise, PassTime, Profile, RenderOptions},
+    output,
 };
 use serde::Serialize;
 
-use super::table::{decimal, table};
+use super::{
+    error::CliError,
+    table::{decimal, table},
+};
 
 /// Returns a phrase that says how long the acceleration structure took to build. `on_host` is the host's build time
 /// in milliseconds, which is shown unless the device has built the structure.
@@ -18,6 +22,16 @@ pub fn built_in(on_host: f64, on_device: Option<&DeviceBuild>) -> String {
         Some(build) => format!("built in {} ms on the device", decimal(build.ms, 3)),
         None => format!("built in {on_host:.0} ms"),
     }
+}
+
+/// Returns a report as JSON that ends with a line break.
+pub fn json(report: &impl Serialize) -> String {
+    serde_json::to_string_pretty(report).expect("plain structs of numbers and words") + "\n"
+}
+
+/// Writes a report to the JSON file that the user has named, if any.
+pub fn write_json(path: Option<&PathBuf>, report: &impl Serialize) -> Result<(), CliError> {
+    Ok(path.map_or(Ok(()), |path| output::write(path, json(report).as_bytes()))?)
 }
 
 /// Version of the names in the JSON of `--profile` and of `inspect`. 2: passes and terms have the field's names
@@ -314,13 +328,6 @@ impl Report {
         }
         let paths = self.extra_files.iter().chain(&self.pictures);
         paths.map(|path| format!("wrote {}\n", path.display())).collect()
-    }
-
-    /// The report as JSON that ends with a line break.
-    pub fn json(&self) -> Vec<u8> {
-        let mut json = serde_json::to_vec_pretty(self).expect("plain structs of numbers and words");
-        json.push(b'\n');
-        json
     }
 }
 

@@ -17,11 +17,10 @@ use super::{
     device_args::software_note,
     error::CliError,
     file_roles::FileRoles,
-    picture_args::check_build,
     print, print_line,
     progress::Progress,
     render::set_threads,
-    report::SCHEMA,
+    report::{SCHEMA, write_json},
     view_args::{Switch, ViewArgs},
 };
 
@@ -31,8 +30,7 @@ const SAMPLES_AT_REST: u32 = 256;
 /// Runs `kdray view`: loads the scene if there is one, builds its structure and shows it. Arguments and files are
 /// checked before the work that an error would waste.
 pub fn run(args: &ViewArgs) -> Result<(), CliError> {
-    args.picture.check()?;
-    check_build(args.picture.build, args.cpu)?;
+    args.picture.check(args.cpu)?;
     check_scene(args)?;
     check_shaders(args)?;
     check_outputs(args)?;
@@ -73,11 +71,8 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
         },
     )?;
     let tell = || {
-        if let Some(path) = &args.profile {
-            let profile =
-                Profile { schema: SCHEMA, scene: &scene_name, budget_ms: args.budget_ms, vsync, view: &report };
-            output::write(path, &json(&profile))?;
-        }
+        let profile = Profile { schema: SCHEMA, scene: &scene_name, budget_ms: args.budget_ms, vsync, view: &report };
+        write_json(args.profile.as_ref(), &profile)?;
         if let Some(choices) = report.choices.as_ref().filter(|_| !args.quiet) {
             print(&format!("{choices}\n"))?;
         }
@@ -187,16 +182,10 @@ struct Profile<'a> {
     view: &'a ViewReport,
 }
 
-fn json(profile: &Profile) -> Vec<u8> {
-    let mut json = serde_json::to_vec_pretty(profile).expect("plain structs of numbers and words");
-    json.push(b'\n');
-    json
-}
-
 /// Refuses options that choose a part of the scene's file if there is none.
 fn check_scene(args: &ViewArgs) -> Result<(), CliError> {
     if args.scene.is_none() && (args.load.camera.is_some() || args.load.scene_name.is_some()) {
-        return Err(CliError::Usage("--camera and --scene choose a part of SCENE, which is missing".into()));
+        return CliError::refuse("--camera and --scene choose a part of SCENE, which is missing");
     }
     Ok(())
 }
@@ -205,7 +194,7 @@ fn check_scene(args: &ViewArgs) -> Result<(), CliError> {
 fn check_shaders(args: &ViewArgs) -> Result<(), CliError> {
     match &args.shaders {
         Some(checkout) if !checkout.join("glsl").is_dir() => {
-            Err(CliError::Usage(format!("--shaders {}: there is no folder glsl in it", checkout.display())))
+            CliError::refuse(format!("--shaders {}: there is no folder glsl in it", checkout.display()))
         }
         _ => Ok(()),
     }

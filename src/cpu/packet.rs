@@ -12,6 +12,7 @@ use super::{
     lanes::{LANES, LaneMask},
     packet_triangle::{HitColumns, Shears},
     soa::{HitsSoa, RaysSoa},
+    vec3x16::Vec3x16,
 };
 use crate::{
     layout::{Hit, KD_LEAST_COMPONENT, KD_PLANE_EPSILON, KdNode, NO_TRIANGLE, Slab},
@@ -81,12 +82,6 @@ impl<S: Simd> PacketIntervals<S> {
     }
 }
 
-/// Loads one vector for each ray, as a column for each axis.
-#[inline(always)]
-pub fn columns<S: Simd>(simd: S, [x, y, z]: &[[f32; LANES]; 3]) -> [f32x16<S>; 3] {
-    [f32x16::load_array_ref(simd, x), f32x16::load_array_ref(simd, y), f32x16::load_array_ref(simd, z)]
-}
-
 /// Returns one ray's components, followed by a 0.
 #[inline(always)]
 fn row<S: Simd>(columns: &[f32x16<S>; 3], lane: usize) -> [f32; 4] {
@@ -138,7 +133,8 @@ impl<S: Simd> Packet<S> {
         search_rays: &RaysSoa,
         n_rays: usize,
     ) -> (Self, PacketIntervals<S>) {
-        let (origin, direction) = (columns(simd, &search_rays.origin), columns(simd, &search_rays.direction));
+        let [Vec3x16(origin), Vec3x16(direction)] =
+            [Vec3x16::load(simd, &search_rays.origin), Vec3x16::load(simd, &search_rays.direction)];
         let inv_direction = [inverse(direction[0]), inverse(direction[1]), inverse(direction[2])];
         let bias = [-origin[0] * inv_direction[0], -origin[1] * inv_direction[1], -origin[2] * inv_direction[2]];
         let [x0, y0, z0] = times_plus(inputs.box_min.to_array(), &inv_direction, &bias);

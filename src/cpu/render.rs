@@ -13,7 +13,7 @@ use crate::{
     accel::kdtree::TraversalLinks,
     frame::{
         BounceStats, Denoise, FrameProperties, FrameRenderer, Integrator, MeanLayers, NoiseTiles, Pass, Picture, Plan,
-        Primary, Profile, RenderOptions, Watcher, opaque, plan::passes,
+        Primary, Profile, RenderOptions, Scope, Watcher, opaque, plan::passes,
     },
     gpu::GpuError,
     layout::{
@@ -88,7 +88,7 @@ pub struct CpuRenderer {
     paths: Paths,
     /// The materials of paths. Empty for ray trees.
     path_materials: Vec<Material>,
-    /// The batch of paths that is drawn.
+    /// The batch that is drawn.
     batch: Batch,
     /// Number of rays beyond which the current batch is halved: `queue_capacity`, or no limit for one pixel.
     most_rays: u32,
@@ -149,11 +149,20 @@ impl CpuRenderer {
         }
     }
 
+    /// Returns a renderer of the same world by other options, with the same camera and batches.
+    #[cfg(feature = "view")]
+    pub fn with_options(&self, options: &RenderOptions) -> Self {
+        self.remade(&self.world, options)
+    }
+
+    fn remade(&self, world: &World, options: &RenderOptions) -> Self {
+        Self { camera: self.camera, ..Self::new(world, options, self.batching) }
+    }
+
     /// Draws another world from now on. The next sample is the first of a new picture.
     pub fn set_world(&mut self, world: &World) {
         if !world.shares_geometries(&self.world) {
-            let (options, batching, camera) = (self.options.clone(), self.batching, self.camera);
-            *self = Self { camera, ..Self::new(world, &options, batching) };
+            *self = self.remade(world, &self.options);
             return;
         }
         self.frame.set_light_of(&world.frame_constants(&self.options));
@@ -263,6 +272,11 @@ impl CpuRenderer {
         self.pixel_aovs.resize(if self.options.pixel_aovs { n_pixels } else { 0 }, PixelAovs::default());
     }
 
+    #[cfg(feature = "view")]
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
     /// Moves the camera. The next sample is the first of a new picture.
     pub fn set_camera(&mut self, camera: &Camera) {
         self.camera = *camera;
@@ -304,9 +318,9 @@ impl CpuRenderer {
     /// Draws a batch of pixels: first all bounces are traced, then their hits are lit. If there are more rays than
     /// the queue may hold, the two halves of the batch are drawn instead.
     fn batch(&mut self, plan: &Plan, first_pixel: u32, n_pixels: u32) {
+        self.batch = Batch { first_pixel, n_pixels, ..Batch::default() };
         self.most_rays = if n_pixels == 1 { u32::MAX } else { self.batching.queue_capacity };
         self.batch_stats.clear();
-        self.primary_rays(plan, first_pixel, n_pixels);
         for (depth, bounce) in (0..).zip(&plan.bounces) {
             passes(bounce).for_each(|pass| self.run(pass, depth));
             match self.queue.bounces.get(depth as usize + 1) {
@@ -345,16 +359,24 @@ impl CpuRenderer {
         self.count();
     }
 
-    /// Runs a pass. `depth` is its bounce, and is ignored by a pass that belongs to no bounce.
+    /// Runs a pass, and times it. `depth` is its bounce, and is ignored by a pass that belongs to no bounce.
     fn run(&mut self, pass: Pass, depth: u32) {
+        if pass == Pass::PathTrace && self.options.pixel_aovs && self.n_samples == 0 {
+            self.note_costs_of_paths(depth);
+        }
+        let start_ms = self.clock.elapsed_ms();
         match pass {
             Pass::Visibility => self.visibility(),
             Pass::PrimaryHit | Pass::Trace => self.closest_hits(pass, depth),
             Pass::PixelAovs => self.note_aovs(),
             Pass::SurfaceLayers => self.surface_layers(),
             Pass::CompactReduce => self.compact_reduce(depth),
-            Pass::CompactSpine if self.options.integrator == Integrator::Path => self.path_spine(depth),
+            Pass::CompactSpine if self.options.integrator == Integrator::Path => {
+                self.paths.spine(&self.frame, depth, &mut self.queue);
+            }
             Pass::CompactSpine => self.compact_spine(depth),
+            // The queue has no room for the next bounce.
+            Pass::CompactScatter if self.queue.bounces[depth as usize + 1].overflow != 0 => return,
             Pass::CompactScatter => self.compact_scatter(depth),
             Pass::Shadow => self.shadow(),
             Pass::Shade => self.shade(),
@@ -364,9 +386,9 @@ impl CpuRenderer {
             Pass::Tonemap => self.tonemap(),
             Pass::PathBegin => self.path_begin(),
             Pass::PathTrace => self.path_trace(depth),
-            Pass::PathScatter => self.path_scatter(depth),
-            Pass::PathCompact => self.path_compact(depth),
-            Pass::PathLayers => self.path_layers(depth),
+            Pass::PathScatter => self.path_scatter(),
+            Pass::PathCompact => self.paths.compact(depth, &self.queue),
+            Pass::PathLayers => self.path_layers(),
             Pass::PathResolve => self.path_resolve(),
             Pass::PathAccumulate => self.path_accumulate(),
             Pass::Auxiliary => self.auxiliary(),
@@ -376,13 +398,26 @@ impl CpuRenderer {
                 unreachable!("the CPU's plan has no `{}`", pass.name())
             }
         }
+        let of_bounce = match pass {
+            Pass::PathLayers => depth + 1 < LIGHT_LAYERS,
+            _ => pass.scope() == Scope::Bounce,
+        };
+        self.clock.record(pass, of_bounce.then_some(depth), start_ms);
     }
 
     fn path_begin(&mut self) {
         let Self { world, options, frame, batch, paths, queue, .. } = self;
         let n_paths = batch.n_pixels << frame.samples_log2;
         let inputs = KernelInputs::new(world, frame).with_noise_tiles(tiles_of(options));
-        self.clock.time(Pass::PathBegin, Some(0), || paths.begin(&inputs, batch, n_paths, queue));
+        paths.begin(&inputs, batch, n_paths, queue);
+    }
+
+    /// Adds the costs of the rays that the pass `path_trace` is about to trace to the AOVs. They are traced a second
+    /// time to be counted, so later frames, whose counts nobody reads, go without.
+    fn note_costs_of_paths(&mut self, depth: u32) {
+        let Self { world, options, frame, links, paths, queue, path_materials, pixel_aovs, .. } = self;
+        let inputs = KernelInputs::new(world, frame).with_links(links).of_paths(path_materials, world.emitters());
+        paths.note_costs(&inputs, &Batch { depth, ..self.batch }, options.traversal, queue, pixel_aovs);
     }
 
     /// Finds the closest hits of the bounce's paths, tests the shadow rays of the bounce before, and counts both.
@@ -390,13 +425,8 @@ impl CpuRenderer {
         let Self { world, frame, links, paths, queue, path_materials, .. } = self;
         let inputs = KernelInputs::new(world, frame).with_links(links).of_paths(path_materials, world.emitters());
         let (batch, traversal) = (&Batch { depth, ..self.batch }, self.options.traversal);
-        // Rays are traced a second time to be counted, so later frames, whose counts nobody reads, go without.
-        if self.options.pixel_aovs && self.n_samples == 0 {
-            paths.note_costs(&inputs, batch, traversal, queue, &mut self.pixel_aovs);
-        }
         let search = search_for(world, traversal, depth > 0);
-        let trace = || paths.trace(&inputs, batch, search, queue);
-        let (n_hits, n_shadow_rays) = self.clock.time(Pass::PathTrace, Some(depth), trace);
+        let (n_hits, n_shadow_rays) = paths.trace(&inputs, batch, search, queue);
         if let Some(before) = self.batch_stats.last_mut() {
             before.n_shadow_rays = n_shadow_rays.into();
         }
@@ -404,84 +434,68 @@ impl CpuRenderer {
         self.batch_stats.push(BounceStats { n_rays, n_hits: n_hits.into(), n_shadow_rays: 0 });
     }
 
-    fn path_scatter(&mut self, depth: u32) {
+    fn path_scatter(&mut self) {
         let Self { world, options, frame, links, batch, paths, queue, path_materials, .. } = self;
         let inputs = KernelInputs::new(world, frame).with_links(links).of_paths(path_materials, world.emitters());
         let inputs = inputs.with_noise_tiles(tiles_of(options));
-        self.clock.time(Pass::PathScatter, Some(depth), || paths.scatter(&inputs, batch, queue));
+        paths.scatter(&inputs, batch, queue);
     }
 
     fn auxiliary(&mut self) {
         let Self { world, frame, batch, paths, queue, path_materials, pixel_aux, .. } = self;
         let inputs = KernelInputs::new(world, frame).of_paths(path_materials, world.emitters());
-        let aux = || auxiliary::auxiliary(&inputs, batch, &queue.hits, &paths.states, pixel_aux);
-        self.clock.time(Pass::Auxiliary, Some(0), aux);
+        auxiliary::auxiliary(&inputs, batch, &queue.hits, &paths.states, pixel_aux);
     }
 
     fn demodulate(&mut self) {
         let Self { frame, pixel_radiance, pixel_aux, pixel_filtered, .. } = self;
         pixel_filtered.resize(2 * pixel_radiance.len(), [0.0; 4]);
-        let demodulate = || demodulate::demodulate(frame, pixel_radiance, pixel_aux, pixel_filtered);
-        self.clock.time(Pass::Demodulate, None, demodulate);
+        demodulate::demodulate(frame, pixel_radiance, pixel_aux, pixel_filtered);
         self.atrous_iteration = 0;
     }
 
     fn atrous_filter(&mut self) {
-        let (frame, aux, filtered) = (&self.frame, &self.pixel_aux, &mut self.pixel_filtered);
         let iteration = AtrousIteration { iteration_ix: self.atrous_iteration };
-        self.clock.time(Pass::AtrousFilter, None, || atrous_filter::atrous_filter(frame, &iteration, aux, filtered));
+        atrous_filter::atrous_filter(&self.frame, &iteration, &self.pixel_aux, &mut self.pixel_filtered);
         self.atrous_iteration += 1;
     }
 
-    fn path_spine(&mut self, depth: u32) {
-        let Self { frame, paths, queue, .. } = self;
-        self.clock.time(Pass::CompactSpine, Some(depth), || paths.spine(frame, depth, queue));
-    }
-
-    fn path_compact(&mut self, depth: u32) {
-        let Self { paths, queue, .. } = self;
-        self.clock.time(Pass::PathCompact, Some(depth), || paths.compact(depth, queue));
-    }
-
-    fn path_layers(&mut self, depth: u32) {
+    fn path_layers(&mut self) {
         let Self { frame, batch, paths, pixel_radiance, pixel_layers, .. } = self;
         let of_light = &mut pixel_layers[..LIGHT_LAYERS as usize * pixel_radiance.len()];
-        let bounce = (depth + 1 < LIGHT_LAYERS).then_some(depth);
-        self.clock.time(Pass::PathLayers, bounce, || paths.layers(frame, batch, of_light));
+        paths.layers(frame, batch, of_light);
     }
 
     fn path_resolve(&mut self) {
         let Self { frame, batch, paths, pixel_radiance, .. } = self;
-        let resolve = || path_resolve::path_resolve(frame, batch, &paths.states, pixel_radiance);
-        self.clock.time(Pass::PathResolve, None, resolve);
+        path_resolve::path_resolve(frame, batch, &paths.states, pixel_radiance);
     }
 
     fn path_accumulate(&mut self) {
         let Self { frame, pixel_radiance, pixel_accumulated, pixel_layers, layers_accumulated, .. } = self;
-        self.clock.time(Pass::PathAccumulate, None, || {
-            path_accumulate::path_accumulate(frame, pixel_radiance, pixel_accumulated);
-            path_accumulate::path_accumulate(frame, pixel_layers, layers_accumulated);
-        });
+        path_accumulate::path_accumulate(frame, pixel_radiance, pixel_accumulated);
+        path_accumulate::path_accumulate(frame, pixel_layers, layers_accumulated);
     }
 
     fn visibility(&mut self) {
         let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
-        let (traversal, ids) = (self.options.traversal, &mut self.triangle_ids);
-        self.clock.time(Pass::Visibility, None, || super::visibility(&inputs, traversal.into(), ids));
+        super::visibility(&inputs, self.options.traversal.into(), &mut self.triangle_ids);
     }
 
-    /// Writes the primary rays to the queue. Their time counts as part of the first pass, because on a device that
-    /// pass computes the camera rays itself.
-    fn primary_rays(&mut self, plan: &Plan, first_pixel: u32, n_pixels: u32) {
+    /// Writes the primary rays to the queue.
+    fn primary_rays(&mut self) {
         let Queue { rays, bounces, .. } = &mut self.queue;
-        *bounces = vec![Bounce::of(n_pixels, &self.frame)];
-        rays.resize(n_pixels as usize, PathRay::zeroed());
-        let first_pass = passes(&plan.bounces[0]).next().expect("a pass that finds hits");
-        self.clock.time(first_pass, Some(0), || primary_hit::primary_rays(&self.frame, first_pixel, rays));
+        *bounces = vec![Bounce::of(self.batch.n_pixels, &self.frame)];
+        rays.resize(self.batch.n_pixels as usize, PathRay::zeroed());
+        primary_hit::primary_rays(&self.frame, self.batch.first_pixel, rays);
     }
 
-    /// Finds the closest hits of the bounce's rays, and counts them.
+    /// Finds the closest hits of the bounce's rays, and counts them. As on a device, the first pass makes the primary
+    /// rays.
     fn closest_hits(&mut self, pass: Pass, depth: u32) {
+        if depth == 0 {
+            self.primary_rays();
+        }
         let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
         let inputs = if depth == 0 { inputs.of_camera() } else { inputs };
         let Queue { rays, bounces, hits, .. } = &mut self.queue;
@@ -492,21 +506,21 @@ impl CpuRenderer {
             && self.world.scene().triangles.len() >= LEAST_TRIANGLES_OF_BOUNCES
             && are_scattered(rays, self.world.bounds(), |ray| (ray.origin, ray.direction));
         let (ids, search) = (&self.triangle_ids, search_for(&self.world, self.options.traversal, is_scattered));
-        let n_hits = self.clock.time(pass, Some(depth), || match pass {
+        let n_hits = match pass {
             Pass::PrimaryHit => primary_hit::primary_hit(&inputs, ids, rays, hits),
             _ => super::trace(&inputs, search, rays, hits),
-        });
+        };
         self.batch_stats.push(BounceStats { n_rays: rays.len() as u64, n_hits: n_hits.into(), n_shadow_rays: 0 });
     }
 
     /// Records the AOVs of the primary rays' hits.
     fn note_aovs(&mut self) {
         let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
-        let (Queue { rays, hits, .. }, pixels) = (&self.queue, &mut self.pixel_aovs);
+        let Queue { rays, hits, .. } = &self.queue;
         let of_paths = self.options.integrator == Integrator::Path;
         let rays_per_pixel = if of_paths { 1 << self.frame.samples_log2 } else { 1 };
         let first_hits = rays.iter().zip(hits).step_by(rays_per_pixel);
-        self.clock.time(Pass::PixelAovs, Some(0), || pixel_aovs::pixel_aovs(&inputs, first_hits, pixels));
+        pixel_aovs::pixel_aovs(&inputs, first_hits, &mut self.pixel_aovs);
     }
 
     /// Adds up what the camera rays hit.
@@ -519,8 +533,7 @@ impl CpuRenderer {
         };
         let begin = pixel_layers.len() - SURFACE_LAYERS as usize * pixel_radiance.len();
         let (of_camera, layers) = ((&queue.rays[..], &queue.hits[..]), &mut pixel_layers[begin..]);
-        let sum = || surface_layers::surface_layers(&inputs, samples_log2, of_camera, layers);
-        self.clock.time(Pass::SurfaceLayers, Some(0), sum);
+        surface_layers::surface_layers(&inputs, samples_log2, of_camera, layers);
     }
 
     /// Adds the traversal costs of the rays of all bounces to the AOVs.
@@ -550,8 +563,7 @@ impl CpuRenderer {
         child_flags.resize(rays.len(), 0);
         scan_blocks.resize(places.len().div_ceil(SCAN_GROUP_SIZE as usize), 0);
         let parents = Parents { rays: &rays[places.clone()], hits: &hits[places.clone()] };
-        let flags = &mut child_flags[places];
-        self.clock.time(Pass::CompactReduce, Some(depth), || compact::reduce(&inputs, parents, flags, scan_blocks));
+        compact::reduce(&inputs, parents, &mut child_flags[places], scan_blocks);
     }
 
     /// Computes the prefix sums of the counts, and from them the size of the next bounce.
@@ -559,28 +571,22 @@ impl CpuRenderer {
         let constants = Frame { queue_capacity: self.most_rays, ..self.frame };
         let Queue { bounces, scan_blocks, .. } = &mut self.queue;
         let (this, mut next) = (bounces[depth as usize], Bounce::of(0, &self.frame));
-        let spine = || compact::spine(scan_blocks, &constants, &this, &mut next);
-        self.clock.time(Pass::CompactSpine, Some(depth), spine);
+        compact::spine(scan_blocks, &constants, &this, &mut next);
         bounces.push(next);
     }
 
-    /// Writes the next bounce's rays behind those of this bounce, unless the queue has no room for them.
+    /// Writes the next bounce's rays behind those of this bounce.
     fn compact_scatter(&mut self, depth: u32) {
         let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
         let Queue { rays, bounces, hits, child_flags, first_children, scan_blocks, .. } = &mut self.queue;
         let (this, next) = (bounces[depth as usize], bounces[depth as usize + 1]);
-        if next.overflow != 0 {
-            return;
-        }
         let places = this.rays();
         first_children.resize(rays.len(), 0);
         rays.resize(next.rays().end, PathRay::zeroed());
         let (so_far, next_rays) = rays.split_at_mut(next.rays().start);
         let parents = Parents { rays: &so_far[places.clone()], hits: &hits[places.clone()] };
         let (flags, first_children) = (&child_flags[places.clone()], &mut first_children[places]);
-        self.clock.time(Pass::CompactScatter, Some(depth), || {
-            compact::scatter(&inputs, parents, flags, scan_blocks, next.first_ray, first_children, next_rays);
-        });
+        compact::scatter(&inputs, parents, flags, scan_blocks, next.first_ray, first_children, next_rays);
     }
 
     /// Traces the shadow rays of all bounces, and counts them.
@@ -590,9 +596,8 @@ impl CpuRenderer {
         light_visibility.resize(rays.len() * inputs.lights.len(), 0);
         let search = self.options.traversal.into();
         for (bounce, stats) in bounces.iter().zip(&mut self.batch_stats) {
-            let of_bounce =
-                || super::shadow(&inputs, search, &bounce.rays(), (rays.as_slice(), hits), light_visibility);
-            stats.n_shadow_rays = self.clock.time(Pass::Shadow, None, of_bounce).into();
+            let n_shadow_rays = super::shadow(&inputs, search, &bounce.rays(), (rays, hits), light_visibility);
+            stats.n_shadow_rays = n_shadow_rays.into();
         }
     }
 
@@ -602,13 +607,12 @@ impl CpuRenderer {
         ray_radiance.resize(rays.len(), [0.0; 4]);
         let n_of_camera = bounces[0].rays().end;
         let lit = LitRays { rays, hits, n_of_camera, light_visibility };
-        self.clock.time(Pass::Shade, None, || shade::shade(&inputs, lit, ray_radiance));
+        shade::shade(&inputs, lit, ray_radiance);
     }
 
     fn resolve(&mut self) {
         let Queue { rays, bounces, first_children, ray_radiance, .. } = &self.queue;
-        let pixels = &mut self.pixel_radiance;
-        self.clock.time(Pass::Resolve, None, || resolve::resolve(bounces, rays, ray_radiance, first_children, pixels));
+        resolve::resolve(bounces, rays, ray_radiance, first_children, &mut self.pixel_radiance);
     }
 
     fn count(&mut self) {
@@ -621,22 +625,18 @@ impl CpuRenderer {
 
     fn accumulate(&mut self) {
         let Self { frame, pixel_radiance, pixel_accumulated, pixel_layers, layers_accumulated, .. } = self;
-        self.clock.time(Pass::Accumulate, None, || {
-            accumulate::accumulate(frame, &[], pixel_radiance, pixel_accumulated);
-            accumulate::accumulate(frame, &[], pixel_layers, layers_accumulated);
-        });
+        accumulate::accumulate(frame, &[], pixel_radiance, pixel_accumulated);
+        accumulate::accumulate(frame, &[], pixel_layers, layers_accumulated);
     }
 
     fn denoise(&mut self) {
-        let (frame, radiance, filtered) = (&self.frame, &self.pixel_radiance, &mut self.pixel_filtered);
-        filtered.resize(radiance.len(), [0.0; 4]);
-        self.clock.time(Pass::Denoise, None, || denoise::denoise(frame, radiance, filtered));
+        self.pixel_filtered.resize(self.pixel_radiance.len(), [0.0; 4]);
+        denoise::denoise(&self.frame, &self.pixel_radiance, &mut self.pixel_filtered);
     }
 
     fn tonemap(&mut self) {
         let filtered = if self.filters() { &self.pixel_filtered } else { &self.pixel_radiance };
-        let (frame, curve, display) = (&self.frame, self.options.tonemap, &mut self.pixel_display);
-        self.clock.time(Pass::Tonemap, None, || tonemap::tonemap(frame, curve, filtered, display));
+        tonemap::tonemap(&self.frame, self.options.tonemap, filtered, &mut self.pixel_display);
     }
 
     fn filters(&self) -> bool {

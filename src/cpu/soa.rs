@@ -62,14 +62,6 @@ impl RaysSoa {
 
 impl HitsSoa {
     #[inline(always)]
-    pub fn set(&mut self, lane: usize, hit: &Hit) {
-        self.t[lane] = hit.t;
-        self.triangle_ix[lane] = hit.triangle_ix;
-        self.u[lane] = hit.u;
-        self.v[lane] = hit.v;
-    }
-
-    #[inline(always)]
     pub fn get(&self, lane: usize) -> Hit {
         Hit { t: self.t[lane], triangle_ix: self.triangle_ix[lane], u: self.u[lane], v: self.v[lane] }
     }

@@ -21,10 +21,9 @@ impl Clock {
         Self { begin: Instant::now(), passes: Vec::new(), n_counted: 0, batch_ix: 0 }
     }
 
-    /// Runs and times a pass. Two consecutive runs of the same pass, bounce and batch count as one.
-    pub fn time<R>(&mut self, pass: Pass, bounce: Option<u32>, run: impl FnOnce() -> R) -> R {
-        let start_ms = self.elapsed_ms();
-        let result = run();
+    /// Records a pass that has run since `start_ms`. Two consecutive runs of the same pass, bounce and batch count as
+    /// one.
+    pub fn record(&mut self, pass: Pass, bounce: Option<u32>, start_ms: f64) {
         let ms = self.elapsed_ms() - start_ms;
         let mut pass =
             PassTime { name: pass.name(), bounce, start_ms: Some(start_ms), ms: Some(ms), ..PassTime::default() };
@@ -34,7 +33,6 @@ impl Clock {
             Some(last) => last.ms = last.ms.map(|sum| sum + ms),
             None => self.passes.push(pass),
         }
-        result
     }
 
     /// Ends a batch that is complete, or that was abandoned to be halved. `bounces` holds the batch's ray counts.

@@ -19,27 +19,16 @@ enum Backend<'a> {
 }
 
 impl<'a> Caster<'a> {
-    /// Creates a caster on the device. If `context` is none, the caster runs on the CPU.
+    /// Creates a caster on the device. If `context` is none, the caster is the one of the CPU.
     pub(super) fn new(
         context: Option<&Arc<Context>>,
-        geometry: Geometry<'a>,
+        geometry: Geometry,
         traversal: Traversal,
+        of_cpu: impl FnOnce() -> CpuCaster<'a>,
     ) -> Result<Self, GpuError> {
         Ok(Self(match context {
             Some(context) => Backend::Device(Box::new(cast::GpuCaster::new(context, geometry, traversal)?)),
-            None => Backend::Cpu(Box::new(CpuCaster::new(geometry, traversal))),
-        }))
-    }
-
-    /// Does what [`Self::new`] does for a world, which the caster keeps.
-    pub(super) fn of_world(
-        context: Option<&Arc<Context>>,
-        world: &World,
-        traversal: Traversal,
-    ) -> Result<Caster<'static>, GpuError> {
-        Ok(Caster(match context {
-            Some(context) => Backend::Device(Box::new(cast::GpuCaster::new(context, world.geometry(), traversal)?)),
-            None => Backend::Cpu(Box::new(CpuCaster::of_world(world, traversal))),
+            None => Backend::Cpu(Box::new(of_cpu())),
         }))
     }
 

@@ -31,7 +31,7 @@ pub use self::{
 };
 use crate::{
     accel::{Query, kdtree::Traversal},
-    cast::{Hit, Ray},
+    cast::{CpuCaster, Hit, Ray},
     frame::{Goal, RenderOptions},
     gpu::{Context, ContextOptions, Device, GpuError},
     util::progress::Progress,
@@ -161,7 +161,7 @@ impl Engine {
     /// # Errors
     /// The triangles are beyond the device's limits or memory, or too many for [`Traversal::Brute`].
     pub fn caster<'a>(&self, geometry: Geometry<'a>, traversal: Traversal) -> Result<Caster<'a>, GpuError> {
-        Caster::new(self.context(), geometry, traversal)
+        Caster::new(self.context(), geometry, traversal, || CpuCaster::new(geometry, traversal))
     }
 
     /// Creates a caster that keeps the world, and so may live as long as anybody likes.
@@ -169,7 +169,7 @@ impl Engine {
     /// # Errors
     /// Fails as [`Engine::caster`] does.
     pub fn caster_of_world(&self, world: &World, traversal: Traversal) -> Result<Caster<'static>, GpuError> {
-        Caster::of_world(self.context(), world, traversal)
+        Caster::new(self.context(), world.geometry(), traversal, || CpuCaster::of_world(world, traversal))
     }
 
     /// Draws one picture from the scene's own camera with one sample per pixel. The engine's choices of traversal and

@@ -112,278 +112,115 @@ struct Info {
     indirect: Option<Resource>,
 }
 
+impl Info {
+    /// A pass that reads and writes no resource, and whose size the host sets.
+    const fn new(pass: Pass, name: &'static str, role: Role, scope: Scope, color: [u8; 3]) -> Self {
+        Self { pass, name, role, scope, color, reads: &[], writes: &[], indirect: None }
+    }
+
+    const fn reads(self, reads: &'static [Resource]) -> Self {
+        Self { reads, ..self }
+    }
+
+    const fn writes(self, writes: &'static [Resource]) -> Self {
+        Self { writes, ..self }
+    }
+
+    const fn indirect(self, sizes: Resource) -> Self {
+        Self { indirect: Some(sizes), ..self }
+    }
+}
+
 /// A row for each pass, in the order of [`Pass`].
 const TABLE: [Info; 27] = [
-    Info {
-        pass: Pass::Visibility,
-        name: "visibility",
-        role: Role::PrimaryVisibility,
-        scope: Scope::Frame,
-        color: [120, 190, 255],
-        reads: &[],
-        writes: &[TriangleIds],
-        indirect: None,
-    },
-    Info {
-        pass: Pass::RasterizeTriangles,
-        name: "rasterize_triangles",
-        role: Role::PrimaryVisibility,
-        scope: Scope::Frame,
-        color: [110, 225, 235],
-        reads: &[PixelNearest, RasterGroups],
-        writes: &[PixelNearest, RasterGroups],
-        indirect: None,
-    },
-    Info {
-        pass: Pass::RasterizeBlocks,
-        name: "rasterize_blocks",
-        role: Role::PrimaryVisibility,
-        scope: Scope::Frame,
-        color: [60, 160, 170],
-        reads: &[PixelNearest, RasterGroups],
-        writes: &[PixelNearest, RasterGroups],
-        indirect: Some(RasterGroups),
-    },
-    Info {
-        pass: Pass::PrimaryHit,
-        name: "primary_hit",
-        role: Role::ClosestHit,
-        scope: Scope::Bounce,
-        color: [70, 130, 220],
-        reads: &[TriangleIds, PixelNearest, Counters, PixelAovs],
-        writes: &[Hits, Counters, PixelAovs],
-        indirect: None,
-    },
-    Info {
-        pass: Pass::Trace,
-        name: "trace",
-        role: Role::ClosestHit,
-        scope: Scope::Bounce,
-        color: [240, 130, 60],
-        reads: &[Rays, Hits, Bounces, Counters, PixelAovs, SuspendedRays],
-        writes: &[Hits, Counters, PixelAovs, SuspendedRays],
-        indirect: Some(Bounces),
-    },
-    Info {
-        pass: Pass::PixelAovs,
-        name: "pixel_aovs",
-        role: Role::Image,
-        scope: Scope::Bounce,
-        color: [60, 160, 90],
-        reads: &[Rays, Hits, PixelAovs],
-        writes: &[PixelAovs],
-        indirect: None,
-    },
-    Info {
-        pass: Pass::SurfaceLayers,
-        name: "surface_layers",
-        role: Role::Image,
-        scope: Scope::Bounce,
-        color: [90, 130, 60],
-        reads: &[Rays, Hits],
-        writes: &[PixelRadiance],
-        indirect: None,
-    },
-    Info {
-        pass: Pass::CompactReduce,
-        name: "compact_reduce",
-        role: Role::Compaction,
-        scope: Scope::Bounce,
-        color: [200, 90, 110],
-        reads: &[Rays, Hits, Bounces],
-        writes: &[ChildFlags, ScanBlocks],
-        indirect: Some(Bounces),
-    },
-    Info {
-        pass: Pass::CompactSpine,
-        name: "compact_spine",
-        role: Role::Compaction,
-        scope: Scope::Bounce,
-        color: [225, 120, 135],
-        reads: &[ScanBlocks, Bounces],
-        writes: &[ScanBlocks, Bounces],
-        indirect: None,
-    },
-    Info {
-        pass: Pass::CompactScatter,
-        name: "compact_scatter",
-        role: Role::Compaction,
-        scope: Scope::Bounce,
-        color: [245, 160, 165],
-        reads: &[Rays, Hits, ChildFlags, ScanBlocks, Bounces],
-        writes: &[Rays, FirstChildren],
-        indirect: Some(Bounces),
-    },
-    Info {
-        pass: Pass::Shadow,
-        name: "shadow",
-        role: Role::Shadow,
-        scope: Scope::Batch,
-        color: [150, 110, 200],
-        reads: &[Rays, Hits, Bounces, LightVisibility, PixelAovs, SuspendedRays],
-        writes: &[LightVisibility, PixelAovs, SuspendedRays],
-        indirect: Some(Bounces),
-    },
-    Info {
-        pass: Pass::Shade,
-        name: "shade",
-        role: Role::Light,
-        scope: Scope::Batch,
-        color: [250, 210, 90],
-        reads: &[Rays, Hits, LightVisibility, Bounces, Counters],
-        writes: &[RayRadiance, Counters],
-        indirect: Some(Bounces),
-    },
-    Info {
-        pass: Pass::Resolve,
-        name: "resolve",
-        role: Role::Light,
-        scope: Scope::Batch,
-        color: [110, 200, 120],
-        reads: &[RayRadiance, FirstChildren, Bounces],
-        writes: &[PixelRadiance],
-        indirect: None,
-    },
-    Info {
-        pass: Pass::Accumulate,
-        name: "accumulate",
-        role: Role::Image,
-        scope: Scope::Frame,
-        color: [210, 180, 240],
-        reads: &[Bounces, PixelAccumulated, PixelRadiance],
-        writes: &[PixelAccumulated, PixelRadiance],
-        indirect: None,
-    },
-    Info {
-        pass: Pass::Denoise,
-        name: "denoise",
-        role: Role::Image,
-        scope: Scope::Frame,
-        color: [80, 180, 180],
-        reads: &[PixelRadiance],
-        writes: &[PixelFiltered],
-        indirect: None,
-    },
-    Info {
-        pass: Pass::FalseColor,
-        name: "false_color",
-        role: Role::Image,
-        scope: Scope::Frame,
-        color: [190, 140, 140],
-        reads: &[PixelAovs],
-        writes: &[PixelDisplay],
-        indirect: None,
-    },
-    Info {
-        pass: Pass::Tonemap,
-        name: "tonemap",
-        role: Role::Image,
-        scope: Scope::Frame,
-        color: [170, 170, 170],
-        reads: &[PixelFiltered],
-        writes: &[PixelDisplay],
-        indirect: None,
-    },
-    Info {
-        pass: Pass::PathBegin,
-        name: "path_begin",
-        role: Role::PrimaryVisibility,
-        scope: Scope::Bounce,
-        color: [90, 160, 235],
-        reads: &[],
-        writes: &[Rays, PathStates, ShadowRays, LivePaths],
-        indirect: None,
-    },
-    Info {
-        pass: Pass::PathTrace,
-        name: "path_trace",
-        role: Role::ClosestHit,
-        scope: Scope::Bounce,
-        color: [235, 110, 40],
-        reads: &[Rays, Hits, LivePaths, Bounces, PathStates, ShadowRays, Counters, PixelAovs, SuspendedRays],
-        writes: &[Hits, PathStates, ShadowRays, Counters, PixelAovs, SuspendedRays],
-        indirect: Some(Bounces),
-    },
-    Info {
-        pass: Pass::PathScatter,
-        name: "path_scatter",
-        role: Role::Light,
-        scope: Scope::Bounce,
-        color: [240, 200, 70],
-        reads: &[Rays, Hits, LivePaths, Bounces, PathStates],
-        writes: &[Rays, PathStates, ShadowRays, ChildFlags, ScanBlocks],
-        indirect: Some(Bounces),
-    },
-    Info {
-        pass: Pass::PathCompact,
-        name: "path_compact",
-        role: Role::Compaction,
-        scope: Scope::Bounce,
-        color: [250, 150, 150],
-        reads: &[ChildFlags, ScanBlocks, Bounces, LivePaths],
-        writes: &[LivePaths],
-        indirect: Some(Bounces),
-    },
-    Info {
-        pass: Pass::PathLayers,
-        name: "path_layers",
-        role: Role::Light,
-        scope: Scope::Bounce,
-        color: [150, 190, 80],
-        reads: &[PathStates, PathSnapshots],
-        writes: &[PathSnapshots, PixelRadiance],
-        indirect: None,
-    },
-    Info {
-        pass: Pass::PathResolve,
-        name: "path_resolve",
-        role: Role::Light,
-        scope: Scope::Batch,
-        color: [100, 190, 110],
-        reads: &[PathStates],
-        writes: &[PixelRadiance],
-        indirect: None,
-    },
-    Info {
-        pass: Pass::PathAccumulate,
-        name: "path_accumulate",
-        role: Role::Image,
-        scope: Scope::Frame,
-        color: [200, 170, 230],
-        reads: &[PixelAccumulated, PixelRadiance],
-        writes: &[PixelAccumulated, PixelRadiance],
-        indirect: None,
-    },
-    Info {
-        pass: Pass::Auxiliary,
-        name: "auxiliary",
-        role: Role::Image,
-        scope: Scope::Bounce,
-        color: [50, 150, 110],
-        reads: &[Hits, PathStates, PixelAux],
-        writes: &[PixelAux],
-        indirect: None,
-    },
-    Info {
-        pass: Pass::Demodulate,
-        name: "demodulate",
-        role: Role::Image,
-        scope: Scope::Frame,
-        color: [70, 200, 170],
-        reads: &[PixelRadiance, PixelAux],
-        writes: &[PixelFiltered],
-        indirect: None,
-    },
-    Info {
-        pass: Pass::AtrousFilter,
-        name: "atrous_filter",
-        role: Role::Image,
-        scope: Scope::Frame,
-        color: [80, 170, 190],
-        reads: &[PixelAux, PixelFiltered],
-        writes: &[PixelFiltered],
-        indirect: None,
-    },
+    Info::new(Pass::Visibility, "visibility", Role::PrimaryVisibility, Scope::Frame, [120, 190, 255])
+        .writes(&[TriangleIds]),
+    Info::new(Pass::RasterizeTriangles, "rasterize_triangles", Role::PrimaryVisibility, Scope::Frame, [110, 225, 235])
+        .reads(&[PixelNearest, RasterGroups])
+        .writes(&[PixelNearest, RasterGroups]),
+    Info::new(Pass::RasterizeBlocks, "rasterize_blocks", Role::PrimaryVisibility, Scope::Frame, [60, 160, 170])
+        .reads(&[PixelNearest, RasterGroups])
+        .writes(&[PixelNearest, RasterGroups])
+        .indirect(RasterGroups),
+    Info::new(Pass::PrimaryHit, "primary_hit", Role::ClosestHit, Scope::Bounce, [70, 130, 220])
+        .reads(&[TriangleIds, PixelNearest, Counters, PixelAovs])
+        .writes(&[Hits, Counters, PixelAovs]),
+    Info::new(Pass::Trace, "trace", Role::ClosestHit, Scope::Bounce, [240, 130, 60])
+        .reads(&[Rays, Hits, Bounces, Counters, PixelAovs, SuspendedRays])
+        .writes(&[Hits, Counters, PixelAovs, SuspendedRays])
+        .indirect(Bounces),
+    Info::new(Pass::PixelAovs, "pixel_aovs", Role::Image, Scope::Bounce, [60, 160, 90])
+        .reads(&[Rays, Hits, PixelAovs])
+        .writes(&[PixelAovs]),
+    Info::new(Pass::SurfaceLayers, "surface_layers", Role::Image, Scope::Bounce, [90, 130, 60])
+        .reads(&[Rays, Hits])
+        .writes(&[PixelRadiance]),
+    Info::new(Pass::CompactReduce, "compact_reduce", Role::Compaction, Scope::Bounce, [200, 90, 110])
+        .reads(&[Rays, Hits, Bounces])
+        .writes(&[ChildFlags, ScanBlocks])
+        .indirect(Bounces),
+    Info::new(Pass::CompactSpine, "compact_spine", Role::Compaction, Scope::Bounce, [225, 120, 135])
+        .reads(&[ScanBlocks, Bounces])
+        .writes(&[ScanBlocks, Bounces]),
+    Info::new(Pass::CompactScatter, "compact_scatter", Role::Compaction, Scope::Bounce, [245, 160, 165])
+        .reads(&[Rays, Hits, ChildFlags, ScanBlocks, Bounces])
+        .writes(&[Rays, FirstChildren])
+        .indirect(Bounces),
+    Info::new(Pass::Shadow, "shadow", Role::Shadow, Scope::Batch, [150, 110, 200])
+        .reads(&[Rays, Hits, Bounces, LightVisibility, PixelAovs, SuspendedRays])
+        .writes(&[LightVisibility, PixelAovs, SuspendedRays])
+        .indirect(Bounces),
+    Info::new(Pass::Shade, "shade", Role::Light, Scope::Batch, [250, 210, 90])
+        .reads(&[Rays, Hits, LightVisibility, Bounces, Counters])
+        .writes(&[RayRadiance, Counters])
+        .indirect(Bounces),
+    Info::new(Pass::Resolve, "resolve", Role::Light, Scope::Batch, [110, 200, 120])
+        .reads(&[RayRadiance, FirstChildren, Bounces])
+        .writes(&[PixelRadiance]),
+    Info::new(Pass::Accumulate, "accumulate", Role::Image, Scope::Frame, [210, 180, 240])
+        .reads(&[Bounces, PixelAccumulated, PixelRadiance])
+        .writes(&[PixelAccumulated, PixelRadiance]),
+    Info::new(Pass::Denoise, "denoise", Role::Image, Scope::Frame, [80, 180, 180])
+        .reads(&[PixelRadiance])
+        .writes(&[PixelFiltered]),
+    Info::new(Pass::FalseColor, "false_color", Role::Image, Scope::Frame, [190, 140, 140])
+        .reads(&[PixelAovs])
+        .writes(&[PixelDisplay]),
+    Info::new(Pass::Tonemap, "tonemap", Role::Image, Scope::Frame, [170, 170, 170])
+        .reads(&[PixelFiltered])
+        .writes(&[PixelDisplay]),
+    Info::new(Pass::PathBegin, "path_begin", Role::PrimaryVisibility, Scope::Bounce, [90, 160, 235])
+        .writes(&[Rays, PathStates, ShadowRays, LivePaths]),
+    Info::new(Pass::PathTrace, "path_trace", Role::ClosestHit, Scope::Bounce, [235, 110, 40])
+        .reads(&[Rays, Hits, LivePaths, Bounces, PathStates, ShadowRays, Counters, PixelAovs, SuspendedRays])
+        .writes(&[Hits, PathStates, ShadowRays, Counters, PixelAovs, SuspendedRays])
+        .indirect(Bounces),
+    Info::new(Pass::PathScatter, "path_scatter", Role::Light, Scope::Bounce, [240, 200, 70])
+        .reads(&[Rays, Hits, LivePaths, Bounces, PathStates])
+        .writes(&[Rays, PathStates, ShadowRays, ChildFlags, ScanBlocks])
+        .indirect(Bounces),
+    Info::new(Pass::PathCompact, "path_compact", Role::Compaction, Scope::Bounce, [250, 150, 150])
+        .reads(&[ChildFlags, ScanBlocks, Bounces, LivePaths])
+        .writes(&[LivePaths])
+        .indirect(Bounces),
+    Info::new(Pass::PathLayers, "path_layers", Role::Light, Scope::Bounce, [150, 190, 80])
+        .reads(&[PathStates, PathSnapshots])
+        .writes(&[PathSnapshots, PixelRadiance]),
+    Info::new(Pass::PathResolve, "path_resolve", Role::Light, Scope::Batch, [100, 190, 110])
+        .reads(&[PathStates])
+        .writes(&[PixelRadiance]),
+    Info::new(Pass::PathAccumulate, "path_accumulate", Role::Image, Scope::Frame, [200, 170, 230])
+        .reads(&[PixelAccumulated, PixelRadiance])
+        .writes(&[PixelAccumulated, PixelRadiance]),
+    Info::new(Pass::Auxiliary, "auxiliary", Role::Image, Scope::Bounce, [50, 150, 110])
+        .reads(&[Hits, PathStates, PixelAux])
+        .writes(&[PixelAux]),
+    Info::new(Pass::Demodulate, "demodulate", Role::Image, Scope::Frame, [70, 200, 170])
+        .reads(&[PixelRadiance, PixelAux])
+        .writes(&[PixelFiltered]),
+    Info::new(Pass::AtrousFilter, "atrous_filter", Role::Image, Scope::Frame, [80, 170, 190])
+        .reads(&[PixelAux, PixelFiltered])
+        .writes(&[PixelFiltered]),
 ];
 
 impl Pass {

@@ -126,12 +126,9 @@ impl Plan {
 
     /// Returns the passes of a frame that traces paths.
     fn of_paths(frame: &FrameProperties) -> Self {
-        let mut light = if frame.light_layers { layer().to_vec() } else { PassSequence::new() };
-        light.extend([PlanEntry::Run(Pass::PathResolve), barrier(Access::Write, Access::Update, &[PixelRadiance])]);
-        let sums = vec![
-            PlanEntry::Run(Pass::PathAccumulate),
-            barrier(Access::Write, Access::Read, &[PixelAccumulated, PixelRadiance]),
-        ];
+        let mut light = if frame.light_layers { layer() } else { PassSequence::new() };
+        light.extend(run(Pass::PathResolve, Access::Update, &[PixelRadiance]));
+        let sums = run(Pass::PathAccumulate, Access::Read, &[PixelAccumulated, PixelRadiance]);
         Self {
             visibility: PassSequence::new(),
             bounces: (0..frame.n_bounces).map(|depth| bounce_of_paths(frame, depth)).collect(),
@@ -186,27 +183,15 @@ pub fn visibility(primary: Primary) -> PassSequence {
 fn bounce_of_paths(frame: &FrameProperties, depth: u32) -> PassSequence {
     let mut bounce = PassSequence::new();
     if depth == 0 {
-        bounce.extend([
-            PlanEntry::Run(Pass::PathBegin),
-            barrier(Access::Write, Access::Update, &[Rays, PathStates, ShadowRays, LivePaths]),
-        ]);
+        bounce.extend(run(Pass::PathBegin, Access::Update, &[Rays, PathStates, ShadowRays, LivePaths]));
     }
-    bounce.extend([
-        PlanEntry::Run(Pass::PathTrace),
-        barrier(Access::Write, Access::Update, &[Hits, PathStates, ShadowRays, Counters, PixelAovs]),
-    ]);
-    if depth == 0 && frame.pixel_aovs {
-        bounce.extend([PlanEntry::Run(Pass::PixelAovs), barrier(Access::Write, Access::Update, &[PixelAovs])]);
-    }
-    bounce.extend(surface_layers(frame, depth));
+    bounce.extend(run(Pass::PathTrace, Access::Update, &[Hits, PathStates, ShadowRays, Counters, PixelAovs]));
+    bounce.extend(first_hits(frame, depth));
     if frame.is_lit {
-        bounce.extend([
-            PlanEntry::Run(Pass::PathScatter),
-            barrier(Access::Write, Access::Update, &[Rays, PathStates, ShadowRays, ChildFlags, ScanBlocks]),
-        ]);
+        bounce.extend(run(Pass::PathScatter, Access::Update, &[Rays, PathStates, ShadowRays, ChildFlags, ScanBlocks]));
     }
     if depth == 0 && frame.is_lit && frame.denoise == Denoise::Edge {
-        bounce.extend([PlanEntry::Run(Pass::Auxiliary), barrier(Access::Write, Access::Update, &[PixelAux])]);
+        bounce.extend(run(Pass::Auxiliary, Access::Update, &[PixelAux]));
     }
     // The last layer is complete after the last bounce.
     if depth + 1 < LIGHT_LAYERS && frame.is_lit && frame.light_layers {
@@ -225,27 +210,28 @@ fn bounce_of_paths(frame: &FrameProperties, depth: u32) -> PassSequence {
     bounce
 }
 
-/// Returns the entries that add up what camera rays hit, if the frame has them and `depth` is the bounce of these rays.
-fn surface_layers(frame: &FrameProperties, depth: u32) -> PassSequence {
-    if depth > 0 || !frame.is_lit || !frame.surface_layers {
-        return PassSequence::new();
+/// Returns the entries that note what the camera rays have hit: AOVs, and the layers of surfaces.
+fn first_hits(frame: &FrameProperties, depth: u32) -> PassSequence {
+    let mut first_hits = PassSequence::new();
+    if depth == 0 && frame.pixel_aovs {
+        first_hits.extend(run(Pass::PixelAovs, Access::Update, &[PixelAovs]));
     }
-    vec![PlanEntry::Run(Pass::SurfaceLayers), barrier(Access::Write, Access::Update, &[PixelRadiance])]
+    if depth == 0 && frame.is_lit && frame.surface_layers {
+        first_hits.extend(run(Pass::SurfaceLayers, Access::Update, &[PixelRadiance]));
+    }
+    first_hits
 }
 
 /// Returns the entries that add up a layer of light.
-fn layer() -> [PlanEntry; 2] {
-    [PlanEntry::Run(Pass::PathLayers), barrier(Access::Write, Access::Update, &[PathSnapshots, PixelRadiance])]
+fn layer() -> PassSequence {
+    run(Pass::PathLayers, Access::Update, &[PathSnapshots, PixelRadiance])
 }
 
 /// Returns the sequence that finds the closest hits of one bounce's rays and, from these, makes the next bounce's
 /// rays.
 fn bounce(frame: &FrameProperties, depth: u32) -> PassSequence {
     let mut bounce = closest_hits(frame, depth);
-    if depth == 0 && frame.pixel_aovs {
-        bounce.extend([PlanEntry::Run(Pass::PixelAovs), barrier(Access::Write, Access::Update, &[PixelAovs])]);
-    }
-    bounce.extend(surface_layers(frame, depth));
+    bounce.extend(first_hits(frame, depth));
     if depth + 1 < frame.n_bounces {
         bounce.extend(next_rays());
     }
@@ -256,10 +242,7 @@ fn bounce(frame: &FrameProperties, depth: u32) -> PassSequence {
 /// are intersected with these. All other rays are traced through the acceleration structure.
 fn closest_hits(frame: &FrameProperties, depth: u32) -> PassSequence {
     let is_rasterized = depth == 0 && frame.primary != Primary::Trace;
-    vec![
-        PlanEntry::Run(if is_rasterized { Pass::PrimaryHit } else { Pass::Trace }),
-        barrier(Access::Write, Access::Update, &[Hits, Counters, PixelAovs]),
-    ]
+    run(if is_rasterized { Pass::PrimaryHit } else { Pass::Trace }, Access::Update, &[Hits, Counters, PixelAovs])
 }
 
 /// Returns the entries of compaction (the paper's section 2.1), which writes the rays that go on from the hits to the
@@ -283,10 +266,7 @@ pub fn next_rays() -> PassSequence {
 fn light(has_lights: bool) -> PassSequence {
     let mut light = PassSequence::new();
     if has_lights {
-        light.extend([
-            PlanEntry::Run(Pass::Shadow),
-            barrier(Access::Write, Access::Update, &[LightVisibility, PixelAovs]),
-        ]);
+        light.extend(run(Pass::Shadow, Access::Update, &[LightVisibility, PixelAovs]));
     }
     light.extend([
         PlanEntry::Run(Pass::Shade),
@@ -305,7 +285,7 @@ fn samples(frame: &FrameProperties) -> PassSequence {
     if !frame.is_lit || !frame.adds_samples {
         return PassSequence::new();
     }
-    vec![PlanEntry::Run(Pass::Accumulate), barrier(Access::Write, Access::Read, &[PixelAccumulated, PixelRadiance])]
+    run(Pass::Accumulate, Access::Read, &[PixelAccumulated, PixelRadiance])
 }
 
 /// Returns the entries that turn the mean of all samples into the displayed picture, or display an AOV in its place.
@@ -322,17 +302,18 @@ pub fn display(frame: &FrameProperties) -> PassSequence {
 fn noise_filter(denoise: Denoise) -> PassSequence {
     match denoise {
         Denoise::Off => PassSequence::new(),
-        Denoise::Paper { .. } => {
-            vec![PlanEntry::Run(Pass::Denoise), barrier(Access::Write, Access::Read, &[PixelFiltered])]
-        }
+        Denoise::Paper { .. } => run(Pass::Denoise, Access::Read, &[PixelFiltered]),
         Denoise::Edge => {
             let entries = std::iter::repeat_n(Pass::AtrousFilter, N_ATROUS_ITERATIONS as usize);
             let passes = std::iter::once(Pass::Demodulate).chain(entries);
-            passes
-                .flat_map(|pass| [PlanEntry::Run(pass), barrier(Access::Write, Access::Update, &[PixelFiltered])])
-                .collect()
+            passes.flat_map(|pass| run(pass, Access::Update, &[PixelFiltered])).collect()
         }
     }
+}
+
+/// Returns the entries that run a pass, and let what it has written to `of` be accessed `after` it.
+fn run(pass: Pass, after: Access, of: &'static [Resource]) -> PassSequence {
+    vec![PlanEntry::Run(pass), barrier(Access::Write, after, of)]
 }
 
 fn barrier(before: Access, after: Access, of: &'static [Resource]) -> PlanEntry {

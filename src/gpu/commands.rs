@@ -334,11 +334,7 @@ impl Commands<'_> {
         self.transition(
             ids,
             (vk::PipelineStageFlags2::COMPUTE_SHADER, vk::AccessFlags2::NONE, vk::ImageLayout::UNDEFINED),
-            (
-                vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT,
-                vk::AccessFlags2::COLOR_ATTACHMENT_WRITE,
-                vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
-            ),
+            DRAWN_COLOR,
         );
         let depth_access =
             vk::AccessFlags2::DEPTH_STENCIL_ATTACHMENT_READ | vk::AccessFlags2::DEPTH_STENCIL_ATTACHMENT_WRITE;
@@ -351,24 +347,13 @@ impl Commands<'_> {
 
     /// Makes drawn IDs visible to kernels.
     pub fn color_to_compute(&self, ids: &Arc<Target>) {
-        self.transition(
-            ids,
-            (
-                vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT,
-                vk::AccessFlags2::COLOR_ATTACHMENT_WRITE,
-                vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
-            ),
-            (vk::PipelineStageFlags2::COMPUTE_SHADER, vk::AccessFlags2::SHADER_STORAGE_READ, vk::ImageLayout::GENERAL),
-        );
+        self.transition(ids, DRAWN_COLOR, READ_BY_KERNELS);
     }
 
     /// Prepares an ID target for kernels and discards its contents.
     pub fn discard_for_compute(&self, ids: &Arc<Target>) {
-        self.transition(
-            ids,
-            (vk::PipelineStageFlags2::NONE, vk::AccessFlags2::NONE, vk::ImageLayout::UNDEFINED),
-            (vk::PipelineStageFlags2::COMPUTE_SHADER, vk::AccessFlags2::SHADER_STORAGE_READ, vk::ImageLayout::GENERAL),
-        );
+        let before = (vk::PipelineStageFlags2::NONE, vk::AccessFlags2::NONE, vk::ImageLayout::UNDEFINED);
+        self.transition(ids, before, READ_BY_KERNELS);
     }
 
     fn transition(&self, target: &Arc<Target>, from: LayoutState, to: LayoutState) {
@@ -377,7 +362,13 @@ impl Commands<'_> {
     }
 
     /// Records a layout transition between two states of an image.
-    fn transition_image(&self, image: vk::Image, range: vk::ImageSubresourceRange, from: LayoutState, to: LayoutState) {
+    pub(super) fn transition_image(
+        &self,
+        image: vk::Image,
+        range: vk::ImageSubresourceRange,
+        from: LayoutState,
+        to: LayoutState,
+    ) {
         let barrier = [vk::ImageMemoryBarrier2::default()
             .image(image)
             .subresource_range(range)
@@ -482,22 +473,36 @@ impl Commands<'_> {
         let [before, after] = image.layouts;
         let (copy, written) = (vk::PipelineStageFlags2::COPY, vk::AccessFlags2::TRANSFER_WRITE);
         let copying = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
-        self.transition_external(image, (copy, vk::AccessFlags2::NONE, before), (copy, written, copying));
+        self.transition_image(image.raw, COLOR_RANGE, (copy, vk::AccessFlags2::NONE, before), (copy, written, copying));
         let n_pixels = u64::from(rows.stride) * u64::from(height.saturating_sub(1)) + u64::from(width);
         assert!(width <= rows.stride && rows.offset + 4 * n_pixels <= source.bytes(), "the buffer holds the rows");
         self.keep(source);
         // SAFETY: the buffer holds the rows, and the image is in this layout.
         unsafe { self.device.raw.cmd_copy_buffer_to_image(self.raw, source.raw(), image.raw, copying, &region) };
         // `Context::submit_copies` signals its semaphore at the stage COPY, so the transition ends at this stage.
-        self.transition_external(image, (copy, written, copying), (copy, vk::AccessFlags2::NONE, after));
-    }
-
-    fn transition_external(&self, image: &ExternalImage, from: LayoutState, to: LayoutState) {
-        let range =
-            vk::ImageSubresourceRange::default().aspect_mask(vk::ImageAspectFlags::COLOR).level_count(1).layer_count(1);
-        self.transition_image(image.raw, range, from, to);
+        self.transition_image(image.raw, COLOR_RANGE, (copy, written, copying), (copy, vk::AccessFlags2::NONE, after));
     }
 }
 
+/// The whole of a colour image, which has one mip level and one layer.
+pub(super) const COLOR_RANGE: vk::ImageSubresourceRange = vk::ImageSubresourceRange {
+    aspect_mask: vk::ImageAspectFlags::COLOR,
+    base_mip_level: 0,
+    level_count: 1,
+    base_array_layer: 0,
+    layer_count: 1,
+};
+
 /// Stages, accesses and image layout on one side of a layout transition.
 type LayoutState = (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout);
+
+/// A colour image that rendering writes, or has written.
+pub(super) const DRAWN_COLOR: LayoutState = (
+    vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT,
+    vk::AccessFlags2::COLOR_ATTACHMENT_WRITE,
+    vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
+);
+
+/// An image that kernels read.
+const READ_BY_KERNELS: LayoutState =
+    (vk::PipelineStageFlags2::COMPUTE_SHADER, vk::AccessFlags2::SHADER_STORAGE_READ, vk::ImageLayout::GENERAL);

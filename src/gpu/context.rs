@@ -202,11 +202,7 @@ impl Context {
     /// # Errors
     /// The kernel does not run.
     pub fn fuses_fma(self: &Arc<Self>) -> Result<bool, GpuError> {
-        if let Some(&fuses) = self.fuses_fma.get() {
-            return Ok(fuses);
-        }
-        let fuses = probe::fuses_fma(self)?;
-        Ok(*self.fuses_fma.get_or_init(|| fuses))
+        probed(&self.fuses_fma, || probe::fuses_fma(self))
     }
 
     /// Returns the number of lanes (invocations) that are resident on the device at once, in all subgroups together.
@@ -216,11 +212,7 @@ impl Context {
     /// # Errors
     /// The kernel does not run.
     pub fn n_lanes(self: &Arc<Self>) -> Result<u32, GpuError> {
-        if let Some(&n_lanes) = self.n_lanes.get() {
-            return Ok(n_lanes);
-        }
-        let n_lanes = if self.predicates_branches { 0 } else { probe::n_lanes(self)? };
-        Ok(*self.n_lanes.get_or_init(|| n_lanes))
+        probed(&self.n_lanes, || if self.predicates_branches { Ok(0) } else { probe::n_lanes(self) })
     }
 
     /// Returns the number of iterations that all loops of a kernel may take together. Beyond it, the driver
@@ -231,11 +223,7 @@ impl Context {
     /// # Errors
     /// The kernel does not run.
     pub fn loop_limit(self: &Arc<Self>) -> Result<Option<u32>, GpuError> {
-        if let Some(&limit) = self.loop_limit.get() {
-            return Ok(limit);
-        }
-        let limit = if self.is_software() { probe::loop_limit(self)? } else { None };
-        Ok(*self.loop_limit.get_or_init(|| limit))
+        probed(&self.loop_limit, || if self.is_software() { probe::loop_limit(self) } else { Ok(None) })
     }
 
     /// Returns the properties that tests substitute for the device's own.
@@ -321,6 +309,15 @@ impl Context {
     pub fn wait_for_all(&self) -> Result<(), GpuError> {
         self.queue.wait_for_all()
     }
+}
+
+/// Returns the property, which `probe` finds out at the first call.
+fn probed<T: Copy>(property: &OnceLock<T>, probe: impl FnOnce() -> Result<T, GpuError>) -> Result<T, GpuError> {
+    if let Some(&known) = property.get() {
+        return Ok(known);
+    }
+    let found = probe()?;
+    Ok(*property.get_or_init(|| found))
 }
 
 #[cfg(test)]

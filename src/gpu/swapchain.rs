@@ -4,7 +4,7 @@ use std::{slice, sync::Arc};
 
 use ash::{khr, vk};
 
-use super::{Context, GpuError, WindowSurface};
+use super::{Context, GpuError, WindowSurface, commands::COLOR_RANGE};
 
 /// Number of images to request, within the surface's bounds: one is shown, one waits to be shown and one is drawn.
 const N_IMAGES: u32 = 3;
@@ -88,17 +88,11 @@ impl Swapchain {
 
     fn add_image(&mut self, raw: vk::Image, format: vk::Format) -> Result<(), GpuError> {
         let device = &self.context.device.raw;
-        let range = vk::ImageSubresourceRange {
-            aspect_mask: vk::ImageAspectFlags::COLOR,
-            level_count: 1,
-            layer_count: 1,
-            ..Default::default()
-        };
         let info = vk::ImageViewCreateInfo::default()
             .image(raw)
             .view_type(vk::ImageViewType::TYPE_2D)
             .format(format)
-            .subresource_range(range);
+            .subresource_range(COLOR_RANGE);
         // SAFETY: the image belongs to the swapchain, with which the view and the semaphore are released.
         unsafe {
             let view = device.create_image_view(&info, None).map_err(GpuError::call("vkCreateImageView", "window"))?;

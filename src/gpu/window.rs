@@ -3,19 +3,20 @@
 use ash::vk;
 use bytemuck::Pod;
 
-use super::{BindingSet, Commands, RasterPipeline, WindowImage, swapchain::SwapchainImage};
+use super::{
+    BindingSet, Commands, RasterPipeline, WindowImage,
+    commands::{COLOR_RANGE, DRAWN_COLOR},
+    swapchain::SwapchainImage,
+};
 
 impl Commands<'_> {
     /// Prepares the image for drawing and begins rendering to it, which clears it to black.
     pub(super) fn begin_window(&self, image: &SwapchainImage, extent: vk::Extent2D) {
-        let output = vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT;
         // The submit waits at this stage until the image is acquired.
-        let barrier = image_barrier(image)
-            .src_stage_mask(output)
-            .old_layout(vk::ImageLayout::UNDEFINED)
-            .dst_stage_mask(output)
-            .dst_access_mask(vk::AccessFlags2::COLOR_ATTACHMENT_READ | vk::AccessFlags2::COLOR_ATTACHMENT_WRITE)
-            .new_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL);
+        let output = vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT;
+        let access = vk::AccessFlags2::COLOR_ATTACHMENT_READ | vk::AccessFlags2::COLOR_ATTACHMENT_WRITE;
+        let before = (output, vk::AccessFlags2::NONE, vk::ImageLayout::UNDEFINED);
+        let drawing = (output, access, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL);
         let color = [vk::RenderingAttachmentInfo::default()
             .image_view(image.view)
             .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
@@ -23,7 +24,7 @@ impl Commands<'_> {
             .store_op(vk::AttachmentStoreOp::STORE)];
         let area = vk::Rect2D { extent, ..Default::default() };
         let rendering = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&color);
-        self.image_barrier(barrier);
+        self.transition_image(image.raw, COLOR_RANGE, before, drawing);
         // SAFETY: the commands are being recorded, and the image is in the named layout.
         unsafe { self.device.raw.cmd_begin_rendering(self.raw, &rendering) };
     }
@@ -32,13 +33,8 @@ impl Commands<'_> {
     pub(super) fn end_window(&self, image: &SwapchainImage) {
         // SAFETY: `begin_window` has begun the rendering.
         unsafe { self.device.raw.cmd_end_rendering(self.raw) };
-        let barrier = image_barrier(image)
-            .src_stage_mask(vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT)
-            .src_access_mask(vk::AccessFlags2::COLOR_ATTACHMENT_WRITE)
-            .old_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
-            .dst_stage_mask(vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT)
-            .new_layout(vk::ImageLayout::PRESENT_SRC_KHR);
-        self.image_barrier(barrier);
+        let shown = (DRAWN_COLOR.0, vk::AccessFlags2::NONE, vk::ImageLayout::PRESENT_SRC_KHR);
+        self.transition_image(image.raw, COLOR_RANGE, DRAWN_COLOR, shown);
     }
 
     /// Draws one triangle that covers the window, as a pass of the pipeline's name.
@@ -64,21 +60,4 @@ impl Commands<'_> {
             }
         });
     }
-
-    fn image_barrier(&self, barrier: vk::ImageMemoryBarrier2) {
-        let barriers = [barrier];
-        let info = vk::DependencyInfo::default().image_memory_barriers(&barriers);
-        // SAFETY: the commands are being recorded, and no rendering is open.
-        unsafe { self.device.raw.cmd_pipeline_barrier2(self.raw, &info) };
-    }
-}
-
-fn image_barrier(image: &SwapchainImage) -> vk::ImageMemoryBarrier2<'static> {
-    let range = vk::ImageSubresourceRange {
-        aspect_mask: vk::ImageAspectFlags::COLOR,
-        level_count: 1,
-        layer_count: 1,
-        ..Default::default()
-    };
-    vk::ImageMemoryBarrier2::default().image(image.raw).subresource_range(range)
 }

@@ -20,7 +20,7 @@ use crate::{
 };
 
 /// The scene, its acceleration structure and the frame's constants. `R` counts reads of the structure.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct KernelInputs<'a, R = NoCounter> {
     /// The frame's constants; `None` for rays that do not belong to a frame.
     pub frame: Option<&'a Frame>,
@@ -288,37 +288,12 @@ impl<'a> KernelInputs<'a> {
     /// Inputs with the triangles and the constants of their structure. All other arrays are empty.
     fn without_accel(triangles: &'a [Triangle], constants: &AccelConstants) -> Self {
         Self {
-            frame: None,
-            noise_tiles: &[],
             box_min: constants.box_min,
             box_max: constants.box_max,
             origin_reach: constants.origin_reach,
             triangles,
-            triangle_materials: &[],
-            filters: false,
-            materials: &[],
-            textures: None,
-            alpha_masks: None,
-            path_alpha_test: None,
-            tests_blended: false,
-            stochastic_alpha: false,
-            is_of_camera: false,
-            culls_back_faces: false,
-            lights: &[],
-            emitters: None,
-            kd_nodes: CountedSlice::from(&[][..]),
-            kd_parents: CountedSlice::from(&[][..]),
-            leaf_triangles: CountedSlice::from(&[][..]),
-            leaf_planes: &[],
-            kd_slabs: CountedSlice::from(&[][..]),
-            kd_boxes: CountedSlice::from(&[][..]),
-            kd_ropes: CountedSlice::from(&[][..]),
-            lattice: None,
-            grid_cells: CountedSlice::from(&[][..]),
-            n_grid_levels: 0,
-            instanced: None,
             other_rays: INSTANCE_FOR_OTHERS,
-            inside: None,
+            ..Self::default()
         }
     }
 

@@ -18,7 +18,7 @@ use crate::layout::{
 
 /// The directions in which a ray continues from a surface, and the weights by which its throughput is multiplied. A
 /// weight of zero means that there is no such ray.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Scattering {
     pub reflected: Vec3,
     pub reflected_weight: Vec3,
@@ -151,24 +151,18 @@ pub fn transmittance(material: &Material, surface: &Surface, t: f32) -> Vec3 {
 /// Returns how a ray of this direction continues from a surface.
 pub fn scatter(material: &Material, surface: &Surface, direction: Vec3) -> Scattering {
     if is_unlit(material) {
+        let transmitted_weight = Vec3::splat(1.0 - material.d);
         return Scattering {
-            reflected: Vec3::ZERO,
-            reflected_weight: Vec3::ZERO,
             transmitted: direction,
-            transmitted_weight: Vec3::splat(1.0 - material.d),
+            transmitted_weight,
             passes_straight: true,
+            ..Scattering::default()
         };
     }
     if is_microfacet(material) {
         return scatter_by_microfacets(material, surface, direction);
     }
-    let mut s = Scattering {
-        reflected: Vec3::ZERO,
-        reflected_weight: Vec3::ZERO,
-        transmitted: direction,
-        transmitted_weight: Vec3::ZERO,
-        passes_straight: false,
-    };
+    let mut s = Scattering { transmitted: direction, ..Scattering::default() };
     let reflects = material.flags & MATERIAL_REFLECT != 0;
     let refracts = material.flags & MATERIAL_REFRACT != 0;
     if !reflects && !refracts {

@@ -33,7 +33,7 @@ impl GpuRenderer {
     /// and a pending sample stays pending.
     pub fn resize(&mut self, width: u32, height: u32) -> Result<(), GpuError> {
         let options = RenderOptions { width, height, crop: None, ..self.options.clone() };
-        self.remake(&options)
+        self.set_options(&options)
     }
 
     /// Sets the part of the picture to render. If it changes, the next sample is the first of a new picture. Buffers
@@ -43,19 +43,7 @@ impl GpuRenderer {
     /// The crop is empty or exceeds the picture, or the part exceeds the device's limits or memory. Then nothing has
     /// changed.
     pub fn set_crop(&mut self, crop: Crop) -> Result<(), GpuError> {
-        self.remake(&RenderOptions { crop: Some(crop), ..self.options.clone() })
-    }
-
-    /// Sets the options of the next samples. Only kernels that depend on a changed option are created again. Samples
-    /// are kept if only their display changes: the exposure, the tone curve or the filter's threshold.
-    /// [`GpuRenderer::show`] then displays them by the new options, unless a pending sample has overwritten some of
-    /// their radiance. A pending sample is dropped.
-    ///
-    /// # Errors
-    /// An option is out of its range, the options exceed the device's limits or memory, or the driver refuses a kernel.
-    /// Then nothing has changed, and a pending sample stays pending.
-    pub fn set_options(&mut self, options: &RenderOptions) -> Result<(), GpuError> {
-        self.remake(options)
+        self.set_options(&RenderOptions { crop: Some(crop), ..self.options.clone() })
     }
 
     /// Creates all kernels again, from shaders that have changed. The next sample is the first of a new picture.
@@ -128,9 +116,16 @@ impl GpuRenderer {
         Ok(true)
     }
 
-    /// Creates the buffers and kernels that the changed options need, and then installs them by steps that cannot
-    /// fail.
-    fn remake(&mut self, options: &RenderOptions) -> Result<(), GpuError> {
+    /// Sets the options of the next samples. Only kernels that depend on a changed option are created again. Samples
+    /// are kept if only their display changes: the exposure, the tone curve or the filter's threshold.
+    /// [`GpuRenderer::show`] then displays them by the new options, unless a pending sample has overwritten some of
+    /// their radiance. A pending sample is dropped.
+    ///
+    /// # Errors
+    /// An option is out of its range, the options exceed the device's limits or memory, or the driver refuses a kernel.
+    /// Then nothing has changed, and a pending sample stays pending.
+    pub fn set_options(&mut self, options: &RenderOptions) -> Result<(), GpuError> {
+        // What the changed options need is created first, and then installed by steps that cannot fail.
         options.check_ranges()?;
         let (asked, options) = (options.clone(), &in_use(options));
         if options.integrator != self.in_use.integrator {

@@ -25,8 +25,6 @@ pub enum ViewRenderer {
 /// The CPU engine's renderer, with the picture that the window shows.
 pub struct CpuView {
     renderer: CpuRenderer,
-    world: World,
-    camera: Camera,
     most_pixels: Option<u32>,
     /// The last complete picture.
     displayed: Option<(Displayed, Picture)>,
@@ -49,7 +47,10 @@ impl ViewRenderer {
         options.check()?;
         Ok(match context {
             Some(context) => Self::Device(Box::new(GpuRenderer::new(context.clone(), world, options)?)),
-            None => Self::Cpu(Box::new(CpuView::new(world, options))),
+            None => {
+                let renderer = CpuRenderer::new(world, options, Batching::default());
+                Self::Cpu(Box::new(CpuView { renderer, most_pixels: None, displayed: None }))
+            }
         })
     }
 
@@ -62,9 +63,8 @@ impl ViewRenderer {
             Self::Device(renderer) => Self::Device(Box::new(renderer.sharing(options)?)),
             Self::Cpu(view) => {
                 options.check()?;
-                let mut next = CpuView::new(&view.world, options);
-                next.set_camera(&view.camera);
-                Self::Cpu(Box::new(next))
+                let renderer = view.renderer.with_options(options);
+                Self::Cpu(Box::new(CpuView { renderer, most_pixels: view.most_pixels, displayed: None }))
             }
         })
     }
@@ -82,11 +82,7 @@ impl ViewRenderer {
             Self::Device(renderer) => renderer.set_options(options),
             Self::Cpu(view) => {
                 options.check()?;
-                let mut next = CpuView::new(&view.world, options);
-                next.set_camera(&view.camera);
-                next.limit_batches(view.most_pixels);
-                next.displayed = view.displayed.take();
-                **view = next;
+                view.renderer = view.renderer.with_options(options);
                 Ok(())
             }
         }
@@ -98,7 +94,6 @@ impl ViewRenderer {
             Self::Device(renderer) => renderer.set_world(world),
             Self::Cpu(view) => {
                 view.renderer.set_world(world);
-                view.world = world.clone();
                 Ok(())
             }
         }
@@ -107,14 +102,14 @@ impl ViewRenderer {
     pub fn camera(&self) -> &Camera {
         match self {
             Self::Device(renderer) => renderer.camera(),
-            Self::Cpu(view) => &view.camera,
+            Self::Cpu(view) => view.renderer.camera(),
         }
     }
 
     pub fn set_camera(&mut self, camera: &Camera) {
         match self {
             Self::Device(renderer) => renderer.set_camera(camera),
-            Self::Cpu(view) => view.set_camera(camera),
+            Self::Cpu(view) => view.renderer.set_camera(camera),
         }
     }
 
@@ -155,7 +150,8 @@ impl ViewRenderer {
         match self {
             Self::Device(renderer) => renderer.limit_batches(most_pixels),
             Self::Cpu(view) => {
-                view.limit_batches(most_pixels);
+                view.most_pixels = most_pixels;
+                view.renderer.limit_batches(most_pixels);
                 Ok(())
             }
         }
@@ -233,25 +229,10 @@ impl ViewRenderer {
 }
 
 impl CpuView {
-    fn new(world: &World, options: &RenderOptions) -> Self {
-        let renderer = CpuRenderer::new(world, options, Batching::default());
-        Self { renderer, world: world.clone(), camera: world.scene().camera, most_pixels: None, displayed: None }
-    }
-
-    fn set_camera(&mut self, camera: &Camera) {
-        self.camera = *camera;
-        self.renderer.set_camera(camera);
-    }
-
-    fn limit_batches(&mut self, most_pixels: Option<u32>) {
-        self.most_pixels = most_pixels;
-        self.renderer.limit_batches(most_pixels);
-    }
-
     fn draw_batch(&mut self) -> Option<Profile> {
         let profile = self.renderer.draw_batch()?;
         let picture = self.renderer.picture();
-        let displayed = Displayed { size: (picture.width, picture.height), camera: self.camera };
+        let displayed = Displayed { size: (picture.width, picture.height), camera: *self.renderer.camera() };
         self.displayed = Some((displayed, picture));
         Some(profile)
     }

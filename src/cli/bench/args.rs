@@ -22,6 +22,7 @@ use crate::cli::{
         PictureArgs, accel_help, accel_long_help, fixed_traversal_help, fixed_traversal_long_help, listed,
         traversals_of_devices,
     },
+    report::write_json,
 };
 
 /// The benchmark suites.
@@ -215,11 +216,7 @@ impl FileArgs {
 
     /// Writes the files that the user has named.
     pub fn write(&self, report: &impl serde::Serialize, svg: impl FnOnce() -> String) -> Result<(), CliError> {
-        if let Some(path) = &self.json {
-            let mut json = serde_json::to_vec_pretty(report).expect("plain structs of numbers and words");
-            json.push(b'\n');
-            output::write(path, &json)?;
-        }
+        write_json(self.json.as_ref(), report)?;
         if let Some(path) = &self.svg {
             output::write(path, svg().as_bytes())?;
         }

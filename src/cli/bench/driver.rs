@@ -13,10 +13,7 @@ use kdray::{
         rays::{RaySetKind, ray_sets},
         stage::Stage,
     },
-    engine::{
-        Opened,
-        choices::{Processor, TreeKind},
-    },
+    engine::choices::{Processor, TreeKind},
     gpu::{ContextOptions, Device, GpuError},
     world::FlatScene,
 };
@@ -35,9 +32,8 @@ pub fn run(args: &DriverArgs) -> Result<(), CliError> {
     args.files.check(&[&args.mesh], &args.load.options())?;
     let device = Device::with_ray_tracing(&ContextOptions::new(args.device.clone(), false))?;
     let progress = Progress::new(false, 8);
-    let loading = format!("loading {}", args.mesh.display());
-    let (opened, _) = progress.stage(&loading, || Opened::read(&args.mesh, &args.load.rays()));
-    let scene = FlatScene::new(&opened?.scene).map_err(GpuError::from)?;
+    let opened = progress.read(&args.mesh, &args.load.rays())?;
+    let scene = FlatScene::new(&opened.scene).map_err(GpuError::from)?;
     let build_options = TreeKind::Best.options(Processor::of_device(device.info()));
     let building = format!("building the kd-tree of {} triangles", scene.triangles.len());
     let (stage, _) = progress.stage(&building, || stage(args, scene, &build_options));

@@ -2,7 +2,7 @@
 
 use kdray::{
     bench::motion::{Phase, Report, measure, moments},
-    engine::{AnimatedWorld, Engine, Loaded, Opened},
+    engine::{AnimatedWorld, Engine, Loaded},
     frame::RenderOptions,
     gpu::{ContextOptions, Device},
 };
@@ -11,7 +11,6 @@ use super::args::MotionArgs;
 use crate::cli::{
     device_args::open_device,
     error::CliError,
-    picture_args::check_build,
     print,
     progress::Progress,
     table::{decimal, table},
@@ -20,17 +19,15 @@ use crate::cli::{
 /// Loads the scene, draws its frames and reports their times.
 pub fn run(args: &MotionArgs) -> Result<(), CliError> {
     args.files.check(&[&args.scene], &args.load.options())?;
-    args.picture.check()?;
-    check_build(args.picture.build, args.cpu)?;
+    args.picture.check(args.cpu)?;
     let progress = Progress::new(false, 3);
     let (scene, n_frames) = (args.scene.display(), args.frames);
     let mut request = args.load.pictures(&args.picture, &args.look, Default::default());
     let first = request.scene.at;
     request.scene.at = first.or(Some(0.0));
-    let (opened, _) = progress.stage(&format!("loading {scene}"), || Opened::read(&args.scene, &request));
-    let opened = opened?;
+    let opened = progress.read(&args.scene, &request)?;
     if !args.load.plays(&opened.scene.animations) {
-        return Err(CliError::Usage(format!("{scene}: nothing moves, so there are no frames to measure")));
+        return CliError::refuse(format!("{scene}: nothing moves, so there are no frames to measure"));
     }
     let fps = args.load.frames_a_second();
     let animations = &opened.scene.animations;

@@ -7,7 +7,7 @@ use kdray::{
         stage::Stage,
         traversal::{InstancesReport, Report, SetResult, StepsARay, Tracers, VariantResult},
     },
-    engine::{Opened, choices::TreeKind},
+    engine::choices::TreeKind,
     gpu::{ContextOptions, Device, GpuError},
     world::{FlatScene, World},
 };
@@ -27,9 +27,7 @@ pub fn run(args: &TraversalArgs) -> Result<(), CliError> {
     args.files.check(&[&args.mesh], &args.load.options())?;
     let variants = variants(&args.variants, args.cpu)?;
     let progress = Progress::new(false, 7);
-    let loading = format!("loading {}", args.mesh.display());
-    let (opened, _) = progress.stage(&loading, || Opened::read(&args.mesh, &args.load.rays()));
-    let scene = opened?.scene;
+    let scene = progress.read(&args.mesh, &args.load.rays())?.scene;
     let kept = args.instances.then(|| FlatScene::with_instances(&scene)).transpose().map_err(GpuError::from)?;
     let flat = FlatScene::new(&scene).map_err(GpuError::from)?;
 
@@ -65,7 +63,7 @@ fn variants(asked: &[Search], on_cpu: bool) -> Result<Vec<Search>, CliError> {
         return Ok(Search::all(on_cpu));
     }
     if asked.contains(&Search::Wide) && !on_cpu {
-        return Err(CliError::Usage(format!("--variants {}: only the CPU has it, with --cpu", Search::Wide)));
+        return CliError::refuse(format!("--variants {}: only the CPU has it, with --cpu", Search::Wide));
     }
     let mut variants = Vec::new();
     for variant in asked {

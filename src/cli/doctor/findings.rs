@@ -209,12 +209,6 @@ impl Findings {
         text + &format!("\n{}\n", self.summary())
     }
 
-    /// Returns the findings as JSON, as `--json` prints them.
-    pub fn json(&self) -> String {
-        let json = serde_json::to_string_pretty(self).expect("plain structs of numbers and words");
-        format!("{json}\n")
-    }
-
     /// Whether a processor has passed all its checks.
     pub fn can_render(&self) -> bool {
         self.processors.iter().any(ProcessorFindings::is_ok)

@@ -39,7 +39,9 @@ use self::{
     findings::{Findings, Problem, ProcessorFindings, SceneFindings, Verdict},
     host::Host,
 };
-use super::{args::DoctorArgs, error::CliError, load_args::LoadArgs, print, print_raw, progress::Progress};
+use super::{
+    args::DoctorArgs, error::CliError, load_args::LoadArgs, print, print_raw, progress::Progress, report::json,
+};
 
 /// Examines the machine and, if the user names one, a scene. Prints what was found even if that is an error.
 pub fn run(args: &DoctorArgs) -> Result<(), CliError> {
@@ -67,7 +69,7 @@ pub fn run(args: &DoctorArgs) -> Result<(), CliError> {
         scene,
     };
     match args.json {
-        true => print_raw(&findings.json())?,
+        true => print_raw(&json(&findings))?,
         false => print(&findings.text())?,
     }
     match error {

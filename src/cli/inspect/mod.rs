@@ -9,7 +9,7 @@ use kdray::{
     accel::Statistics,
     buffers::{PathQueue, Pixels},
     engine::{
-        Builder, LoadError, Loaded, Opened, Work,
+        Builder, LoadError, Loaded, Work,
         choices::{BuildPolicy, Processor, Request},
     },
     layout::{LIGHT_DIRECTIONAL, LIGHT_SPOT, Light},
@@ -22,15 +22,19 @@ use self::{
     lighting::Lighting,
     text::{cut_table, shortened},
 };
-use super::{args::InspectArgs, error::CliError, print, print_raw, progress::Progress, report::SCHEMA, table::table};
+use super::{
+    args::InspectArgs,
+    error::CliError,
+    print, print_raw,
+    progress::Progress,
+    report::{SCHEMA, json},
+    table::table,
+};
 
 /// Loads the scene, builds its structure and describes both.
 pub fn run(args: &InspectArgs) -> Result<(), CliError> {
     let progress = Progress::new(false, 2);
-    let request = args.load.scene(Default::default());
-    let (opened, _) =
-        progress.stage(&format!("loading {}", args.scene.display()), || Opened::read(&args.scene, &request));
-    let opened = opened?;
+    let opened = progress.read(&args.scene, &args.load.scene(Default::default()))?;
     let scene = &opened.scene;
     let contents = Contents::from(scene);
     let lighting = Lighting::from(scene);
@@ -66,12 +70,7 @@ pub fn run(args: &InspectArgs) -> Result<(), CliError> {
         build_ms,
         scene: scene.name.clone(),
     };
-    if args.json {
-        let json = serde_json::to_string_pretty(&inspection).expect("plain structs of numbers and words");
-        print_raw(&format!("{json}\n"))
-    } else {
-        print(&inspection.text())
-    }
+    if args.json { print_raw(&json(&inspection)) } else { print(&inspection.text()) }
 }
 
 /// The description, as it is printed.

@@ -39,20 +39,14 @@ pub fn shortened(name: &str) -> String {
 pub fn contents(contents: &Contents, materials: &[MaterialUse], lights: &[LightUse], memory: &TextureMemory) -> String {
     let mut tables = vec![
         cut_table(["mesh", "name", "triangles", "instances", "has"], &contents.meshes, mesh_row),
-        cut_table(["look of material", "model", "opacity", "seen from", "terms", "maps"], materials, |_, it| {
-            material_row(it)
-        }),
+        cut_table(["look of material", "model", "opacity", "seen from", "terms", "maps"], materials, material_row),
     ];
     if !contents.images.is_empty() {
-        tables.push(cut_table(["image", "size", "channels", "bytes", "used by"], &contents.images, |_, it| {
-            image_row(it)
-        }));
+        tables.push(cut_table(["image", "size", "channels", "bytes", "used by"], &contents.images, image_row));
     }
     let spots: Vec<_> = lights.iter().filter(|light| light.direction.is_some()).collect();
     if !spots.is_empty() {
-        tables.push(cut_table(["spot light at", "direction", "inner angle", "outer angle"], &spots, |_, it| {
-            spot_row(it)
-        }));
+        tables.push(cut_table(["spot light at", "direction", "inner angle", "outer angle"], &spots, spot_row));
     }
     tables.push(cameras(contents));
     if !contents.animations.is_empty() {
@@ -76,7 +70,7 @@ fn mesh_row(ix: usize, mesh: &MeshUse) -> [String; 5] {
     [ix.to_string(), shortened(&mesh.name), triangles, instances, parts.join(", ")]
 }
 
-fn material_row(material: &MaterialUse) -> [String; 6] {
+fn material_row(_: usize, material: &MaterialUse) -> [String; 6] {
     let details = &material.details;
     let sides = if details.double_sided { "both sides" } else { "the front" };
     // Without a term or a map that says otherwise, a surface covers what is behind it.
@@ -134,7 +128,7 @@ fn animation_row(ix: usize, animation: &AnimationUse) -> [String; 8] {
     ]
 }
 
-fn image_row(image: &ImageUse) -> [String; 5] {
+fn image_row(_: usize, image: &ImageUse) -> [String; 5] {
     let uses = image.used_by.iter().take(3).map(|shown| format!("{} of {}", shown.term, shortened(&shown.material)));
     let mut uses = uses.collect::<Vec<_>>().join(", ");
     if image.used_by.len() > 3 {
@@ -154,7 +148,7 @@ fn sky_rows(sky: &SkyUse) -> [[String; 2]; 4] {
     ]
 }
 
-fn spot_row(light: &LightUse) -> [String; 4] {
+fn spot_row(_: usize, light: &&LightUse) -> [String; 4] {
     let angle = |angle: Option<f32>| angle.map_or_else(String::new, |angle| format!("{angle:.1}"));
     let direction = light.direction.map_or_else(String::new, vector);
     [vector(light.position), direction, angle(light.inner_angle), angle(light.outer_angle)]

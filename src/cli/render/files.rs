@@ -106,7 +106,7 @@ pub fn check_outputs(args: &RenderArgs, job: &Job) -> Result<(), CliError> {
         if args.is_film() && is_one_film(&job.output) {
             if !args.aov.is_empty() {
                 let what = "--aov needs a file for each frame: an --output with ####, as in out.####.png";
-                return Err(CliError::Usage(what.to_owned()));
+                return CliError::refuse(what);
             }
             if job.output != Path::new(STDOUT) {
                 output::check(&job.output)?;
@@ -178,7 +178,7 @@ pub fn is_one_film(output: &Path) -> bool {
 pub fn numbered(pattern: &Path, frame: u32) -> Result<PathBuf, CliError> {
     let refused = |what| {
         let pattern = pattern.display();
-        Err(CliError::Usage(format!("--output `{pattern}` {what} #### for the frame's number, as in out.####.png")))
+        CliError::refuse(format!("--output `{pattern}` {what} #### for the frame's number, as in out.####.png"))
     };
     let Some(name) = pattern.file_name().and_then(|name| name.to_str()) else { return refused("has no") };
     let runs: Vec<&str> = name.split(|c| c != '#').filter(|run| !run.is_empty()).collect();

@@ -26,7 +26,7 @@ mod views;
 
 use std::path::{Path, PathBuf};
 
-use kdray::{gpu::Device, output};
+use kdray::gpu::Device;
 
 use self::{
     files::{STDOUT, check_outputs, only_job, roles},
@@ -34,7 +34,7 @@ use self::{
     views::{NamedPath, views},
 };
 pub use self::{motion::Shutter, seed::Seed};
-use super::{args::RenderArgs, error::CliError, interrupt, print, print_line};
+use super::{args::RenderArgs, error::CliError, interrupt, print, print_line, report::write_json};
 
 /// Runs `kdray render`.
 pub fn run(args: RenderArgs) -> Result<(), CliError> {
@@ -69,9 +69,7 @@ fn run_one(args: RenderArgs, scene: PathBuf) -> Result<(), CliError> {
     }
     let report = session.draw(&job.scene, views, path)?;
     let engine = session.end()?;
-    if let Some(path) = &args.profile {
-        output::write(path, &report.json())?;
-    }
+    write_json(args.profile.as_ref(), &report)?;
     if !args.quiet && job.output != Path::new(STDOUT) {
         print(&args.progress.report(&report.text()))?;
     }

@@ -69,7 +69,7 @@ fn views_of_film(
     let Frames { first, last, step } = match (args.frames, path) {
         (Some(FrameChoice::Some(frames)), None) if args.turntable.is_some_and(|n| frames.last >= n) => {
             let (last, n) = (frames.last, args.turntable.unwrap_or_default());
-            return Err(CliError::Usage(format!("--frames: a turn of {n} frames has no frame {last}")));
+            return CliError::refuse(format!("--frames: a turn of {n} frames has no frame {last}"));
         }
         (Some(FrameChoice::Some(frames)), _) => frames,
         (_, Some(path)) => path.frames()?,
@@ -101,7 +101,7 @@ fn frames_of_animations(args: &RenderArgs, scene: &Path) -> Result<Frames, CliEr
     if !(first <= last && last <= MOST_FRAMES) {
         let scene = scene.display();
         let what = format!("{scene}: no frames from 0 to {MOST_FRAMES} lie from {begin} s, its first key, to {end} s");
-        return Err(CliError::Usage(what));
+        return CliError::refuse(what);
     }
     Ok(Frames { first: first as u32, last: last as u32, step: 1 })
 }

@@ -45,7 +45,7 @@ pub struct ReadCounts {
 }
 
 /// A slice and the counter of its reads.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct CountedSlice<'a, T, R = NoCounter> {
     items: &'a [T],
     reads: R,
