@@ -6,10 +6,9 @@ use super::image::{Encoded, Examined, MAX_PIXELS, decode_all, normals_of_heights
 use crate::{
     scene::{
         files::SourceFile,
-        meshes::needs::require_for_images,
         model::{Channel, Image, MaterialChoice, Pixels, error::Checked, preset::is_replaced},
     },
-    util::progress::Progress,
+    util::{memory::require, progress::Progress},
 };
 
 /// What a texture shows of an image file.
@@ -141,7 +140,7 @@ impl Images {
             }
             let pixel_bytes = if matches!((view, &image.pixels), (View::Inverted, Pixels::Halves(_))) { 8 } else { 4 };
             let n_bytes = self.n_bytes_to_make.saturating_add(image.pixels.len() as u64 * pixel_bytes);
-            require_for_images(n_bytes)?;
+            require("making images from others", n_bytes)?;
             (self.n_pixels, self.n_bytes_to_make) = (n_pixels, n_bytes);
         }
         self.shown.push(Shown::OfFile(file, view));

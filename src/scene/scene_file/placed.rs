@@ -382,7 +382,7 @@ impl<'a> Placer<'a> {
 fn require_for_places(scene: &Scene, n_places: usize, n_instances: usize) -> Checked<()> {
     let n_bytes_of_one = (size_of::<Instance>() + size_of::<u32>() * scene.materials.len()) as u64;
     let n_bytes = (n_places as u64).saturating_mul(n_instances as u64).saturating_mul(n_bytes_of_one);
-    require("placing a mesh many times", n_bytes).map_err(|error| error.to_string())
+    Ok(require("placing a mesh many times", n_bytes)?)
 }
 
 /// Adds an instance once for each transform that follows its own.

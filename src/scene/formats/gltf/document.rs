@@ -202,7 +202,7 @@ impl Document {
     /// Decodes a buffer view. `n_total` is the number of bytes of all so far.
     fn decoded_view(&self, packed: &meshopt::Packed, n_total: &mut u64) -> Checked<Vec<u8>> {
         *n_total = packed.n_bytes()?.saturating_add(*n_total);
-        require("decoding the buffer views", *n_total).map_err(|error| error.to_string())?;
+        require("decoding the buffer views", *n_total)?;
         let buffer = item(&self.buffers, "buffers", packed.buffer, &"buffer")?;
         packed.decode(part(buffer.bytes(), packed.byte_offset, packed.byte_length)?)
     }

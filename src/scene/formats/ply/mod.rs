@@ -27,13 +27,14 @@ use crate::{
     scene::{
         files::SourceFile,
         meshes::{
-            needs::{Attributes, MeshSize, require_for_mesh, require_for_rows},
+            needs::{Attributes, MeshSize, require_for_mesh},
             polygon::Triangulator,
             smooth::{Shading, smooth_normals},
         },
         model::{Material, Mesh, Texture, error::Checked},
     },
     util::{
+        memory::require,
         progress::{Progress, Work},
         text::one_line,
     },
@@ -226,7 +227,7 @@ fn check_counts(header: &Header, n_bytes: u64) -> Checked<()> {
     }
     // The numbers of a text become eight bytes each.
     let n_content = n_bytes.saturating_mul(if is_text { 5 } else { 1 });
-    require_for_rows(n_held.saturating_add(n_content))
+    Ok(require("reading its rows", n_held.saturating_add(n_content))?)
 }
 
 /// Returns the names of images in the comments `TextureFile NAME`.
