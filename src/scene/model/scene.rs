@@ -6,8 +6,11 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{
-    AnimationInfo, Camera, ChosenLight, Environment, Ground, Image, Light, Material, Mesh, Projection, RenderDefaults,
-    Sky, Transform, deformation::PosedMesh, mesh::corners_of,
+    AnimationInfo, Camera, ChosenLight, Environment, Ground, Image, Light, Material, Mesh, RenderDefaults, Sky,
+    Transform,
+    deformation::PosedMesh,
+    load_options::find_named,
+    mesh::{bounds_of, corners_of},
 };
 
 /// Name of the material of meshes and faces that name none.
@@ -103,17 +106,8 @@ pub struct Instance {
 impl Scene {
     /// Makes one of [`Scene::cameras`] the scene's camera: the first one of this name, or else the one of this index.
     pub(crate) fn choose_camera(&mut self, name: &str) -> Result<(), String> {
-        let named = self.cameras.iter().find(|(other, _)| other == name);
-        let found = named.or_else(|| self.cameras.get(name.parse::<usize>().ok()?));
-        let Some((_, camera)) = found else {
-            let cameras = self.cameras.iter().enumerate().map(|(ix, (name, _))| format!("{ix} `{name}`"));
-            let cameras = cameras.collect::<Vec<_>>().join(", ");
-            return Err(match cameras.is_empty() {
-                true => format!("there is no camera `{name}`: the file names no cameras"),
-                false => format!("there is no camera `{name}`, but {cameras}"),
-            });
-        };
-        self.camera = *camera;
+        let names: Vec<_> = self.cameras.iter().map(|(name, _)| Some(&**name)).collect();
+        self.camera = self.cameras[find_named("camera", name, &names, "the file names no cameras")?].1;
         Ok(())
     }
 
