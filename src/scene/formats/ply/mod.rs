@@ -66,7 +66,7 @@ struct Faces<'a> {
 
 /// The mesh of a file without its materials. Its faces have the slot of their image.
 pub(crate) struct PlyMesh {
-    mesh: Mesh,
+    pub mesh: Mesh,
     /// The names of the images.
     names: Vec<String>,
     /// Whether normals depend on the crease angle.
@@ -126,11 +126,6 @@ pub(crate) fn ply_mesh(
 }
 
 impl PlyMesh {
-    /// The mesh without its materials.
-    pub fn mesh(&self) -> &Mesh {
-        &self.mesh
-    }
-
     /// Reads the images that the file names.
     pub fn with_materials(self, file: &SourceFile, images: &mut Images) -> Loaded {
         let Self { mesh, names, uses_crease, warnings } = self;
