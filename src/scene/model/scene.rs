@@ -21,7 +21,7 @@ const MOST_TRIANGLES: u64 = 1 << 31;
 pub(crate) const GROUND: &str = "(ground)";
 
 /// Everything that a frame shows. World space is right-handed, +y up by default.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scene {
     /// The file's name without its folder and extension.
     pub name: String,
@@ -171,8 +171,7 @@ impl Scene {
         let none = || (Vec3::INFINITY, Vec3::NEG_INFINITY);
         let joined = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
         let of_instance = |Instance { mesh_ix, transform, .. }: &Instance| {
-            let world = corners[*mesh_ix].par_iter().map(|p| transform.point(*p));
-            world.map(|p| (p, p)).reduce(none, joined)
+            bounds_of(corners[*mesh_ix].par_iter().map(|p| transform.point(*p)))
         };
         instances.par_iter().map(of_instance).reduce(none, joined)
     }
@@ -191,32 +190,7 @@ impl Scene {
     /// Returns a scene without meshes, materials and lights, to fill by a program. Its name is that of a file
     /// ([`Scene::name_of`]). Its camera is a placeholder, at the origin: it looks along -z.
     pub fn empty(path: &Path) -> Self {
-        Self {
-            name: Self::name_of(path),
-            origin: DVec3::ZERO,
-            meshes: Vec::new(),
-            instances: Vec::new(),
-            materials: Vec::new(),
-            images: Vec::new(),
-            lights: Vec::new(),
-            chosen_light: None,
-            camera: Camera {
-                eye: Vec3::ZERO,
-                target: Vec3::NEG_Z,
-                up: Vec3::Y,
-                projection: Projection::Perspective { vertical_fov_degrees: 45.0 },
-            },
-            chosen_camera: false,
-            cameras: Vec::new(),
-            animations: Vec::new(),
-            ambient: Vec3::ZERO,
-            ground: None,
-            background: Vec3::ZERO,
-            environment: None,
-            sky: None,
-            studio: None,
-            defaults: RenderDefaults::default(),
-        }
+        Self { name: Self::name_of(path), ..Self::default() }
     }
 
     /// Adds a material and returns its index.
