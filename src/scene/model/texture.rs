@@ -176,3 +176,9 @@ pub(crate) fn linear_of_srgb(value: f32) -> f32 {
     let value = if value > 0.0 { value.min(1.0) } else { 0.0 };
     if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
 }
+
+/// Returns the bits of a half-precision number. A number that is too large becomes the largest one, and NaN becomes 0.
+pub(crate) fn half_bits(value: f32) -> u16 {
+    const MOST: f32 = 65_504.0;
+    f16::from_f32(if value.is_nan() { 0.0 } else { value.clamp(-MOST, MOST) }).to_bits()
+}
