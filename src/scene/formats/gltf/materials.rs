@@ -157,7 +157,9 @@ impl Reader<'_> {
 
     fn clearcoat(&self, json: &json::Material) -> Clearcoat {
         let raw = self.extension(json, "KHR_materials_clearcoat");
-        let Some(Raw { factor, roughness, .. }) = raw else { return Clearcoat::default() };
+        let Some(Raw { clearcoat_factor: factor, clearcoat_roughness_factor: roughness, .. }) = raw else {
+            return Clearcoat::default();
+        };
         if factor > 0.0 {
             self.document.note("layers of clearcoat, which the integrator whitted does not show", &self.path);
         }
@@ -169,13 +171,15 @@ impl Reader<'_> {
 
     fn sheen(&self, json: &json::Material) -> Sheen {
         let raw = self.extension(json, "KHR_materials_sheen");
-        let Some(Raw { colour, sheen_roughness, .. }) = raw else { return Sheen::default() };
+        let Some(Raw { sheen_color_factor: colour, sheen_roughness_factor: roughness, .. }) = raw else {
+            return Sheen::default();
+        };
         if colour != [0.0; 3] {
             self.document.note("sheen, which the integrator whitted does not show", &self.path);
         }
         Sheen {
             colour: self.colour("sheenColorFactor", colour),
-            roughness: self.within("sheenRoughnessFactor", sheen_roughness, 0.0, 1.0),
+            roughness: self.within("sheenRoughnessFactor", roughness, 0.0, 1.0),
         }
     }
 
@@ -249,14 +253,10 @@ impl Reader<'_> {
 
 /// The numbers of KHR_materials_clearcoat and KHR_materials_sheen. Their textures are not read.
 #[derive(Default, serde::Deserialize)]
-#[serde(default)]
+#[serde(default, rename_all = "camelCase")]
 struct Raw {
-    #[serde(rename = "clearcoatFactor")]
-    factor: f32,
-    #[serde(rename = "clearcoatRoughnessFactor")]
-    roughness: f32,
-    #[serde(rename = "sheenColorFactor")]
-    colour: [f32; 3],
-    #[serde(rename = "sheenRoughnessFactor")]
-    sheen_roughness: f32,
+    clearcoat_factor: f32,
+    clearcoat_roughness_factor: f32,
+    sheen_color_factor: [f32; 3],
+    sheen_roughness_factor: f32,
 }
