@@ -1,5 +1,6 @@
 //! Axis-aligned boxes, and references, which are the entries in a cell's list of triangles.
 
+use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::layout::Triangle;
@@ -26,6 +27,12 @@ pub const MARGIN: f32 = 1.0 / (1 << 17) as f32;
 pub struct Bounds {
     pub min: [f32; 3],
     pub max: [f32; 3],
+}
+
+impl From<[Vec3; 2]> for Bounds {
+    fn from([min, max]: [Vec3; 2]) -> Self {
+        Self { min: min.to_array(), max: max.to_array() }
+    }
 }
 
 impl Bounds {
@@ -99,6 +106,12 @@ impl Bounds {
     /// Returns the side lengths. In f64 no finite box overflows, nor does a product of two side lengths.
     pub fn extent(&self) -> [f64; 3] {
         [0, 1, 2].map(|axis| f64::from(self.max[axis]) - f64::from(self.min[axis]))
+    }
+
+    /// Returns half the area of the surface.
+    pub fn half_area(&self) -> f64 {
+        let [x, y, z] = self.extent();
+        x * y + y * z + z * x
     }
 }
 

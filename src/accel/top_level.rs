@@ -181,13 +181,7 @@ fn best_of_bins(items: &[Item], axis: usize, low: f32, extent: f32) -> usize {
         *n += 1;
         *bounds = Some(bounds.map_or(item.bounds, |bounds| bounds.union(&item.bounds)));
     }
-    let cost = |(n, bounds): (usize, Option<Bounds>)| {
-        let area = |bounds: Bounds| {
-            let [x, y, z] = bounds.extent();
-            x * y + y * z + z * x
-        };
-        n as f64 * bounds.map_or(0.0, area)
-    };
+    let cost = |(n, bounds): (usize, Option<Bounds>)| n as f64 * bounds.map_or(0.0, |bounds| bounds.half_area());
     let add = |a: (usize, Option<Bounds>), b: (usize, Option<Bounds>)| {
         let both = a.1.zip(b.1).map(|(a, b)| a.union(&b));
         (a.0 + b.0, both.or(a.1).or(b.1))

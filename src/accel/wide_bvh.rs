@@ -82,12 +82,6 @@ fn piece_in(tree: &KdTree, triangle: &Triangle, cell: &Bounds) -> Bounds {
     if (0..3).all(|axis| piece.min[axis] <= piece.max[axis]) { piece } else { *cell }
 }
 
-/// Returns half of a box's surface area.
-fn half_area(bounds: &Bounds) -> f64 {
-    let [x, y, z] = bounds.extent();
-    x * y + y * z + z * x
-}
-
 /// Returns the union of two ascending lists, if it fits into a block.
 fn union(a: &BlockList, b: &BlockList) -> Option<BlockList> {
     let mut both: ArrayVec<u32, { 2 * WIDTH }> = a.iter().chain(b).copied().collect();
@@ -145,7 +139,7 @@ impl Subtree {
         };
         if let (Self::Block { bounds: of_a, triangle_ixs: in_a }, Self::Block { bounds: of_b, triangle_ixs: in_b }) =
             (&a, &b)
-            && half_area(&bounds) <= half_area(of_a) + half_area(of_b)
+            && bounds.half_area() <= of_a.half_area() + of_b.half_area()
             && let Some(triangle_ixs) = union(in_a, in_b)
         {
             return Self::Block { bounds, triangle_ixs };
@@ -162,7 +156,7 @@ impl Subtree {
 
     /// Returns half of the surface area of the box, if the subtree can be replaced by its two children.
     fn half_area_of_inner(&self) -> Option<f64> {
-        if let Self::Inner { bounds, .. } = self { Some(half_area(bounds)) } else { None }
+        if let Self::Inner { bounds, .. } = self { Some(bounds.half_area()) } else { None }
     }
 
     /// Returns the subtrees that become the children of this subtree's node. Those with the largest boxes are replaced
@@ -232,7 +226,7 @@ fn write(subtree: Subtree, nodes: &mut Vec<WideNode>, lists: &mut Vec<BlockList>
 impl WideBvh {
     /// Makes the hierarchy of the triangles that a kd-tree was built from, on the current rayon pool.
     pub fn new(tree: &KdTree, triangles: &[Triangle]) -> Self {
-        let cell = Bounds { min: tree.box_min().to_array(), max: tree.box_max().to_array() };
+        let cell = Bounds::from(tree.bounds());
         let (mut nodes, mut lists) = (Vec::new(), vec![BlockList::new()]);
         write(Subtree::of(tree, triangles, 0, &cell, 0), &mut nodes, &mut lists);
         let blocks = lists.par_iter().map(|list| TriangleBlock::new(triangles, list)).collect();
@@ -347,7 +341,7 @@ mod tests {
             }
         });
         let mut n_entries = 0;
-        let cell = Bounds { min: tree.box_min().to_array(), max: tree.box_max().to_array() };
+        let cell = Bounds::from(tree.bounds());
         visit_leaves(&tree, 0, &cell, &mut |triangle_ixs, cell| {
             for &triangle_ix in triangle_ixs {
                 let triangle = &triangles[triangle_ix as usize];

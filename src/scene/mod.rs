@@ -24,6 +24,7 @@ mod scene_file;
 
 #[doc(hidden)]
 pub use self::model::deformation;
+pub(crate) use self::model::texture::half_bits;
 #[cfg(feature = "files")]
 pub(crate) use self::{files::pack, poser::Poser};
 #[cfg(feature = "files")]

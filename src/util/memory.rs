@@ -17,6 +17,12 @@ pub struct OutOfMemory {
     available: u64,
 }
 
+impl From<OutOfMemory> for String {
+    fn from(error: OutOfMemory) -> Self {
+        error.to_string()
+    }
+}
+
 /// Checks that `needed` bytes are available. `what` begins the error's message.
 ///
 /// # Errors

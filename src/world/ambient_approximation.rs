@@ -7,7 +7,10 @@ use std::f64::consts::PI;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{FlatScene, emissive::is_emissive};
+use super::{
+    FlatScene,
+    emissive::{area_of, is_emissive},
+};
 use crate::scene::{Environment, Up};
 
 /// Factor on the light of surfaces and lights with an area: others reflect half of it again and again.
@@ -64,10 +67,8 @@ fn flux(scene: &FlatScene) -> DVec3 {
     let is_emissive: Vec<bool> = emission.iter().map(Option::is_some).collect();
     let of_triangle = |ix: usize| {
         let Some(ke) = emission[scene.material_ix_of(ix) as usize] else { return DVec3::ZERO };
-        let triangle = scene.triangle(ix);
-        let area = f64::from((triangle.v1 - triangle.v0).cross(triangle.v2 - triangle.v0).length()) / 2.0;
         // Both sides shine.
-        ke * (2.0 * PI * area)
+        ke * (2.0 * PI * area_of(&scene.triangle(ix)))
     };
     of_lights + scene.triangles_with(&is_emissive).into_iter().map(of_triangle).sum::<DVec3>()
 }

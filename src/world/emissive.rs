@@ -40,7 +40,7 @@ pub(super) fn emissive_triangles(scene: &FlatScene) -> Vec<(usize, f64)> {
 }
 
 /// Returns the area as kernels see it: 0 if its square underflows.
-fn area_of(t: &Triangle) -> f64 {
+pub(super) fn area_of(t: &Triangle) -> f64 {
     f64::from((t.v1 - t.v0).cross(t.v2 - t.v0).length()) / 2.0
 }
 

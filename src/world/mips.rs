@@ -11,11 +11,8 @@ use rayon::prelude::*;
 
 use crate::{
     layout::SRGB_TABLE_SIZE,
-    scene::{Encoding, Image, Pixels},
+    scene::{Encoding, Image, Pixels, half_bits},
 };
-
-/// The largest finite half-precision number.
-const MAX_HALF: f32 = 65_504.0;
 
 /// The linear values of the bytes that sRGB encodes.
 pub(super) static SRGB: LazyLock<[f32; SRGB_TABLE_SIZE as usize]> =
@@ -97,8 +94,7 @@ pub(super) enum Mean {
 
 /// Returns half-precision floats in two words, red in the lowest bits. All of them are finite.
 fn packed(texel: [f32; 4]) -> [u32; 2] {
-    let half = |value: f32| if value.is_nan() { 0.0 } else { value.clamp(-MAX_HALF, MAX_HALF) };
-    let [r, g, b, a] = texel.map(|value| u32::from(f16::from_f32(half(value)).to_bits()));
+    let [r, g, b, a] = texel.map(|value| u32::from(half_bits(value)));
     [r | g << 16, b | a << 16]
 }
 

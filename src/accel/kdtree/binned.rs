@@ -10,7 +10,7 @@
 use rayon::prelude::*;
 
 use super::{
-    BuildOptions,
+    BuildOptions, counted,
     sah::{ChildAreas, Split},
 };
 use crate::accel::bounds::{Bounds, Reference};
@@ -71,8 +71,12 @@ impl Bins {
 }
 
 impl BinnedSearch {
-    /// Returns the cheapest split of a cell. Its weight is infinite if there is none.
+    /// Returns the cheapest split of a cell, by the planes of all its references if they are few (counted.rs). Its
+    /// weight is infinite if there is none.
     pub fn best_split(&mut self, references: &[Reference], cell: &Bounds, options: &BuildOptions) -> Split {
+        if references.len() <= counted::MAX_REFERENCES {
+            return counted::best_split(references, cell, options);
+        }
         let n_bins = (references.len() / 4).next_power_of_two().clamp(32, MAX_BINS);
         let bins = [0, 1, 2]
             .map(|axis| ChildAreas::new(cell, axis, options).map(|child_areas| Bins::new(child_areas, n_bins)));

@@ -7,7 +7,7 @@ impl KdTree {
     /// Returns the cell of each node, zeros for the unused node 1.
     pub fn boxes(&self) -> Vec<KdBox> {
         let mut cells = vec![Bounds { min: [0.0; 3], max: [0.0; 3] }; self.nodes().len()];
-        cells[0] = Bounds { min: self.box_min().to_array(), max: self.box_max().to_array() };
+        cells[0] = Bounds::from(self.bounds());
         // Parents come before their children.
         for node_ix in 0..self.nodes().len() {
             if let Node::Split { axis, position, child } = self.node(node_ix as u32) {

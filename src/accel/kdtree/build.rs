@@ -6,11 +6,11 @@ use rayon::prelude::*;
 
 use super::{
     BuildOptions, KdTree,
+    binned::BinnedSearch,
     flatten::{UpperTree, flatten},
     planes::planes_of,
     sah::Split,
     scales::Scales,
-    search::Search,
     subtree::{self, BuildCell, Input, split_reference},
 };
 use crate::{
@@ -81,7 +81,7 @@ fn grow((input, meter): (Input, &Meter), references: Vec<Reference>, cell: Build
     }
     // The observer may stop the build, which takes long until the first subtree is done.
     meter.add(0);
-    let Some((split, cells)) = cell.split(&references, input.options, &mut Search::default()) else {
+    let Some((split, cells)) = cell.split(&references, input.options, &mut BinnedSearch::default()) else {
         // The cell becomes a leaf. This is rare: nearly all of its triangles coincide, or a split exceeds the budget.
         return subtree(references);
     };

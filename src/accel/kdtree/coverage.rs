@@ -37,7 +37,7 @@ enum Lack {
 /// # Errors
 /// The first triangle, by index, for which this does not hold, and the node.
 pub fn check(tree: &KdTree, triangles: &[Triangle]) -> Result<(), Invalid> {
-    let root = Bounds { min: tree.box_min().to_array(), max: tree.box_max().to_array() };
+    let root = Bounds::from(tree.bounds());
     let missing = triangles.par_iter().enumerate().find_map_first(|(ix, triangle)| {
         let corners = [triangle.v0, triangle.v1, triangle.v2].map(|v| v.as_dvec3());
         let lack = if is_finite(triangle) {

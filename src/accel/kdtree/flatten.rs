@@ -16,12 +16,9 @@ pub fn flatten(top: UpperTree, cell: Bounds) -> KdArrays {
     let mut tree = KdArrays {
         nodes: vec![EMPTY_LEAF; 2],
         parents: vec![0],
-        leaf_triangles: Vec::new(),
-        leaf_planes: Vec::new(),
-        slabs: Vec::new(),
         box_min: Vec3::from_array(cell.min),
         box_max: Vec3::from_array(cell.max),
-        depth: 0,
+        ..KdArrays::default()
     };
     append(&mut tree, 0, top);
     tree

@@ -24,7 +24,6 @@ mod planes;
 mod ropes;
 mod sah;
 pub(super) mod scales;
-mod search;
 mod slabs;
 mod statistics;
 mod subtree;
@@ -33,7 +32,7 @@ mod validate;
 
 use glam::Vec3;
 
-use crate::accel::Lazy;
+use crate::accel::{Lazy, bounds::Bounds};
 use crate::layout::{
     AccelConstants, KD_AXIS_MASK, KD_LEAF, KD_MAX_DEPTH, KD_PAIR_SHIFT, KD_PLANE_EPSILON, KdNode, Triangle,
 };
@@ -61,7 +60,7 @@ impl KdTree {
     /// Returns the uniform constants that kernels need in addition to the tree's arrays. All other members are 0.
     pub fn constants(&self) -> AccelConstants {
         let bounds = self.bounds();
-        constants(bounds, self.scales.origin_reach(largest_coordinate(bounds)))
+        constants(bounds, self.scales.origin_reach(Bounds::from(bounds).largest_coordinate()))
     }
 
     /// Returns the distance from a cell within which a triangle counts as inside the cell, world units.
@@ -70,14 +69,10 @@ impl KdTree {
     }
 }
 
-fn largest_coordinate([min, max]: [Vec3; 2]) -> f32 {
-    min.abs().max(max.abs()).max_element()
-}
-
 /// Returns the constants of a tree whose root has this cell.
 fn constants(bounds: [Vec3; 2], origin_reach: f32) -> AccelConstants {
     let [box_min, box_max] = bounds;
-    let plane_epsilon = KD_PLANE_EPSILON * largest_coordinate(bounds);
+    let plane_epsilon = KD_PLANE_EPSILON * Bounds::from(bounds).largest_coordinate();
     AccelConstants { box_min, box_max, plane_epsilon, origin_reach, ..AccelConstants::default() }
 }
 

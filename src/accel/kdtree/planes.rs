@@ -70,7 +70,7 @@ fn cell_scales(arrays: &KdArrays, scales: &Scales) -> Vec<u32> {
     if scales.has_one() {
         return of_entries;
     }
-    let mut stack = vec![(0, Bounds { min: arrays.box_min.to_array(), max: arrays.box_max.to_array() })];
+    let mut stack = vec![(0, Bounds::from([arrays.box_min, arrays.box_max]))];
     while let Some((node_ix, cell)) = stack.pop() {
         match arrays.node(node_ix) {
             Node::Leaf { first, count } => {

@@ -40,7 +40,7 @@ impl KdTree {
     /// The same triangles and tree give the same slabs on any number of threads. This takes some 200 ns for each
     /// entry of the leaves.
     pub(super) fn add_slabs(&mut self, triangles: &[Triangle]) {
-        let bounds = Bounds { min: self.box_min().to_array(), max: self.box_max().to_array() };
+        let bounds = Bounds::from(self.bounds());
         let fitting = Fitting { tree: self, triangles, n_entries: self.entries_below() };
         let slabs: Vec<Slabs> = fitting.patches(bounds).par_iter().map(|patch| fitting.slabs_of(patch)).collect();
         let arrays = &mut self.arrays;

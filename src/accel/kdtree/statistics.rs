@@ -5,7 +5,10 @@ use std::ops::Add;
 use serde::Serialize;
 
 use super::{BuildOptions, KdTree, Node};
-use crate::layout::{KdNode, Plane, Slab};
+use crate::{
+    accel::bounds::Bounds,
+    layout::{KdNode, Plane, Slab},
+};
 
 /// Statistics of a kd-tree.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -48,13 +51,13 @@ impl KdTree {
                 + size_of_val(self.slabs())) as u64,
             ..Default::default()
         };
-        let root = (self.box_min().as_dvec3().to_array(), self.box_max().as_dvec3().to_array());
-        let root_area = half_area(&root.0, &root.1);
+        let root = Bounds::from(self.bounds());
+        let root_area = root.half_area();
         let (mut n_slabs, mut n_empty_leaves, mut sah_cost) = (0, 0, 0.0);
         let mut stack = vec![(0, root)];
-        while let Some((node_ix, (min, max))) = stack.pop() {
+        while let Some((node_ix, cell)) = stack.pop() {
             // If the root's cell has no surface (a point, a line), all cells count like the root.
-            let share = if root_area > 0.0 { half_area(&min, &max) / root_area } else { 1.0 };
+            let share = if root_area > 0.0 { cell.half_area() / root_area } else { 1.0 };
             statistics.n_nodes += 1;
             n_slabs += u64::from(self.has_slab(node_ix));
             match self.node(node_ix) {
@@ -65,11 +68,8 @@ impl KdTree {
                 }
                 Node::Split { axis, position, child } => {
                     sah_cost += f64::from(options.traversal_cost) * share;
-                    let (mut below_max, mut above_min) = (max, min);
-                    below_max[axis] = f64::from(position);
-                    above_min[axis] = f64::from(position);
-                    stack.push((child + 1, (above_min, max)));
-                    stack.push((child, (min, below_max)));
+                    let [below, above] = cell.split(axis, position);
+                    stack.extend([(child + 1, above), (child, below)]);
                 }
             }
         }
@@ -117,10 +117,4 @@ impl Statistics {
             ..Self::default()
         }
     }
-}
-
-/// Returns half of a box's surface.
-fn half_area(min: &[f64; 3], max: &[f64; 3]) -> f64 {
-    let [x, y, z] = [max[0] - min[0], max[1] - min[1], max[2] - min[2]];
-    x * y + y * z + z * x
 }

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use super::{BuildOptions, EMPTY_LEAF, Node, clip::split_bounds, sah::Split, scales::Scales, search::Search};
+use super::{BuildOptions, EMPTY_LEAF, Node, binned::BinnedSearch, clip::split_bounds, sah::Split, scales::Scales};
 use crate::{
     accel::bounds::{Bounds, Reference},
     layout::{KD_WORD_DEPTH, KdNode, Triangle},
@@ -39,7 +39,7 @@ impl BuildCell {
         self,
         references: &[Reference],
         options: &BuildOptions,
-        search: &mut Search,
+        search: &mut BinnedSearch,
     ) -> Option<(Split, [BuildCell; 2])> {
         let leaf_cost = options.intersection_cost * references.len() as f32;
         // A split costs at least one step.
@@ -94,7 +94,7 @@ pub struct Subtree {
 pub fn build(input: Input, references: Vec<Reference>, cell: BuildCell) -> Subtree {
     let n = references.len();
     let subtree = Subtree { nodes: vec![EMPTY_LEAF; 2], leaf_triangles: Vec::new(), depth: cell.level };
-    let mut builder = Builder { input, references, above: Vec::new(), search: Search::default(), subtree };
+    let mut builder = Builder { input, references, above: Vec::new(), search: BinnedSearch::default(), subtree };
     builder.node(0, 0..n, cell);
     builder.subtree
 }
@@ -107,7 +107,7 @@ struct Builder<'a> {
     references: Vec<Reference>,
     /// The references of the upper child while those of both children are separated.
     above: Vec<Reference>,
-    search: Search,
+    search: BinnedSearch,
     subtree: Subtree,
 }
 

@@ -73,7 +73,7 @@ impl KdTree {
         if nodes < 2 || nodes != 2 * parents {
             return Err(Invalid::Length { nodes, parents });
         }
-        let root = Bounds { min: self.box_min().to_array(), max: self.box_max().to_array() };
+        let root = Bounds::from(self.bounds());
         let exact_bounds = Bounds::of_all(triangles);
         let scales = Scales::new(triangles, &exact_bounds);
         if root != exact_bounds.grown(exact_bounds.margin()) || scales != self.scales {

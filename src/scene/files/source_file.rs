@@ -219,13 +219,7 @@ const HINT: &str = "--allow-outside reads it";
 /// Returns whether a name is that of a file below a folder, unless a link leads out of it.
 fn stays_below(name: &str) -> bool {
     let is_windows_path = name.starts_with('\\') || name.split('\\').any(|part| part == "..");
-    let depth = Path::new(name).components().try_fold(0_u32, |depth, part| match part {
-        Component::Normal(_) => Some(depth + 1),
-        Component::CurDir => Some(depth),
-        Component::ParentDir => depth.checked_sub(1),
-        Component::RootDir | Component::Prefix(_) => None,
-    });
-    depth.is_some() && !is_windows_path
+    !is_windows_path && pack::name_of(Path::new(name)).is_some()
 }
 
 /// Returns the only entry of a folder whose name differs from `name` in the case of letters alone.

@@ -14,8 +14,7 @@ use crate::{scene::model::error::Checked, util::memory::require};
 /// Reads a regular file of which `n_copies` are in memory meanwhile. An error is a message for people.
 pub fn read(path: &Path, n_copies: u64) -> Checked<Vec<u8>> {
     let unread = |error: io::Error| format!("cannot be read: {error}");
-    let check =
-        |n_bytes: u64| require("reading it", n_bytes.saturating_mul(n_copies)).map_err(|error| error.to_string());
+    let check = |n_bytes: u64| require("reading it", n_bytes.saturating_mul(n_copies));
     match pack::entry(path) {
         Some(entry) => {
             let entry = entry.map_err(unread)?;

@@ -6,10 +6,9 @@ use super::image::{Encoded, Examined, MAX_PIXELS, decode_all, normals_of_heights
 use crate::{
     scene::{
         files::SourceFile,
-        meshes::needs::require_for_images,
         model::{Channel, Image, MaterialChoice, Pixels, error::Checked, preset::is_replaced},
     },
-    util::progress::Progress,
+    util::{memory::require, progress::Progress},
 };
 
 /// What a texture shows of an image file.
@@ -141,7 +140,7 @@ impl Images {
             }
             let pixel_bytes = if matches!((view, &image.pixels), (View::Inverted, Pixels::Halves(_))) { 8 } else { 4 };
             let n_bytes = self.n_bytes_to_make.saturating_add(image.pixels.len() as u64 * pixel_bytes);
-            require_for_images(n_bytes)?;
+            require("making images from others", n_bytes)?;
             (self.n_pixels, self.n_bytes_to_make) = (n_pixels, n_bytes);
         }
         self.shown.push(Shown::OfFile(file, view));
@@ -165,13 +164,13 @@ impl Images {
 
     /// Returns the shown images.
     pub fn finish(self) -> Vec<Image> {
-        let Self { mut files, shown, .. } = self;
         let made = |shown: &Shown| match *shown {
-            Shown::Own(_) | Shown::OfFile(_, View::Plain) => None,
-            Shown::OfFile(file, view) => Some(view_of(image_of(&files[file]), view)),
+            Shown::Own(_) => None,
+            Shown::OfFile(file, view) => view_of(self.get(file).expect("only images are shown").image(), view),
         };
         // Plain views take the images that the others are made of.
-        let made: Vec<Option<Image>> = shown.iter().map(made).collect();
+        let made: Vec<Option<Image>> = self.shown.iter().map(made).collect();
+        let Self { mut files, shown, .. } = self;
         let image = |(shown, made)| match (shown, made) {
             (_, Some(made)) => made,
             (Shown::Own(image), None) => image,
@@ -184,18 +183,12 @@ impl Images {
     }
 }
 
-/// Returns the image of a file that is shown.
-fn image_of(file: &File) -> &Image {
-    let image = file.image.as_ref().and_then(|image| image.as_ref().ok());
-    image.expect("only images are shown").image()
-}
-
-/// Returns a view of an image.
-fn view_of(image: &Image, view: View) -> Image {
+/// Returns a view of an image, or `None` for the image itself.
+fn view_of(image: &Image, view: View) -> Option<Image> {
     match view {
-        View::Plain => image.clone(),
-        View::Heights(channel, scale) => normals_of_heights(image, channel, f32::from_bits(scale)),
-        View::Inverted => inverted(image),
+        View::Plain => None,
+        View::Heights(channel, scale) => Some(normals_of_heights(image, channel, f32::from_bits(scale))),
+        View::Inverted => Some(inverted(image)),
     }
 }
 
@@ -203,12 +196,8 @@ fn view_of(image: &Image, view: View) -> Image {
 fn inverted(image: &Image) -> Image {
     let half = |bits: u16| half::f16::from_f32(1.0 - half::f16::from_bits(bits).to_f32()).to_bits();
     let pixels = match &image.pixels {
-        Pixels::Bytes(pixels) => {
-            Pixels::Bytes(pixels.iter().map(|[r, g, b, a]| [255 - r, 255 - g, 255 - b, 255 - a]).collect())
-        }
-        Pixels::Halves(pixels) => {
-            Pixels::Halves(pixels.iter().map(|[r, g, b, a]| [half(*r), half(*g), half(*b), half(*a)]).collect())
-        }
+        Pixels::Bytes(pixels) => Pixels::Bytes(pixels.iter().map(|pixel| pixel.map(|byte| 255 - byte)).collect()),
+        Pixels::Halves(pixels) => Pixels::Halves(pixels.iter().map(|pixel| pixel.map(half)).collect()),
     };
     Image { pixels, ..image.clone() }
 }

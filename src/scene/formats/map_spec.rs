@@ -26,18 +26,11 @@ pub(crate) struct MapTable {
     scale: Option<[f32; 2]>,
     /// What is added to the scaled texture coordinates; 0 and 0 where absent.
     offset: Option<[f32; 2]>,
-    wrap: Option<WrapSpec>,
+    #[serde(default)]
+    wrap: Wrap,
     filter: Option<FilterSpec>,
-    channel: Option<ChannelSpec>,
-    encoding: Option<EncodingSpec>,
-}
-
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum WrapSpec {
-    Repeat,
-    Mirror,
-    Clamp,
+    channel: Option<Channel>,
+    encoding: Option<Encoding>,
 }
 
 #[derive(Clone, Copy, Debug, Deserialize)]
@@ -45,23 +38,6 @@ enum WrapSpec {
 enum FilterSpec {
     Linear,
     Nearest,
-}
-
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum ChannelSpec {
-    Red,
-    Green,
-    Blue,
-    Alpha,
-    Luminance,
-}
-
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum EncodingSpec {
-    Srgb,
-    Linear,
 }
 
 impl MapSpec {
@@ -120,7 +96,7 @@ impl MapTable {
             Some(_) if !is_vector && texture.channel == Channel::Alpha => {
                 Err("has `encoding`, but the map reads the opacity, which is always linear".to_owned())
             }
-            Some(EncodingSpec::Srgb) if is_linear => {
+            Some(Encoding::Srgb) if is_linear => {
                 Err("has `encoding = \"srgb\"`, but the image's numbers are linear".to_owned())
             }
             _ => Ok(()),
@@ -135,25 +111,13 @@ impl MapTable {
         };
         let placed =
             texture.placed(vector("scale", self.scale, Vec2::ONE)?, vector("offset", self.offset, Vec2::ZERO)?);
-        let wrap = match self.wrap {
-            None | Some(WrapSpec::Repeat) => Wrap::Repeat,
-            Some(WrapSpec::Mirror) => Wrap::Mirror,
-            Some(WrapSpec::Clamp) => Wrap::Clamp,
-        };
-        let channel = match self.channel {
-            None => placed.channel,
-            Some(ChannelSpec::Red) => Channel::Red,
-            Some(ChannelSpec::Green) => Channel::Green,
-            Some(ChannelSpec::Blue) => Channel::Blue,
-            Some(ChannelSpec::Alpha) => Channel::Alpha,
-            Some(ChannelSpec::Luminance) => Channel::Luminance,
-        };
-        let encoding = match self.encoding {
-            None => placed.encoding,
-            Some(EncodingSpec::Srgb) => Encoding::Srgb,
-            Some(EncodingSpec::Linear) => Encoding::Linear,
-        };
         let is_smooth = !matches!(self.filter, Some(FilterSpec::Nearest));
-        Ok(Texture { wrap: [wrap; 2], channel, encoding, is_smooth, ..placed })
+        Ok(Texture {
+            wrap: [self.wrap; 2],
+            channel: self.channel.unwrap_or(placed.channel),
+            encoding: self.encoding.unwrap_or(placed.encoding),
+            is_smooth,
+            ..placed
+        })
     }
 }

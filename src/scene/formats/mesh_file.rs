@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use super::{
     image_files::Images,
@@ -128,6 +128,16 @@ enum ShapeKind {
     Stl(Mesh, Option<String>),
 }
 
+impl ShapeKind {
+    fn points(&self) -> &[Vec3] {
+        match self {
+            Self::Obj(content) => content.elements.points(),
+            Self::Ply(ply) => &ply.mesh.positions,
+            Self::Stl(mesh, _) => &mesh.positions,
+        }
+    }
+}
+
 impl Shape {
     /// Reads a file's content. `n_loaded`: the number of triangles that the scene has already.
     pub fn parse(
@@ -152,12 +162,7 @@ impl Shape {
             Ok((origin, kind.map_err(|what| file.error(what))?))
         };
         let first = parse(origin.first())?;
-        let nearer = match &first.1 {
-            ShapeKind::Ply(ply) => origin.second(&ply.mesh().positions),
-            ShapeKind::Stl(mesh, _) => origin.second(&mesh.positions),
-            ShapeKind::Obj(_) => None,
-        };
-        let (origin, kind) = nearer.map_or(Ok(first), parse)?;
+        let (origin, kind) = origin.second(first.1.points()).map_or(Ok(first), parse)?;
         Ok(Self { file, kind, origin })
     }
 
@@ -165,11 +170,7 @@ impl Shape {
     pub fn loaded(self, loading: &mut Loading) -> Result<Loaded, SceneError> {
         let Self { file, kind, origin } = self;
         let path = &*file.path;
-        let n_points = match &kind {
-            ShapeKind::Obj(content) => content.n_points(),
-            ShapeKind::Ply(ply) => ply.mesh().positions.len(),
-            ShapeKind::Stl(mesh, _) => mesh.positions.len(),
-        };
+        let n_points = kind.points().len();
         // An OBJ file's polygons are separated before they are cut into triangles.
         let is_obj = matches!(kind, ShapeKind::Obj(_));
         let mut loaded = match kind {

@@ -3,7 +3,7 @@
 //! OBJ and PLY files state no axis. What decides is a comment of a program whose axis is known, or else the
 //! coordinates of a map, or a ground: a large flat surface below everything else. In doubt it is +y.
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::scene::{
@@ -112,9 +112,7 @@ fn is_on_a_map(mesh: &Mesh, origin: DVec3) -> bool {
 /// Returns whether a ground at the lowest z carries everything else, and nothing suggests another axis.
 fn has_ground_along_z(mesh: &Mesh) -> bool {
     let corners = |face: &[u32; 3]| face.map(|ix| mesh.positions[ix as usize]);
-    let bounds = |(min, max): (Vec3, Vec3), p: Vec3| (min.min(p), max.max(p));
-    let nothing = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    let (min, max) = mesh.faces.iter().flat_map(corners).fold(nothing, bounds);
+    let (min, max) = bounds_of(mesh.faces.par_iter().flat_map_iter(corners));
     let size = max - min;
     let is_flat = size.z > 0.0 && size.z <= size.x && size.z <= size.y;
     if !is_flat {
@@ -135,7 +133,7 @@ fn has_ground_along_z(mesh: &Mesh) -> bool {
     if !is_only_ground {
         return false;
     }
-    let carried = mesh.faces.iter().filter(|face| !is_lowest(face)).flat_map(corners).fold(nothing, bounds);
+    let carried = bounds_of(mesh.faces.par_iter().filter(|face| !is_lowest(face)).flat_map_iter(corners));
     let carried = carried.1 - carried.0;
     carried.x * carried.y <= CARRIED_SHARE * size.x * size.y
 }
@@ -144,8 +142,7 @@ fn has_ground_along_z(mesh: &Mesh) -> bool {
 /// bookcase whose back is at the lowest z is like this, too, so it is no reason to turn the picture.
 fn may_lie_on_side(mesh: &Mesh) -> bool {
     let corners = |face: &[u32; 3]| face.map(|ix| mesh.positions[ix as usize]);
-    let bounds = |(min, max): (Vec3, Vec3), p: Vec3| (min.min(p), max.max(p));
-    let (min, max) = mesh.faces.iter().flat_map(corners).fold((Vec3::INFINITY, Vec3::NEG_INFINITY), bounds);
+    let (min, max) = bounds_of(mesh.faces.par_iter().flat_map_iter(corners));
     let near = THICKNESS * (max - min).max_element();
     // The area that faces down an axis at its least coordinate.
     let area = |axis: usize| -> f32 {
@@ -158,6 +155,8 @@ fn may_lie_on_side(mesh: &Mesh) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
+
     use super::*;
 
     /// A square of edge 2 in the plane w = 0, and on it a pyramid; (u, v, w) are the places of x, y, z.

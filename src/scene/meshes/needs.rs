@@ -56,7 +56,7 @@ impl MeshSize {
 pub(crate) fn require_for_mesh(n_loaded: u64, mesh: &MeshSize) -> Checked<()> {
     let n_triangles = n_loaded.saturating_add(mesh.n_triangles);
     let needed = n_triangles.saturating_mul(TREE_BYTES).saturating_add(mesh.n_bytes());
-    require(&format!("a scene of {n_triangles} triangles"), needed).map_err(|error| error.to_string())
+    Ok(require(&format!("a scene of {n_triangles} triangles"), needed)?)
 }
 
 /// Refuses to compute tangents for meshes with these numbers of faces if there is not enough memory for it. `n_copied`:
@@ -70,23 +70,13 @@ pub(crate) fn require_for_tangents(mut n_faces: Vec<u64>, n_copied: u64) -> Chec
     let needed = of_results
         .saturating_add(n_at_once.saturating_mul(MIKKTSPACE_BYTES))
         .saturating_add(n_copied.saturating_mul(TRIANGLE_BYTES));
-    require("tangents for normal maps", needed).map_err(|error| error.to_string())
+    Ok(require("tangents for normal maps", needed)?)
 }
 
 /// Refuses what `n_targets` morph targets add to `n_vertices` vertices if there is not enough memory for it.
 pub(crate) fn require_for_morph_targets(n_targets: u64, n_vertices: u64) -> Checked<()> {
     let needed = n_targets.saturating_mul(n_vertices).saturating_mul(size_of::<MorphDelta>() as u64);
-    require("what morph targets add", needed).map_err(|error| error.to_string())
-}
-
-/// Refuses to make images of `n_bytes` from others if there is not enough memory for them.
-pub(crate) fn require_for_images(n_bytes: u64) -> Checked<()> {
-    require("making images from others", n_bytes).map_err(|error| error.to_string())
-}
-
-/// Refuses `n_bytes` of a file's rows if there is not enough memory for them.
-pub(crate) fn require_for_rows(n_bytes: u64) -> Checked<()> {
-    require("reading its rows", n_bytes).map_err(|error| error.to_string())
+    Ok(require("what morph targets add", needed)?)
 }
 
 #[cfg(test)]

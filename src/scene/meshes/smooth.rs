@@ -59,7 +59,8 @@ pub(crate) fn crease_normals(positions: &[Vec3], faces: &[[u32; 3]], smooth: &[b
     };
     let facets = || -> Vec<Facet> { faces.par_iter().zip(smooth).map(facet).collect() };
     let (point_of, facets) = rayon::join(|| weld(positions), facets);
-    let around = FacesAround::new(&point_of, faces, positions.len());
+    let corners = faces.as_flattened().iter();
+    let around = Groups::new(positions.len(), corners.map(|ix| point_of[*ix as usize] as usize));
     let corner_normals = CornerNormals::new(&around, &facets, crease);
     let normals_of = |(face, facet): (&[u32; 3], &Facet)| {
         if facet.normal == Vec3::ZERO {
@@ -82,7 +83,8 @@ pub(crate) fn smooth_normals(positions: &[Vec3], faces: &[[u32; 3]], shading: Sh
 
 /// The data from which the normals at the corners of faces are computed.
 struct CornerNormals<'a> {
-    around: &'a FacesAround,
+    /// The corners that meet at each point. Corner k of face f has the number 3 f + k.
+    around: &'a Groups,
     facets: &'a [Facet],
     min_cosine: f32,
     /// For each point the average that all its faces have in common, or `None` if the crease angle parts them.
@@ -90,7 +92,7 @@ struct CornerNormals<'a> {
 }
 
 impl<'a> CornerNormals<'a> {
-    fn new(around: &'a FacesAround, facets: &'a [Facet], crease: f32) -> Self {
+    fn new(around: &'a Groups, facets: &'a [Facet], crease: f32) -> Self {
         let min_cosine = crease.to_radians().cos();
         let mut normals = Self { around, facets, min_cosine, common: Vec::new() };
         // If all normals are within half the crease angle of their average, each pair is within the crease angle.
@@ -106,7 +108,7 @@ impl<'a> CornerNormals<'a> {
             let is_common = corners.len() > MAX_PAIRED_FACES || corners.iter().all(is_near);
             is_common.then_some(average)
         };
-        normals.common = (0..around.n_points()).into_par_iter().map(common).collect();
+        normals.common = (0..around.first.len() as u32 - 1).into_par_iter().map(common).collect();
         normals
     }
 
@@ -141,24 +143,16 @@ fn weld(positions: &[Vec3]) -> Vec<u32> {
         return positions.iter().enumerate().map(first).collect();
     }
     let part_of: Vec<u16> = positions.par_iter().map(|p| part_of(place(*p), n_bits)).collect();
-    let mut begins = vec![0_usize; (1 << n_bits) + 1];
-    part_of.iter().for_each(|part| begins[usize::from(*part) + 1] += 1);
-    (1..begins.len()).for_each(|part| begins[part] += begins[part - 1]);
-    // The positions of each part, in ascending order of their indices.
-    let (mut next, mut sorted) = (begins.clone(), vec![0_u32; positions.len()]);
-    for (ix, part) in part_of.iter().enumerate() {
-        let slot = &mut next[usize::from(*part)];
-        sorted[*slot] = ix as u32;
-        *slot += 1;
-    }
-    let welded = |window: &[usize]| {
-        let mut first_at = HashMap::with_capacity(window[1] - window[0]);
+    let sorted = Groups::new(1 << n_bits, part_of.iter().map(|part| usize::from(*part)));
+    let welded = |part: u32| {
+        let of_part = sorted.of(part);
+        let mut first_at = HashMap::with_capacity(of_part.len());
         let first = |ix: &u32| *first_at.entry(place(positions[*ix as usize])).or_insert(*ix);
-        sorted[window[0]..window[1]].iter().map(first).collect::<Vec<u32>>()
+        of_part.iter().map(first).collect::<Vec<u32>>()
     };
-    let parts: Vec<Vec<u32>> = begins.par_windows(2).map(welded).collect();
+    let parts: Vec<Vec<u32>> = (0..1 << n_bits).into_par_iter().map(welded).collect();
     let mut first_of = vec![0; positions.len()];
-    sorted.iter().zip(parts.iter().flatten()).for_each(|(ix, first)| first_of[*ix as usize] = *first);
+    sorted.members.iter().zip(parts.iter().flatten()).for_each(|(ix, first)| first_of[*ix as usize] = *first);
     first_of
 }
 
@@ -188,38 +182,29 @@ fn facet(corners: [DVec3; 3]) -> Facet {
     Facet { normal, angles }
 }
 
-/// The corners that meet at each point. Corner k of face f has the number 3 f + k.
-struct FacesAround {
-    /// The corners of point `ix` are `corners[first[ix]..first[ix + 1]]`.
+/// Indices in groups, ascending in each.
+struct Groups {
+    /// The members of group `ix` are `members[first[ix]..first[ix + 1]]`.
     first: Vec<u32>,
-    corners: Vec<u32>,
+    members: Vec<u32>,
 }
 
-impl FacesAround {
-    fn new(point_of: &[u32], faces: &[[u32; 3]], n_points: usize) -> Self {
-        let mut first = vec![0u32; n_points + 1];
-        for ix in faces.as_flattened() {
-            first[point_of[*ix as usize] as usize + 1] += 1;
+impl Groups {
+    /// Sorts indices by the groups that `group_of` states for them.
+    fn new(n_groups: usize, group_of: impl ExactSizeIterator<Item = usize> + Clone) -> Self {
+        let mut first = vec![0; n_groups + 1];
+        group_of.clone().for_each(|group| first[group + 1] += 1);
+        (0..n_groups).for_each(|ix| first[ix + 1] += first[ix]);
+        let (mut next, mut members) = (first.clone(), vec![0; group_of.len()]);
+        for (ix, group) in group_of.enumerate() {
+            members[next[group] as usize] = ix as u32;
+            next[group] += 1;
         }
-        for ix in 0..n_points {
-            first[ix + 1] += first[ix];
-        }
-        let mut next = first.clone();
-        let mut corners = vec![0; faces.len() * 3];
-        for (corner, ix) in faces.as_flattened().iter().enumerate() {
-            let slot = &mut next[point_of[*ix as usize] as usize];
-            corners[*slot as usize] = corner as u32;
-            *slot += 1;
-        }
-        Self { first, corners }
+        Self { first, members }
     }
 
-    fn n_points(&self) -> u32 {
-        (self.first.len() - 1) as u32
-    }
-
-    fn of(&self, point: u32) -> &[u32] {
-        &self.corners[self.first[point as usize] as usize..self.first[point as usize + 1] as usize]
+    fn of(&self, group: u32) -> &[u32] {
+        &self.members[self.first[group as usize] as usize..self.first[group as usize + 1] as usize]
     }
 }
 

@@ -39,6 +39,14 @@ pub enum Projection {
     },
 }
 
+impl Default for Camera {
+    /// Looks from the origin along -z; +y points up.
+    fn default() -> Self {
+        let projection = Projection::Perspective { vertical_fov_degrees: 45.0 };
+        Self { eye: Vec3::ZERO, target: Vec3::NEG_Z, up: Vec3::Y, projection }
+    }
+}
+
 impl Camera {
     /// Returns whether eye and target differ, and up does not point along the view.
     pub(crate) fn spans_picture(&self) -> bool {

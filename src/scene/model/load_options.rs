@@ -46,6 +46,23 @@ pub enum AnimationChoice {
     Named(String),
 }
 
+/// Returns the index of the first thing that has a name, or else of the thing whose index the name is. An error lists
+/// what there is; `none` says that there is nothing.
+pub(crate) fn find_named(kind: &str, name: &str, names: &[Option<&str>], none: &str) -> Checked<usize> {
+    let named = names.iter().position(|other| *other == Some(name));
+    let found = named.or_else(|| name.parse().ok().filter(|ix| *ix < names.len()));
+    found.ok_or_else(|| {
+        let listed = |(ix, name): (usize, &Option<&str>)| name.map_or(ix.to_string(), |name| format!("{ix} `{name}`"));
+        match names.is_empty() {
+            true => format!("there is no {kind} `{name}`: {none}"),
+            false => {
+                let all = names.iter().enumerate().map(listed).collect::<Vec<_>>().join(", ");
+                format!("there is no {kind} `{name}`, but {all}")
+            }
+        }
+    })
+}
+
 impl AnimationChoice {
     /// Returns the indices of the animations that are shown, of those with these names.
     ///
@@ -57,14 +74,8 @@ impl AnimationChoice {
             Self::None => return Ok(Vec::new()),
             Self::Named(name) => name,
         };
-        let named = names.iter().position(|other| other == name);
-        let found = named.or_else(|| name.parse().ok().filter(|ix| *ix < names.len()));
-        let known = || names.iter().enumerate().map(|(ix, name)| format!("{ix} `{name}`")).collect::<Vec<_>>();
-        let missing = || match names.is_empty() {
-            true => format!("there is no animation `{name}`: the file has none"),
-            false => format!("there is no animation `{name}`, but {}", known().join(", ")),
-        };
-        found.map(|ix| vec![ix]).ok_or_else(missing)
+        let names: Vec<_> = names.iter().map(|name| Some(*name)).collect();
+        find_named("animation", name, &names, "the file has none").map(|ix| vec![ix])
     }
 }
 

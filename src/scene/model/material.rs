@@ -180,38 +180,41 @@ pub struct Maps {
 impl Maps {
     /// Returns all textures, in the order of the fields.
     pub fn textures(&self) -> impl Iterator<Item = &Texture> {
-        let Self { base_colour, opacity, specular, specular_factor, emission, roughness, metallic, .. } = self;
-        let Self { transmission, occlusion, normal, .. } = self;
-        let first = [base_colour, opacity, specular, specular_factor, emission, roughness, metallic];
-        first.into_iter().chain([transmission, occlusion, normal]).flatten()
+        self.named().map(|(_, texture)| texture)
+    }
+
+    /// Returns the textures with the names of the terms that they vary.
+    pub fn named(&self) -> impl Iterator<Item = (&'static str, &Texture)> {
+        let all = [
+            ("base colour", &self.base_colour),
+            ("opacity", &self.opacity),
+            ("specular colour", &self.specular),
+            ("specular factor", &self.specular_factor),
+            ("emission", &self.emission),
+            ("roughness", &self.roughness),
+            ("metallic", &self.metallic),
+            ("transmission", &self.transmission),
+            ("occlusion", &self.occlusion),
+            ("normal", &self.normal),
+        ];
+        all.into_iter().filter_map(|(name, texture)| Some((name, texture.as_ref()?)))
     }
 
     /// Calls `change` for each texture.
     pub(crate) fn change_each(&mut self, change: impl FnMut(&mut Texture)) {
-        self.places().into_iter().flatten().for_each(change);
+        self.places().flatten().for_each(change);
     }
 
     /// Removes the textures for which `is_kept` returns false.
     pub(crate) fn keep_each(&mut self, is_kept: impl Fn(&Texture) -> bool) {
-        self.places().into_iter().for_each(|texture| *texture = texture.take().filter(&is_kept));
+        self.places().for_each(|texture| *texture = texture.take().filter(&is_kept));
     }
 
-    fn places(&mut self) -> [&mut Option<Texture>; 10] {
-        let Self {
-            base_colour: a,
-            opacity: b,
-            specular: c,
-            specular_factor: d,
-            emission: e,
-            roughness: f,
-            metallic: g,
-            transmission: h,
-            occlusion: i,
-            normal: j,
-            occlusion_strength: _,
-            normal_scale: _,
-        } = self;
-        [a, b, c, d, e, f, g, h, i, j]
+    fn places(&mut self) -> impl Iterator<Item = &mut Option<Texture>> {
+        let Self { base_colour, opacity, specular, specular_factor, emission, roughness, metallic, .. } = self;
+        let Self { transmission, occlusion, normal, .. } = self;
+        let first = [base_colour, opacity, specular, specular_factor, emission, roughness, metallic];
+        first.into_iter().chain([transmission, occlusion, normal])
     }
 }
 

@@ -6,8 +6,11 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{
-    AnimationInfo, Camera, ChosenLight, Environment, Ground, Image, Light, Material, Mesh, Projection, RenderDefaults,
-    Sky, Transform, deformation::PosedMesh, mesh::corners_of,
+    AnimationInfo, Camera, ChosenLight, Environment, Ground, Image, Light, Material, Mesh, RenderDefaults, Sky,
+    Transform,
+    deformation::PosedMesh,
+    load_options::find_named,
+    mesh::{bounds_of, corners_of},
 };
 
 /// Name of the material of meshes and faces that name none.
@@ -18,7 +21,7 @@ const MOST_TRIANGLES: u64 = 1 << 31;
 pub(crate) const GROUND: &str = "(ground)";
 
 /// Everything that a frame shows. World space is right-handed, +y up by default.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scene {
     /// The file's name without its folder and extension.
     pub name: String,
@@ -103,17 +106,8 @@ pub struct Instance {
 impl Scene {
     /// Makes one of [`Scene::cameras`] the scene's camera: the first one of this name, or else the one of this index.
     pub(crate) fn choose_camera(&mut self, name: &str) -> Result<(), String> {
-        let named = self.cameras.iter().find(|(other, _)| other == name);
-        let found = named.or_else(|| self.cameras.get(name.parse::<usize>().ok()?));
-        let Some((_, camera)) = found else {
-            let cameras = self.cameras.iter().enumerate().map(|(ix, (name, _))| format!("{ix} `{name}`"));
-            let cameras = cameras.collect::<Vec<_>>().join(", ");
-            return Err(match cameras.is_empty() {
-                true => format!("there is no camera `{name}`: the file names no cameras"),
-                false => format!("there is no camera `{name}`, but {cameras}"),
-            });
-        };
-        self.camera = *camera;
+        let names: Vec<_> = self.cameras.iter().map(|(name, _)| Some(&**name)).collect();
+        self.camera = self.cameras[find_named("camera", name, &names, "the file names no cameras")?].1;
         Ok(())
     }
 
@@ -177,8 +171,7 @@ impl Scene {
         let none = || (Vec3::INFINITY, Vec3::NEG_INFINITY);
         let joined = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
         let of_instance = |Instance { mesh_ix, transform, .. }: &Instance| {
-            let world = corners[*mesh_ix].par_iter().map(|p| transform.point(*p));
-            world.map(|p| (p, p)).reduce(none, joined)
+            bounds_of(corners[*mesh_ix].par_iter().map(|p| transform.point(*p)))
         };
         instances.par_iter().map(of_instance).reduce(none, joined)
     }
@@ -197,32 +190,7 @@ impl Scene {
     /// Returns a scene without meshes, materials and lights, to fill by a program. Its name is that of a file
     /// ([`Scene::name_of`]). Its camera is a placeholder, at the origin: it looks along -z.
     pub fn empty(path: &Path) -> Self {
-        Self {
-            name: Self::name_of(path),
-            origin: DVec3::ZERO,
-            meshes: Vec::new(),
-            instances: Vec::new(),
-            materials: Vec::new(),
-            images: Vec::new(),
-            lights: Vec::new(),
-            chosen_light: None,
-            camera: Camera {
-                eye: Vec3::ZERO,
-                target: Vec3::NEG_Z,
-                up: Vec3::Y,
-                projection: Projection::Perspective { vertical_fov_degrees: 45.0 },
-            },
-            chosen_camera: false,
-            cameras: Vec::new(),
-            animations: Vec::new(),
-            ambient: Vec3::ZERO,
-            ground: None,
-            background: Vec3::ZERO,
-            environment: None,
-            sky: None,
-            studio: None,
-            defaults: RenderDefaults::default(),
-        }
+        Self { name: Self::name_of(path), ..Self::default() }
     }
 
     /// Adds a material and returns its index.

@@ -2,6 +2,7 @@
 
 use glam::{Affine2, Vec2};
 use half::f16;
+use serde::Deserialize;
 
 /// An image that textures show, decoded.
 #[derive(Clone, Debug, PartialEq)]
@@ -88,7 +89,8 @@ pub struct Texture {
 }
 
 /// Encoding of an image's colours.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq, Hash)]
+#[serde(rename_all = "snake_case")]
 pub enum Encoding {
     /// sRGB (IEC 61966-2-1), for colours.
     #[default]
@@ -98,7 +100,8 @@ pub enum Encoding {
 }
 
 /// Channel of an image.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq, Hash)]
+#[serde(rename_all = "snake_case")]
 pub enum Channel {
     /// Red.
     #[default]
@@ -130,7 +133,8 @@ impl Channel {
 }
 
 /// Continuation of an image outside of 0 to 1.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
 pub enum Wrap {
     /// The image repeats.
     #[default]
@@ -171,4 +175,10 @@ impl Texture {
 pub(crate) fn linear_of_srgb(value: f32) -> f32 {
     let value = if value > 0.0 { value.min(1.0) } else { 0.0 };
     if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
+}
+
+/// Returns the bits of a half-precision number. A number that is too large becomes the largest one, and NaN becomes 0.
+pub(crate) fn half_bits(value: f32) -> u16 {
+    const MOST: f32 = 65_504.0;
+    f16::from_f32(if value.is_nan() { 0.0 } else { value.clamp(-MOST, MOST) }).to_bits()
 }

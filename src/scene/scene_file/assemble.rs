@@ -373,7 +373,7 @@ fn extent_of(name: &str, length: f32) -> Checked<f32> {
 fn environment(file: &File, spec: &EnvironmentSpec) -> Checked<Environment> {
     let bytes = file.source.exact(&spec.file)?.bytes().map_err(|error| error.to_string())?;
     let (size, colours) = decode_colours(&Encoded { name: spec.file.clone(), bytes: bytes.into() })?;
-    memory::require("the environment", colours.len() as u64 * ENVIRONMENT_BYTES).map_err(|error| error.to_string())?;
+    memory::require("the environment", colours.len() as u64 * ENVIRONMENT_BYTES)?;
     let rotation = within("rotation", spec.rotation.unwrap_or(0.0), -3600.0, 3600.0)?;
     let strength = within("strength", spec.strength.unwrap_or(1.0), 0.0, 1e6)?;
     let (environment, mended) = Environment::new(size, colours, (rotation, strength))?;

@@ -182,9 +182,8 @@ pub(crate) struct MeshSpec {
 /// Source of a mesh's triangles.
 #[derive(Debug)]
 pub(crate) enum Source {
-    /// A mesh file; `path` is relative to the scene file's folder. `crease` is in degrees. `origin` is the point of the
-    /// file that becomes the origin of the mesh.
-    File { path: String, crease: Option<f32>, scene: Option<String>, origin: Option<[f64; 3]> },
+    /// A mesh file.
+    File(FileSpec),
     /// A generator that makes the mesh from a few parameters.
     Generator(Generator),
 }
@@ -237,15 +236,16 @@ impl CommonSpec {
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct FileSpec {
-    file: String,
+pub(crate) struct FileSpec {
+    /// Relative to the scene file's folder.
+    pub file: String,
     /// Angle between two faces, in degrees, beyond which their common edge is sharp. Applies to faces without
     /// normals.
-    crease: Option<f32>,
+    pub crease: Option<f32>,
     /// Scene of a glTF file by its name or its index, counted from 0; the file's default scene where absent.
-    scene: Option<String>,
+    pub scene: Option<String>,
     /// Point of the file that becomes the origin of the mesh, in double precision; 0 where absent.
-    origin: Option<[f64; 3]>,
+    pub origin: Option<[f64; 3]>,
 }
 
 /// Largest coordinate of an origin. Farther away, double precision is coarse, too.
@@ -269,12 +269,12 @@ impl MeshSpec {
         }
         let source = match (table.contains_key("file"), table.contains_key("generator")) {
             (true, false) => {
-                let FileSpec { file: path, crease, scene, origin } = read(table)?;
-                if let Some(origin) = origin.filter(|origin| !origin.iter().all(|x| x.abs() <= MAX_ORIGIN)) {
+                let file: FileSpec = read(table)?;
+                if let Some(origin) = file.origin.filter(|origin| !origin.iter().all(|x| x.abs() <= MAX_ORIGIN)) {
                     return Err(format!("origin = {origin:?} is not within {MAX_ORIGIN:e}"));
                 }
-                let crease = crease.map(|crease| within("crease", crease, 0.0, 180.0)).transpose()?;
-                Source::File { path, crease, scene, origin }
+                file.crease.map(|crease| within("crease", crease, 0.0, 180.0)).transpose()?;
+                Source::File(file)
             }
             (false, true) if common.overrides => {
                 return Err("has `override`, but only mesh files have materials of their own".to_owned());

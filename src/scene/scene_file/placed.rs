@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::{
     animations::{Animations, Moving, places_of},
     assemble::File,
-    description::{CommonSpec, MeshSpec, Source},
+    description::{CommonSpec, FileSpec, MeshSpec, Source},
     overrides::NamedMaterials,
     transforms,
 };
@@ -205,7 +205,8 @@ impl<'a> Placer<'a> {
     pub fn add(&mut self, table: &MeshTable) -> Result<(), SceneError> {
         let failed = |what: String| self.file.at(&table.span, format!("mesh {}: {what}", table.number));
         let MeshSpec { source, common, place } = &table.spec;
-        let array = self.array(common).map_err(failed)?;
+        let array = common.instances.as_ref().map(|name| transforms::read(&self.file.source.exact(name)?));
+        let array = array.transpose().map_err(failed)?;
         let places = places_of(place.at(self.animations.of_keys).map_err(failed)?, array.as_deref());
         let named = self.materials.of_mesh(common).map_err(failed)?;
         let first_instance = self.scene.instances.len();
@@ -214,7 +215,7 @@ impl<'a> Placer<'a> {
                 self.generate(generator, common, (&places, named)).map_err(failed)?;
                 vec![Transform::IDENTITY]
             }
-            Source::File { crease, .. } => {
+            Source::File(FileSpec { crease, .. }) => {
                 let reading =
                     Reading::of(self.file, &table.spec, self.recentre).map_err(failed)?.expect("the source is a file");
                 if !self.read.contains_key(&reading) {
@@ -234,12 +235,6 @@ impl<'a> Placer<'a> {
             self.moving.push(Moving { number, place, array, first_instance, inner });
         }
         Ok(())
-    }
-
-    /// Returns the places of a table's array, if it has one.
-    fn array(&self, common: &CommonSpec) -> Checked<Option<Vec<Transform>>> {
-        let Some(name) = &common.instances else { return Ok(None) };
-        transforms::read(&self.file.source.exact(name)?).map(Some)
     }
 
     /// Adds a generator's mesh.
@@ -382,7 +377,7 @@ impl<'a> Placer<'a> {
 fn require_for_places(scene: &Scene, n_places: usize, n_instances: usize) -> Checked<()> {
     let n_bytes_of_one = (size_of::<Instance>() + size_of::<u32>() * scene.materials.len()) as u64;
     let n_bytes = (n_places as u64).saturating_mul(n_instances as u64).saturating_mul(n_bytes_of_one);
-    require("placing a mesh many times", n_bytes).map_err(|error| error.to_string())
+    Ok(require("placing a mesh many times", n_bytes)?)
 }
 
 /// Adds an instance once for each transform that follows its own.
@@ -401,7 +396,7 @@ fn push_instances(scene: &mut Scene, instance: Instance, places: &[Transform]) -
 impl Reading {
     /// Returns how the file of a mesh is read, or `None` for a generator.
     pub fn of(file: &File, spec: &MeshSpec, recentre: bool) -> Checked<Option<Self>> {
-        let Source::File { path, crease, scene, origin } = &spec.source else { return Ok(None) };
+        let Source::File(FileSpec { file: path, crease, scene, origin }) = &spec.source else { return Ok(None) };
         Ok(Some(Self {
             file: file.source.exact(path)?,
             scene: scene.clone(),

@@ -41,16 +41,44 @@ pub fn source_files_with(path: &Path, options: &LoadOptions) -> Vec<PathBuf> {
 
 /// Returns the meshes that a scene file names, and the other files: images and arrays.
 fn named(scene: &SourceFile) -> (Vec<SourceFile>, Vec<SourceFile>) {
-    let table: Table = scene.text().ok().and_then(|text| text.parse().ok()).unwrap_or_default();
-    let file = |name: &str| scene.exact(name).ok();
-    let tables = || table.get("mesh").and_then(Value::as_array).into_iter().flatten();
-    let named = |key: &'static str| tables().filter_map(move |mesh| mesh.get(key)?.as_str()).filter_map(file);
-    let (meshes, arrays) = (named("file").collect(), named("instances"));
-    let materials = table.get("materials").and_then(Value::as_table).into_iter().flat_map(Table::values);
-    let maps = materials.flat_map(|material| MAP_KEYS.iter().filter_map(|key| material.get(key)));
-    let name = |map: &Value| file(map.as_str().or_else(|| map.get("file")?.as_str())?);
-    let environment = table.get("environment").and_then(|it| file(it.get("file")?.as_str()?));
-    (meshes, maps.filter_map(name).chain(environment).chain(arrays).collect())
+    let mut table: Table = scene.text().ok().and_then(|text| text.parse().ok()).unwrap_or_default();
+    let (mut meshes, mut others) = (Vec::new(), Vec::new());
+    for (is_mesh, name) in names_of_files(&mut table) {
+        let list = if is_mesh { &mut meshes } else { &mut others };
+        list.extend(scene.exact(name));
+    }
+    (meshes, others)
+}
+
+/// Returns the names of files in the table of a scene file, each with whether the file is that of a mesh.
+pub(super) fn names_of_files(table: &mut Table) -> Vec<(bool, &mut String)> {
+    let mut names = Vec::new();
+    for (key, value) in table.iter_mut() {
+        match (key.as_str(), value) {
+            ("mesh", Value::Array(meshes)) => {
+                let keys = meshes.iter_mut().filter_map(Value::as_table_mut).flatten();
+                let files = keys.filter(|(key, _)| ["file", "instances"].contains(&key.as_str()));
+                names.extend(files.map(|(key, name)| (key == "file", name)));
+            }
+            ("environment", Value::Table(environment)) => {
+                names.extend(environment.get_mut("file").map(|name| (false, name)));
+            }
+            ("materials", Value::Table(materials)) => {
+                let materials = materials.iter_mut().filter_map(|(_, material)| material.as_table_mut()).flatten();
+                let maps = materials.filter(|(key, _)| MAP_KEYS.contains(&key.as_str()));
+                names.extend(maps.filter_map(|(_, map)| match map {
+                    Value::Table(map) => Some((false, map.get_mut("file")?)),
+                    name => Some((false, name)),
+                }));
+            }
+            _ => {}
+        }
+    }
+    let text = |(is_mesh, value)| match value {
+        &mut Value::String(ref mut name) => Some((is_mesh, name)),
+        _ => None,
+    };
+    names.into_iter().filter_map(text).collect()
 }
 
 /// Returns whether a file's name is that of a scene file in TOML.

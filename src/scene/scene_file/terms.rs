@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::scene::model::{Alpha, Conductor, Lobes, Maps, Material, Microfacet, Texture};
+use crate::scene::model::{Alpha, Conductor, Lobes, Material, Microfacet};
 
 /// A term of a material.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,25 +102,6 @@ impl Material {
             number("sheen_roughness", sheen.roughness, 0.0),
         ];
         terms.into_iter().filter(|term| !term.is_default)
-    }
-}
-
-impl Maps {
-    /// Returns the textures with the names of the terms that they vary.
-    pub fn named(&self) -> impl Iterator<Item = (&'static str, &Texture)> {
-        let all = [
-            ("base colour", &self.base_colour),
-            ("opacity", &self.opacity),
-            ("specular colour", &self.specular),
-            ("specular factor", &self.specular_factor),
-            ("emission", &self.emission),
-            ("roughness", &self.roughness),
-            ("metallic", &self.metallic),
-            ("transmission", &self.transmission),
-            ("occlusion", &self.occlusion),
-            ("normal", &self.normal),
-        ];
-        all.into_iter().filter_map(|(name, texture)| Some((name, texture.as_ref()?)))
     }
 }
 

@@ -37,7 +37,7 @@ fn parse(mut bytes: &[u8]) -> Checked<Vec<Transform>> {
         return Err(format!("ends after {n_held} of {n} instances"));
     }
     let n_bytes = n.saturating_mul((2 * size_of::<[f64; 16]>() + size_of::<Transform>()) as u64);
-    require("reading instances", n_bytes).map_err(|error| error.to_string())?;
+    require("reading instances", n_bytes)?;
     let file = NpyFile::with_header(header, bytes);
     let unreadable = |e: std::io::Error| e.to_string();
     let numbers: Vec<f64> = match dtype.as_str() {

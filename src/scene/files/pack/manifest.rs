@@ -101,8 +101,7 @@ impl Manifest {
         if format != FORMAT {
             return Err(format!("is a pack of format {format}, and this version of kdray reads format {FORMAT}"));
         }
-        require("reading the manifest of a pack", BYTES_PER_TEXT_BYTE * json.len() as u64)
-            .map_err(|error| error.to_string())?;
+        require("reading the manifest of a pack", BYTES_PER_TEXT_BYTE * json.len() as u64)?;
         let mut manifest: Self = serde_json::from_slice(json).map_err(unread)?;
         let stated_hash = manifest.hash.clone();
         manifest = manifest.sealed();

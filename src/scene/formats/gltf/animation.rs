@@ -131,15 +131,10 @@ fn value_at(
     let node = document.root.nodes.get(node_ix).ok_or_else(|| format!("{path}: there is no nodes[{node_ix}]"))?;
     let sampler_ix = channel.sampler.value();
     let sampler = animation.samplers.get(sampler_ix).ok_or_else(|| format!("{path}: there is no such sampler"))?;
-    let n = match property {
-        Property::Translation | Property::Scale => 3,
-        Property::Rotation => 4,
-        Property::MorphTargetWeights => n_targets(&document.root, node),
-    };
-    let type_ = match property {
-        Property::Translation | Property::Scale => Type::Vec3,
-        Property::Rotation => Type::Vec4,
-        Property::MorphTargetWeights => Type::Scalar,
+    let (type_, n) = match property {
+        Property::Translation | Property::Scale => (Type::Vec3, 3),
+        Property::Rotation => (Type::Vec4, 4),
+        Property::MorphTargetWeights => (Type::Scalar, n_targets(&document.root, node)),
     };
     let keys = Keys::new(document, sampler, path, Driven { type_, n, turns: property == Property::Rotation })?;
     let value = keys.at(seconds)?;

@@ -2,8 +2,10 @@
 
 use std::{borrow::Cow, cell::RefCell, fmt::Display, ops::Range, path::PathBuf, sync::Arc};
 
-use gltf::json::{self, Index, Root, image};
+use gltf::json::{self, Index, Root, Value, image};
 use hashbrown::{HashMap, HashSet};
+use serde::de::DeserializeOwned;
+use serde_json::Map;
 
 use super::{
     deform::MorphTargets,
@@ -202,7 +204,7 @@ impl Document {
     /// Decodes a buffer view. `n_total` is the number of bytes of all so far.
     fn decoded_view(&self, packed: &meshopt::Packed, n_total: &mut u64) -> Checked<Vec<u8>> {
         *n_total = packed.n_bytes()?.saturating_add(*n_total);
-        require("decoding the buffer views", *n_total).map_err(|error| error.to_string())?;
+        require("decoding the buffer views", *n_total)?;
         let buffer = item(&self.buffers, "buffers", packed.buffer, &"buffer")?;
         packed.decode(part(buffer.bytes(), packed.byte_offset, packed.byte_length)?)
     }
@@ -300,6 +302,12 @@ impl Document {
         read.map_err(|what| self.note(LEFT_OUT, what)).ok()
     }
 
+    /// Reads an extension that the crate `gltf` does not know. `path` is the JSON path of the object that has it.
+    pub fn extension<T: DeserializeOwned>(&self, all: &Map<String, Value>, name: &str, path: &str) -> Option<T> {
+        let read = json::deserialize::from_value(all.get(name)?.clone());
+        self.or_left_out(read.map_err(|error| format!("{path}.extensions.{name}: {error}")))
+    }
+
     /// Returns the first thing that is left out because it cannot be read.
     pub fn first_left_out(&self) -> Option<String> {
         let notes = self.notes.borrow();
@@ -369,7 +377,7 @@ pub(super) fn part(bytes: &[u8], offset: u64, n_bytes: u64) -> Checked<&[u8]> {
 /// Returns the files that a glTF file names: its buffers and images. What cannot be read names nothing.
 pub(crate) fn named_files(MeshFile { source, bytes, .. }: &MeshFile) -> Vec<SourceFile> {
     let json = split(bytes).map(|(json, _)| &bytes[json]).unwrap_or_default();
-    let root: json::Value = json::deserialize::from_slice(json).unwrap_or_default();
+    let root: Value = json::deserialize::from_slice(json).unwrap_or_default();
     let items = ["buffers", "images"].into_iter().filter_map(|list| root.get(list)?.as_array()).flatten();
     let uris = items.filter_map(|item| item.get("uri")?.as_str());
     uris.filter_map(|uri| match Uri::new(uri) {

@@ -102,7 +102,7 @@ impl Decoded {
             }
         }
         let n_bytes = streams.values().map(|(_, stream)| stream.working_bytes()).fold(0, u64::saturating_add);
-        require("decoding the data of Draco", n_bytes).map_err(|error| error.to_string())?;
+        require("decoding the data of Draco", n_bytes)?;
         let decode = |(view_ix, (part, stream)): (&usize, &(&Part, Stream))| {
             let decoded = stream.decode().map(|mesh| (*view_ix, mesh));
             decoded.map_err(|what| failed(&part.path, format!("{what}. {REMEDY}")))

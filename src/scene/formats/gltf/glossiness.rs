@@ -2,39 +2,12 @@
 //! the normal is stated. A metal has a high reflectance and a black diffuse colour. The image of glossiness is turned
 //! into one of roughness.
 
-use gltf::json::texture::Info;
 use half::f16;
 
 use crate::scene::model::Pixels;
 
-/// Name of the extension.
-pub(super) const NAME: &str = "KHR_materials_pbrSpecularGlossiness";
 /// Factor that makes of the reflectance along the normal the factor of the 0.04 that the index 1.5 stands for.
 pub(super) const SPECULAR_SCALE: f32 = 25.0;
-
-/// The numbers and textures of the extension.
-#[derive(serde::Deserialize)]
-#[serde(default, rename_all = "camelCase")]
-pub(super) struct SpecularGlossiness {
-    pub diffuse_factor: [f32; 4],
-    pub diffuse_texture: Option<Info>,
-    pub specular_factor: [f32; 3],
-    pub glossiness_factor: f32,
-    /// Reflectance as sRGB colours, glossiness as opacity.
-    pub specular_glossiness_texture: Option<Info>,
-}
-
-impl Default for SpecularGlossiness {
-    fn default() -> Self {
-        Self {
-            diffuse_factor: [1.0; 4],
-            diffuse_texture: None,
-            specular_factor: [1.0; 3],
-            glossiness_factor: 1.0,
-            specular_glossiness_texture: None,
-        }
-    }
-}
 
 /// Turns the opacity of an image, which is its glossiness, into greys of the roughness: 1 - `factor` times opacity.
 pub(super) fn turn_into_roughness(pixels: &mut Pixels, factor: f32) {

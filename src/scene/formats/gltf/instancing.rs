@@ -1,9 +1,9 @@
 //! Nodes whose mesh is there many times (EXT_mesh_gpu_instancing).
 
-use glam::{DMat4, DQuat, DVec3, Quat, Vec3};
+use glam::{DMat4, Quat};
 use gltf::json::{Index, accessor::Type};
 
-use super::{accessor::Accessor, document::Document};
+use super::{accessor::Accessor, document::Document, nodes::matrix_of};
 use crate::scene::model::error::Checked;
 
 const NAME: &str = "EXT_mesh_gpu_instancing";
@@ -42,16 +42,12 @@ pub(super) fn places(document: &Document, node_ix: usize) -> Checked<Option<Plac
 impl Places<'_> {
     /// Returns one of the places.
     pub fn node_from_instance(&self, ix: usize) -> Checked<DMat4> {
-        let vector = |accessor: &Option<Accessor>, or: DVec3| match accessor {
-            Some(accessor) => Ok::<_, String>(Vec3::from_array(accessor.numbers(ix, 0.0)?).as_dvec3()),
-            None => Ok(or),
-        };
-        let rotation = match &self.rotation {
-            Some(accessor) => Quat::from_array(accessor.numbers(ix, 0.0)?).as_dquat(),
-            None => DQuat::IDENTITY,
-        };
-        let rotation = if rotation.length_squared() > 0.0 { rotation.normalize() } else { DQuat::IDENTITY };
-        let (scale, translation) = (vector(&self.scale, DVec3::ONE)?, vector(&self.translation, DVec3::ZERO)?);
-        Ok(DMat4::from_scale_rotation_translation(scale, rotation, translation))
+        let scale = numbers(&self.scale, ix, [1.0; 3])?;
+        let rotation = numbers(&self.rotation, ix, Quat::IDENTITY.to_array())?;
+        Ok(matrix_of(scale, rotation, numbers(&self.translation, ix, [0.0; 3])?))
     }
+}
+
+fn numbers<const N: usize>(accessor: &Option<Accessor>, ix: usize, or: [f32; N]) -> Checked<[f32; N]> {
+    accessor.as_ref().map_or(Ok(or), |accessor| accessor.numbers(ix, 0.0))
 }

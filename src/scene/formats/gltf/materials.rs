@@ -1,12 +1,14 @@
 //! Materials: glTF's metallic-roughness model with its extensions.
 
 use glam::Vec3;
-use gltf::json::{self, Index, Value, material::AlphaMode, validation::Checked::Valid};
+use gltf::json::{
+    self, Index, extensions::material::PbrSpecularGlossiness, material::AlphaMode, validation::Checked::Valid,
+};
 use hashbrown::HashMap;
 
 use super::{
     document::{Document, item},
-    glossiness::{self, SPECULAR_SCALE, SpecularGlossiness},
+    glossiness::SPECULAR_SCALE,
     textures::{TextureUse, Textures},
 };
 use crate::scene::model::{
@@ -40,20 +42,17 @@ impl<'a> Materials<'a> {
         if let Some(ix) = self.known.get(&key) {
             return *ix;
         }
-        let material = match key {
+        let (json, path) = match key {
             Some(ix) => {
                 let from = format_args!("{path}.material");
                 let json = self.document.or_left_out(item(&self.document.root.materials, "materials", ix, &from));
                 let Some(json) = json else { return self.index(None, path) };
-                let reader = Reader { document: self.document, path: format!("materials[{ix}]") };
-                reader.material(json, (&mut self.textures, self.replaced))
+                (json, format!("materials[{ix}]"))
             }
-            None => {
-                let reader = Reader { document: self.document, path: "(default of glTF)".to_owned() };
-                reader.material(&json::Material::default(), (&mut self.textures, self.replaced))
-            }
+            None => (&json::Material::default(), "(default of glTF)".to_owned()),
         };
-        self.materials.push(material);
+        let reader = Reader { document: self.document, path };
+        self.materials.push(reader.material(json, (&mut self.textures, self.replaced)));
         let ix = (self.materials.len() - 1) as u32;
         self.known.insert(key, ix);
         ix
@@ -70,13 +69,13 @@ struct Reader<'a> {
 impl Reader<'_> {
     fn material(&self, json: &json::Material, (textures, replaced): (&mut Textures, &[MaterialChoice])) -> Material {
         let name = json.name.clone().unwrap_or_else(|| self.path.clone());
-        let glossy: Option<SpecularGlossiness> = self.extension(json, glossiness::NAME);
+        let glossy = json.extensions.as_ref().and_then(|it| it.pbr_specular_glossiness.as_ref());
         let maps = match is_replaced(replaced, &name) {
             true => Maps::default(),
-            false => self.maps(json, glossy.as_ref(), textures),
+            false => self.maps(json, glossy, textures),
         };
         let pbr = &json.pbr_metallic_roughness;
-        let [r, g, b, opacity] = glossy.as_ref().map_or(pbr.base_color_factor.0, |glossy| glossy.diffuse_factor);
+        let [r, g, b, opacity] = glossy.map_or(pbr.base_color_factor.0, |glossy| glossy.diffuse_factor.0);
         let kd = self.colour("baseColorFactor", [r, g, b]);
         let extensions = json.extensions.as_ref();
         let ior = extensions.and_then(|it| it.ior.as_ref()).map_or(1.5, |it| it.ior.0);
@@ -89,8 +88,8 @@ impl Reader<'_> {
             name,
             ka: kd,
             kd,
-            ks: match &glossy {
-                Some(glossy) => SPECULAR_SCALE * self.colour("specularFactor", glossy.specular_factor),
+            ks: match glossy {
+                Some(glossy) => SPECULAR_SCALE * self.colour("specularFactor", glossy.specular_factor.0),
                 None => self.specular(json),
             },
             // An unlit material shows its base colour alone.
@@ -100,7 +99,7 @@ impl Reader<'_> {
             ni: if ior == 0.0 { MAX_IOR } else { self.within("ior", ior, 1.0, MAX_IOR) },
             d: self.within("baseColorFactor[3]", opacity, 0.0, 1.0),
             lobes: Lobes::default(),
-            microfacet: Some(match &glossy {
+            microfacet: Some(match glossy {
                 Some(glossy) => self.dielectric(glossy),
                 None => self.microfacet(json),
             }),
@@ -127,8 +126,8 @@ impl Reader<'_> {
         factor * self.colour("specularColorFactor", specular.specular_color_factor.0)
     }
 
-    fn dielectric(&self, glossy: &SpecularGlossiness) -> Microfacet {
-        let glossiness = self.within("glossinessFactor", glossy.glossiness_factor, 0.0, 1.0);
+    fn dielectric(&self, glossy: &PbrSpecularGlossiness) -> Microfacet {
+        let glossiness = self.within("glossinessFactor", glossy.glossiness_factor.0, 0.0, 1.0);
         // The image of the roughness has the factor.
         let roughness = if glossy.specular_glossiness_texture.is_some() { 1.0 } else { 1.0 - glossiness };
         Microfacet { metallic: 0.0, roughness, ..Microfacet::default() }
@@ -158,7 +157,9 @@ impl Reader<'_> {
 
     fn clearcoat(&self, json: &json::Material) -> Clearcoat {
         let raw = self.extension(json, "KHR_materials_clearcoat");
-        let Some(Raw { factor, roughness, .. }) = raw else { return Clearcoat::default() };
+        let Some(Raw { clearcoat_factor: factor, clearcoat_roughness_factor: roughness, .. }) = raw else {
+            return Clearcoat::default();
+        };
         if factor > 0.0 {
             self.document.note("layers of clearcoat, which the integrator whitted does not show", &self.path);
         }
@@ -170,25 +171,24 @@ impl Reader<'_> {
 
     fn sheen(&self, json: &json::Material) -> Sheen {
         let raw = self.extension(json, "KHR_materials_sheen");
-        let Some(Raw { colour, sheen_roughness, .. }) = raw else { return Sheen::default() };
+        let Some(Raw { sheen_color_factor: colour, sheen_roughness_factor: roughness, .. }) = raw else {
+            return Sheen::default();
+        };
         if colour != [0.0; 3] {
             self.document.note("sheen, which the integrator whitted does not show", &self.path);
         }
         Sheen {
             colour: self.colour("sheenColorFactor", colour),
-            roughness: self.within("sheenRoughnessFactor", sheen_roughness, 0.0, 1.0),
+            roughness: self.within("sheenRoughnessFactor", roughness, 0.0, 1.0),
         }
     }
 
     /// Returns an extension that the crate `gltf` does not know.
     fn extension<T: serde::de::DeserializeOwned>(&self, json: &json::Material, name: &str) -> Option<T> {
-        let value = json.extensions.as_ref().and_then(|it| it.others.get(name));
-        let read = |value: &Value| json::deserialize::from_value(value.clone());
-        let read = value.map(read)?.map_err(|error| format!("{}.extensions.{name}: {error}", self.path));
-        self.document.or_left_out(read)
+        self.document.extension(&json.extensions.as_ref()?.others, name, &self.path)
     }
 
-    fn maps(&self, json: &json::Material, glossy: Option<&SpecularGlossiness>, textures: &mut Textures) -> Maps {
+    fn maps(&self, json: &json::Material, glossy: Option<&PbrSpecularGlossiness>, textures: &mut Textures) -> Maps {
         let pbr = &json.pbr_metallic_roughness;
         let mut map = |info: &Option<json::texture::Info>, name: &str, channel: Option<Channel>| {
             let path = format!("{}.{name}", self.path);
@@ -206,7 +206,7 @@ impl Reader<'_> {
             (maps.roughness, maps.metallic) = (None, None);
             maps.specular = map(&glossy.specular_glossiness_texture, "specularGlossinessTexture", None);
             if let Some(info) = &glossy.specular_glossiness_texture {
-                let (path, factor) = (format!("{}.specularGlossinessTexture", self.path), glossy.glossiness_factor);
+                let (path, factor) = (format!("{}.specularGlossinessTexture", self.path), glossy.glossiness_factor.0);
                 maps.roughness = textures.roughness(&TextureUse::of(info), &path, factor.clamp(0.0, 1.0));
             }
         } else if let Some(extensions) = &json.extensions {
@@ -221,12 +221,14 @@ impl Reader<'_> {
         }
         if let Some(normal) = &json.normal_texture {
             let path = format!("{}.normalTexture", self.path);
-            maps.normal = textures.texture(&textures.of_normal(normal, &path), &path, Some(Channel::Red));
+            let others = normal.extensions.as_ref().map(|it| &it.others);
+            maps.normal = textures.of_data((normal.index, normal.tex_coord), others, &path);
             maps.normal_scale = self.within("normalTexture.scale", normal.scale, f32::MIN, f32::MAX);
         }
         if let Some(occlusion) = &json.occlusion_texture {
             let path = format!("{}.occlusionTexture", self.path);
-            maps.occlusion = textures.texture(&textures.of_occlusion(occlusion, &path), &path, Some(Channel::Red));
+            let others = occlusion.extensions.as_ref().map(|it| &it.others);
+            maps.occlusion = textures.of_data((occlusion.index, occlusion.tex_coord), others, &path);
             maps.occlusion_strength = self.within("occlusionTexture.strength", occlusion.strength.0, 0.0, 1.0);
         }
         if json
@@ -250,21 +252,11 @@ impl Reader<'_> {
 }
 
 /// The numbers of KHR_materials_clearcoat and KHR_materials_sheen. Their textures are not read.
-#[derive(serde::Deserialize)]
-#[serde(default)]
+#[derive(Default, serde::Deserialize)]
+#[serde(default, rename_all = "camelCase")]
 struct Raw {
-    #[serde(rename = "clearcoatFactor")]
-    factor: f32,
-    #[serde(rename = "clearcoatRoughnessFactor")]
-    roughness: f32,
-    #[serde(rename = "sheenColorFactor")]
-    colour: [f32; 3],
-    #[serde(rename = "sheenRoughnessFactor")]
-    sheen_roughness: f32,
-}
-
-impl Default for Raw {
-    fn default() -> Self {
-        Self { factor: 0.0, roughness: 0.0, colour: [0.0; 3], sheen_roughness: 0.0 }
-    }
+    clearcoat_factor: f32,
+    clearcoat_roughness_factor: f32,
+    sheen_color_factor: [f32; 3],
+    sheen_roughness_factor: f32,
 }

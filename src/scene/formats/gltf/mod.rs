@@ -86,15 +86,7 @@ pub(crate) fn load(file: MeshFile, options: &LoadOptions) -> Result<(Scene, Lack
     scene.defaults.is_metered = !lacks_light;
     scene.defaults.samples = SAMPLES;
     document.warnings().iter().for_each(|warning| tracing::warn!("{warning}"));
-    let lacks = Lacks {
-        camera: lacks_camera,
-        up: Up::Y,
-        description: true,
-        light: lacks_light,
-        background: lacks_light,
-        integrator: true,
-        exposure: true,
-    };
+    let lacks = Lacks { camera: lacks_camera, light: lacks_light, background: lacks_light, ..Lacks::all(Up::Y) };
     Ok((scene, lacks))
 }
 

@@ -2,14 +2,14 @@
 
 use std::collections::HashMap;
 
-use glam::{DMat4, DQuat, DVec3, Mat4, Quat};
+use glam::{DMat4, DQuat, Mat4, Quat, Vec3};
 use gltf::json::{self, Index, Node};
 
 use super::{
     animation::animated_nodes,
     document::{Document, LEFT_OUT, item},
 };
-use crate::scene::model::{LoadOptions, error::Checked};
+use crate::scene::model::{LoadOptions, error::Checked, load_options::find_named};
 
 /// The nodes of a scene, each with its transform.
 pub(super) struct Nodes {
@@ -88,15 +88,8 @@ impl Nodes {
 fn scene(document: &Document, name: Option<&str>) -> Checked<Option<usize>> {
     let scenes = &document.root.scenes;
     if let Some(name) = name {
-        let named = scenes.iter().position(|scene| scene.name.as_deref() == Some(name));
-        let found = named.or_else(|| name.parse().ok().filter(|ix| *ix < scenes.len()));
-        return found.map(Some).ok_or_else(|| {
-            let names = scenes.iter().enumerate().map(|(ix, scene)| match &scene.name {
-                Some(name) => format!("{ix} `{name}`"),
-                None => ix.to_string(),
-            });
-            format!("there is no scene `{name}`, but {}", names.collect::<Vec<_>>().join(", "))
-        });
+        let names: Vec<_> = scenes.iter().map(|scene| scene.name.as_deref()).collect();
+        return find_named("scene", name, &names, "the file has none").map(Some);
     }
     match document.root.scene {
         Some(index) if document.or_left_out(item(scenes, "scenes", index.value(), &"scene")).is_some() => {
@@ -125,15 +118,17 @@ fn parent_from_node(node: &Node, ix: usize) -> Checked<DMat4> {
     let matrix = match node.matrix {
         Some(matrix) => Mat4::from_cols_array(&matrix).as_dmat4(),
         None => {
-            let vector = |vector: Option<[f32; 3]>, or: f64| {
-                vector.map_or(DVec3::splat(or), |vector| DVec3::from_array(vector.map(f64::from)))
-            };
             let json::scene::UnitQuaternion(rotation) = node.rotation.unwrap_or_default();
-            let rotation = Quat::from_array(rotation).as_dquat();
-            // A quaternion of length 0 turns nothing.
-            let rotation = if rotation.length_squared() > 0.0 { rotation.normalize() } else { DQuat::IDENTITY };
-            DMat4::from_scale_rotation_translation(vector(node.scale, 1.0), rotation, vector(node.translation, 0.0))
+            matrix_of(node.scale.unwrap_or([1.0; 3]), rotation, node.translation.unwrap_or_default())
         }
     };
     if matrix.is_finite() { Ok(matrix) } else { Err(format!("nodes[{ix}]: its transform is not finite")) }
+}
+
+/// Returns the matrix of a transform in parts. A quaternion of length 0 turns nothing.
+pub(super) fn matrix_of(scale: [f32; 3], rotation: [f32; 4], translation: [f32; 3]) -> DMat4 {
+    let rotation = Quat::from_array(rotation).as_dquat();
+    let rotation = if rotation.length_squared() > 0.0 { rotation.normalize() } else { DQuat::IDENTITY };
+    let [scale, translation] = [scale, translation].map(|vector| Vec3::from_array(vector).as_dvec3());
+    DMat4::from_scale_rotation_translation(scale, rotation, translation)
 }

@@ -4,11 +4,11 @@ use glam::{Affine2, Vec2};
 use gltf::json::{
     self, Index,
     extensions::texture::TextureTransform,
-    material::{NormalTexture, OcclusionTexture},
     texture::{MagFilter, Sampler, WrappingMode},
     validation::Checked::{self as Word, Valid},
 };
 use hashbrown::HashMap;
+use serde_json::Map;
 
 use super::{
     document::{Document, ImageSource, LEFT_OUT, item},
@@ -50,34 +50,19 @@ pub(super) struct Textures<'a> {
 
 impl<'a> Textures<'a> {
     pub fn new(document: &'a Document) -> Self {
-        Self {
-            document,
-            encoded: Vec::new(),
-            known: HashMap::new(),
-            known_images: HashMap::new(),
-            rough: HashMap::new(),
-        }
+        let (encoded, known, known_images, rough) = Default::default();
+        Self { document, encoded, known, known_images, rough }
     }
 
-    pub fn of_normal(&self, texture: &NormalTexture, path: &str) -> TextureUse {
-        let transform = self.raw_transform(texture.extensions.as_ref().map(|extensions| &extensions.others), path);
-        TextureUse { index: texture.index, uv_set: texture.tex_coord, transform }
-    }
-
-    pub fn of_occlusion(&self, texture: &OcclusionTexture, path: &str) -> TextureUse {
-        let transform = self.raw_transform(texture.extensions.as_ref().map(|extensions| &extensions.others), path);
-        TextureUse { index: texture.index, uv_set: texture.tex_coord, transform }
-    }
-
-    /// Returns the transform of a texture whose extensions the crate `gltf` does not read.
-    fn raw_transform(
-        &self,
-        extensions: Option<&serde_json::Map<String, json::Value>>,
+    /// Returns a texture of normals or of occlusion, whose extensions the crate `gltf` does not read.
+    pub fn of_data(
+        &mut self,
+        (index, uv_set): (Index<json::Texture>, u32),
+        extensions: Option<&Map<String, json::Value>>,
         path: &str,
-    ) -> Option<TextureTransform> {
-        let value = extensions?.get("KHR_texture_transform")?;
-        let read = json::deserialize::from_value(value.clone());
-        self.document.or_left_out(read.map_err(|error| format!("{path}.extensions.KHR_texture_transform: {error}")))
+    ) -> Option<Texture> {
+        let transform = extensions.and_then(|it| self.document.extension(it, "KHR_texture_transform", path));
+        self.texture(&TextureUse { index, uv_set, transform }, path, Some(Channel::Red))
     }
 
     /// Returns a texture: of the linear numbers of a channel, or without a channel of sRGB colours. `path` is the JSON

@@ -143,7 +143,7 @@ fn check_sum<'a>(headers: impl Iterator<Item = &'a Header> + Clone, n_before: u6
     // Each thread decodes one image at a time.
     let at_once = working.clone().max().unwrap_or(0).saturating_mul(rayon::current_num_threads() as u64);
     let needed = decoded + at_once.min(working.sum());
-    memory::require("decoding the scene's images", needed).map_err(|error| error.to_string())
+    Ok(memory::require("decoding the scene's images", needed)?)
 }
 
 /// Reads an image's header and checks the image's size.
@@ -238,7 +238,7 @@ fn check_exr(bytes: &[u8]) -> Checked<()> {
             }
         }
         // A block is read whole, with all channels that the layer has.
-        memory::require("reading its blocks", layer.max_block_byte_size() as u64).map_err(|error| error.to_string())?;
+        memory::require("reading its blocks", layer.max_block_byte_size() as u64)?;
     }
     Ok(())
 }

@@ -1,12 +1,8 @@
 //! Pixels of decoders as pixels of images: four channels of 8 bits or of half-precision floats.
 
 use ::image::DynamicImage;
-use half::f16;
 
-use crate::scene::model::{Pixels, error::Checked};
-
-/// The largest finite half-precision number.
-const MAX_HALF: f32 = 65_504.0;
+use crate::scene::model::{Pixels, error::Checked, texture::half_bits};
 
 /// Returns decoded pixels with four channels. Grey is spread to red, green and blue, and opacity is 1 where there is
 /// none. `is_premultiplied`: the colours have been multiplied by the opacity, and are divided by it.
@@ -38,14 +34,9 @@ pub(super) fn of_dynamic(decoded: DynamicImage, is_premultiplied: bool) -> Check
     })
 }
 
-/// Returns pixels of half-precision floats. A number that is too large becomes the largest one, and NaN becomes 0.
+/// Returns pixels of half-precision floats, all of which are finite.
 pub(super) fn halves(pixels: impl Iterator<Item = [f32; 4]>) -> Pixels {
     Pixels::Halves(pixels.map(|rgba| rgba.map(half_bits)).collect())
-}
-
-fn half_bits(value: f32) -> u16 {
-    let finite = if value.is_nan() { 0.0 } else { value.clamp(-MAX_HALF, MAX_HALF) };
-    f16::from_f32(finite).to_bits()
 }
 
 fn opaque([r, g, b]: [f32; 3]) -> [f32; 4] {

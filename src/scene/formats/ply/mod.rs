@@ -27,13 +27,14 @@ use crate::{
     scene::{
         files::SourceFile,
         meshes::{
-            needs::{Attributes, MeshSize, require_for_mesh, require_for_rows},
+            needs::{Attributes, MeshSize, require_for_mesh},
             polygon::Triangulator,
             smooth::{Shading, smooth_normals},
         },
         model::{Material, Mesh, Texture, error::Checked},
     },
     util::{
+        memory::require,
         progress::{Progress, Work},
         text::one_line,
     },
@@ -65,7 +66,7 @@ struct Faces<'a> {
 
 /// The mesh of a file without its materials. Its faces have the slot of their image.
 pub(crate) struct PlyMesh {
-    mesh: Mesh,
+    pub mesh: Mesh,
     /// The names of the images.
     names: Vec<String>,
     /// Whether normals depend on the crease angle.
@@ -125,11 +126,6 @@ pub(crate) fn ply_mesh(
 }
 
 impl PlyMesh {
-    /// The mesh without its materials.
-    pub fn mesh(&self) -> &Mesh {
-        &self.mesh
-    }
-
     /// Reads the images that the file names.
     pub fn with_materials(self, file: &SourceFile, images: &mut Images) -> Loaded {
         let Self { mesh, names, uses_crease, warnings } = self;
@@ -226,7 +222,7 @@ fn check_counts(header: &Header, n_bytes: u64) -> Checked<()> {
     }
     // The numbers of a text become eight bytes each.
     let n_content = n_bytes.saturating_mul(if is_text { 5 } else { 1 });
-    require_for_rows(n_held.saturating_add(n_content))
+    Ok(require("reading its rows", n_held.saturating_add(n_content))?)
 }
 
 /// Returns the names of images in the comments `TextureFile NAME`.

@@ -18,18 +18,6 @@ pub struct Cuboid {
     sides: Option<Vec<Side>>,
 }
 
-/// The inside of a box centred at the origin: 2 triangles per side, facing inwards.
-///
-/// Side `sides[i]` has slot i.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Room {
-    /// Edge lengths along x, y, z.
-    size: [f32; 3],
-    /// Sides of the room; where absent, all six in the order left, right, bottom, top, back, front.
-    sides: Option<Vec<Side>>,
-}
-
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Side {
@@ -66,14 +54,26 @@ impl Side {
 
 impl Cuboid {
     pub fn build(&self) -> Checked<Mesh> {
-        faces(self.size, self.sides.as_deref(), [0, 1, 2, 3], LOWER_LEFT_FIRST)
+        self.faces([0, 1, 2, 3], LOWER_LEFT_FIRST)
     }
-}
 
-impl Room {
-    pub fn build(&self) -> Checked<Mesh> {
-        let mesh = faces(self.size, self.sides.as_deref(), [0, 3, 2, 1], LOWER_RIGHT_FIRST)?;
-        Ok(Mesh { name: "room".to_owned(), ..mesh })
+    /// Makes the inside of the box: its triangles face inwards.
+    pub fn room(&self) -> Checked<Mesh> {
+        Ok(Mesh { name: "room".to_owned(), ..self.faces([0, 3, 2, 1], LOWER_RIGHT_FIRST)? })
+    }
+
+    /// Makes two triangles per side. `order` names the corners of `Side::corners` in the order of the faces, and `uvs`
+    /// are their texture coordinates in this order.
+    fn faces(&self, order: [usize; 4], uvs: [Vec2; 4]) -> Checked<Mesh> {
+        let mut mesh = Mesh { positions: corners(self.size)?, ..Mesh::default() };
+        for (slot, side) in self.sides.as_deref().unwrap_or(&ALL_SIDES).iter().enumerate() {
+            let corners = order.map(|ix| side.corners()[ix]);
+            for face in [[0, 1, 2], [0, 2, 3]] {
+                mesh.push_flat(face.map(|ix: usize| corners[ix]), slot as u32);
+                mesh.uvs[0].push(face.map(|ix| uvs[ix]));
+            }
+        }
+        Ok(mesh)
     }
 }
 
@@ -81,20 +81,6 @@ impl Room {
 const LOWER_LEFT_FIRST: [Vec2; 4] = [Vec2::Y, Vec2::ONE, Vec2::X, Vec2::ZERO];
 /// Texture coordinates of a side's corners, counter-clockwise from the lower right corner of the image.
 const LOWER_RIGHT_FIRST: [Vec2; 4] = [Vec2::ONE, Vec2::X, Vec2::ZERO, Vec2::Y];
-
-/// Makes two triangles per side. `order` names the corners of `Side::corners` in the order of the faces, and `uvs` are
-/// their texture coordinates in this order.
-fn faces(size: [f32; 3], sides: Option<&[Side]>, order: [usize; 4], uvs: [Vec2; 4]) -> Checked<Mesh> {
-    let mut mesh = Mesh { positions: corners(size)?, ..Mesh::default() };
-    for (slot, side) in sides.unwrap_or(&ALL_SIDES).iter().enumerate() {
-        let corners = order.map(|ix| side.corners()[ix]);
-        for face in [[0, 1, 2], [0, 2, 3]] {
-            mesh.push_flat(face.map(|ix: usize| corners[ix]), slot as u32);
-            mesh.uvs[0].push(face.map(|ix| uvs[ix]));
-        }
-    }
-    Ok(mesh)
-}
 
 /// Returns the positions of the eight corners. The index of a corner is its number, as `Side::corners` defines it.
 fn corners(size: [f32; 3]) -> Checked<Vec<Vec3>> {

@@ -30,7 +30,7 @@ pub enum Generator {
     /// A box.
     Box(cuboid::Cuboid),
     /// A box whose faces point inwards, with a slot for each wall.
-    Room(cuboid::Room),
+    Room(cuboid::Cuboid),
     /// A rectangle, which may be checkered.
     Plane(plane::Plane),
     /// A disc.
@@ -53,7 +53,7 @@ impl Generator {
     pub fn build(&self, budget: &TriangleBudget) -> Checked<Mesh> {
         match self {
             Self::Box(cuboid) => cuboid.build(),
-            Self::Room(room) => room.build(),
+            Self::Room(cuboid) => cuboid.room(),
             Self::Plane(plane) => plane.build(budget),
             Self::Disc(disc) => disc.build(budget),
             Self::Sphere(sphere) => sphere.build(budget),

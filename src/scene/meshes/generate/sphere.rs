@@ -108,21 +108,12 @@ const ICOSAHEDRON: [[usize; 3]; 20] = [
 /// Returns the corners of the icosahedron: (0, +-1, +-golden ratio) and their cyclic permutations.
 fn icosahedron_corners() -> [DVec3; 12] {
     let g = (1.0 + 5f64.sqrt()) / 2.0;
-    [
-        [-1.0, g, 0.0],
-        [1.0, g, 0.0],
-        [-1.0, -g, 0.0],
-        [1.0, -g, 0.0],
-        [0.0, -1.0, g],
-        [0.0, 1.0, g],
-        [0.0, -1.0, -g],
-        [0.0, 1.0, -g],
-        [g, 0.0, -1.0],
-        [g, 0.0, 1.0],
-        [-g, 0.0, -1.0],
-        [-g, 0.0, 1.0],
-    ]
-    .map(DVec3::from_array)
+    std::array::from_fn(|ix| {
+        let mut corner = DVec3::ZERO;
+        corner[ix / 4] = [-1.0, 1.0][ix % 2];
+        corner[(ix / 4 + 1) % 3] = [g, -g][ix / 2 % 2];
+        corner
+    })
 }
 
 impl Geodesic {

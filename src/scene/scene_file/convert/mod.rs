@@ -9,10 +9,9 @@ use std::path::Path;
 use toml::{Table, Value};
 
 use self::relative::Places;
-use super::sources::is_scene_file;
+use super::sources::{is_scene_file, names_of_files};
 use crate::scene::{
     files::{SourceFile, pack::pack_of},
-    formats::material_spec::MAP_KEYS,
     model::{LoadOptions, Look, Scene, SceneError},
 };
 
@@ -82,7 +81,7 @@ fn moved(input: &Path, places: &Places, (scene, options): (&Scene, &LoadOptions)
         let replace = table.entry("replace").or_insert(Value::Array(Vec::new()));
         replace.as_array_mut().expect("the input is loaded, so this is a list").extend(words);
     }
-    for name in names_of_files(&mut table) {
+    for (_, name) in names_of_files(&mut table) {
         *name = places.name_of(&folder.join(&*name))?;
     }
     toml::to_string(&table).map_err(|error| SceneError::file(input, error.to_string()))
@@ -95,36 +94,6 @@ fn unmeter(table: &mut Table) {
     }
 }
 
-/// Returns the names of files in a scene file.
-fn names_of_files(table: &mut Table) -> Vec<&mut String> {
-    let mut names = Vec::new();
-    for (key, value) in table.iter_mut() {
-        match (key.as_str(), value) {
-            ("mesh", Value::Array(meshes)) => {
-                let keys = meshes.iter_mut().filter_map(Value::as_table_mut).flatten();
-                names.extend(
-                    keys.filter(|(key, _)| ["file", "instances"].contains(&key.as_str())).map(|(_, name)| name),
-                );
-            }
-            ("environment", Value::Table(environment)) => names.extend(environment.get_mut("file")),
-            ("materials", Value::Table(materials)) => {
-                let materials = materials.iter_mut().filter_map(|(_, material)| material.as_table_mut()).flatten();
-                let maps = materials.filter(|(key, _)| MAP_KEYS.contains(&key.as_str()));
-                names.extend(maps.filter_map(|(_, map)| match map {
-                    Value::Table(map) => map.get_mut("file"),
-                    name => Some(name),
-                }));
-            }
-            _ => {}
-        }
-    }
-    let text = |value| match value {
-        &mut Value::String(ref mut name) => Some(name),
-        _ => None,
-    };
-    names.into_iter().filter_map(text).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -134,7 +103,7 @@ mod tests {
         let text = "environment = { file = \"sky.hdr\" }\nmesh = [{ file = \"a.obj\", instances = \"c.npy\" }]\n\
                     materials = { m = { map_Kd = \"b.png\" } }\n";
         let mut table: Table = text.parse().unwrap();
-        let mut names: Vec<String> = names_of_files(&mut table).into_iter().map(|name| name.clone()).collect();
+        let mut names: Vec<String> = names_of_files(&mut table).into_iter().map(|(_, name)| name.clone()).collect();
         names.sort();
         assert_eq!(names, ["a.obj", "b.png", "c.npy", "sky.hdr"]);
     }

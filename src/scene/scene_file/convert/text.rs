@@ -107,50 +107,41 @@ pub(crate) fn camera(camera: &Camera, origin: DVec3) -> String {
 
 /// Returns the table of a light.
 pub(super) fn light(light: &Light) -> String {
-    let keys = match *light {
+    let key = |name: &str, value: Vec3| format!("{name} = {}\n", vector(value));
+    let size = |name: &str, value: f32| format!("{name} = {}\n", number(value));
+    let (kind, keys) = match *light {
         Light::Point { position, intensity } => {
-            format!("kind = \"point\"\nposition = {}\nintensity = {}\n", vector(position), vector(intensity))
+            ("point", [key("position", position), key("intensity", intensity)].concat())
         }
         Light::Directional { towards, irradiance } => {
-            let (direction, irradiance) = (vector(-towards), vector(irradiance));
-            format!("kind = \"directional\"\ndirection = {direction}\nirradiance = {irradiance}\n")
+            ("directional", [key("direction", -towards), key("irradiance", irradiance)].concat())
         }
         Light::Sun { towards, irradiance, angle_degrees } => {
-            let (direction, irradiance, angle) = (vector(-towards), vector(irradiance), number(angle_degrees));
-            format!("kind = \"directional\"\ndirection = {direction}\nirradiance = {irradiance}\nangle = {angle}\n")
+            let keys = [key("direction", -towards), key("irradiance", irradiance), size("angle", angle_degrees)];
+            ("directional", keys.concat())
         }
         Light::Rectangle { position, edge_u, edge_v, radiance } => {
-            let direction = vector(edge_u.cross(edge_v).normalize_or(Vec3::NEG_Y));
-            let (up, position, radiance) = (vector(edge_v.normalize_or(Vec3::Y)), vector(position), vector(radiance));
-            let (width, height) = (number(2.0 * edge_u.length()), number(2.0 * edge_v.length()));
-            format!(
-                "kind = \"rectangle\"\nposition = {position}\ndirection = {direction}\nup = {up}\nwidth = {width}\n\
-                 height = {height}\nradiance = {radiance}\n"
-            )
+            let direction = edge_u.cross(edge_v).normalize_or(Vec3::NEG_Y);
+            let up = key("up", edge_v.normalize_or(Vec3::Y));
+            let sides = size("width", 2.0 * edge_u.length()) + &size("height", 2.0 * edge_v.length());
+            let keys = [key("position", position), key("direction", direction), up, sides, key("radiance", radiance)];
+            ("rectangle", keys.concat())
         }
         Light::Disk { position, towards, radius, radiance } => {
-            let (position, direction, radiance) = (vector(position), vector(towards), vector(radiance));
-            let radius = number(radius);
-            format!(
-                "kind = \"disk\"\nposition = {position}\ndirection = {direction}\nradius = {radius}\n\
-                 radiance = {radiance}\n"
-            )
+            let placed = key("position", position) + &key("direction", towards);
+            ("disk", [placed, size("radius", radius), key("radiance", radiance)].concat())
         }
         Light::Sphere { position, radius, radiance } => {
-            let (position, radius, radiance) = (vector(position), number(radius), vector(radiance));
-            format!("kind = \"sphere\"\nposition = {position}\nradius = {radius}\nradiance = {radiance}\n")
+            ("sphere", [key("position", position), size("radius", radius), key("radiance", radiance)].concat())
         }
         Light::Spot { position, towards, intensity, inner_cos, outer_cos } => {
-            let (position, direction, intensity) = (vector(position), vector(towards), vector(intensity));
-            // Double precision is needed to read the same cosines.
             let [inner, outer] = [inner_cos, outer_cos].map(|cosine| f64::from(cosine).acos().to_degrees());
-            format!(
-                "kind = \"spot\"\nposition = {position}\ndirection = {direction}\nintensity = {intensity}\n\
-                 inner_angle = {inner:?}\nouter_angle = {outer:?}\n"
-            )
+            let angles = format!("inner_angle = {inner:?}\nouter_angle = {outer:?}\n");
+            let keys = [key("position", position), key("direction", towards), key("intensity", intensity), angles];
+            ("spot", keys.concat())
         }
     };
-    format!("\n[[light]]\n{keys}")
+    format!("\n[[light]]\nkind = \"{kind}\"\n{keys}")
 }
 
 /// Returns the keys of a sky.
