@@ -1,14 +1,17 @@
-//! MTL files. They are read line by line and converted to materials.
+//! MTL files. They are checked and rewritten line by line, read by tobj and converted to materials.
+//!
+//! A colour of one number is a grey in MTL, but tobj 4.0.5 panics on it; so it is rewritten as three numbers.
 
 use std::{
     collections::{BTreeSet, HashMap, HashSet},
+    fmt::Write,
     path::{Path, PathBuf},
 };
 
 use super::{
     files::{library_files, own_library},
     maps::{MapKind, MapOptions, Term, set_map},
-    statement::{Fault, split_keyword, statements, words},
+    statement::{split_keyword, statements, words},
     udim::{TOKEN, UdimMaterials, files_of_map},
 };
 use crate::{
@@ -35,7 +38,7 @@ struct Described {
     more: More,
 }
 
-/// What a [`MaterialSpec`] does not have of a material.
+/// What tobj does not read of a material.
 #[derive(Clone, Debug, Default)]
 struct More {
     /// Pr, Pm, Ps, Pc and Pcr by their keywords.
@@ -125,13 +128,18 @@ fn with_tiles(described: Vec<Described>) -> (Vec<Described>, UdimMaterials) {
 
 fn load_library(obj: &SourceFile, mtl: &SourceFile, images: &mut Images) -> Result<Vec<Described>, SceneError> {
     let (path, text) = (&*mtl.path, mtl.lossy_text()?);
-    let (materials, left_out) = read_terms(&text);
+    let (clean, left_out) = clean_mtl(&text);
     for (line, what) in left_out {
         tracing::warn!("{}:{line}: {}; the statement is left out", shown(path), one_line(&what));
     }
     let more = read_more(obj, path, &text, images);
-    let described =
-        |((name, spec), more): ((String, MaterialSpec), More)| Described { spec, name, path: path.to_owned(), more };
+    let (materials, _) = tobj::load_mtl_buf(&mut clean.as_bytes()).map_err(|e| mtl.error(e.to_string()))?;
+    let described = |(material, more): (tobj::Material, More)| Described {
+        spec: spec(&material),
+        name: material.name,
+        path: path.to_owned(),
+        more,
+    };
     let mut described: Vec<_> = materials.into_iter().zip(more).map(described).collect();
     as_meant(path, &mut described);
     Ok(described)
@@ -254,7 +262,7 @@ fn read_more(obj: &SourceFile, path: &Path, text: &str, images: &mut Images) -> 
         material.begins_with_illum |= is_first && keyword == "illum";
         is_first = false;
         if matches!(keyword, "Pr" | "Pm" | "Ps" | "Pc" | "Pcr") {
-            // A number that is none has been told by `read_terms`.
+            // A number that is none has been told by `clean_mtl`.
             let Ok(number) = fraction(keyword, rest) else { continue };
             material.numbers.insert(keyword.to_owned(), number);
             // The roughness of the clearcoat says nothing without a clearcoat.
@@ -422,65 +430,48 @@ fn material(described: &Described, images: &mut Images) -> Checked<Material> {
     Ok(material)
 }
 
-/// Returns the names and the terms of the materials. Wrong statements are left out; they are returned with their lines
-/// and what is wrong with them.
-fn read_terms(text: &str) -> (Vec<(String, MaterialSpec)>, Vec<Fault>) {
-    let (mut materials, mut left_out) = (Vec::<(String, MaterialSpec)>::new(), Vec::new());
+/// Returns the statements of the terms that are rendered. Greys are written as three numbers. Maps and all other
+/// statements are left out, and so are wrong ones, which are returned with their lines and what is wrong with them.
+fn clean_mtl(text: &str) -> (String, Vec<(usize, String)>) {
+    let (mut clean, mut left_out) = (String::new(), Vec::new());
     for (line, statement) in statements(text) {
         let (keyword, rest) = split_keyword(&statement);
-        if keyword == "newmtl" {
-            let name = if rest.is_empty() { NAMELESS } else { rest };
-            materials.push((name.to_owned(), MaterialSpec::default()));
-            continue;
-        }
-        let mut of_none = MaterialSpec::default();
-        let spec = materials.last_mut().map_or(&mut of_none, |(_, spec)| spec);
-        if let Err(what) = set_term(spec, keyword, rest) {
-            left_out.push((line, what));
+        let cleaned = match keyword {
+            "newmtl" if rest.is_empty() => Ok(NAMELESS.to_owned()),
+            "newmtl" => Ok(rest.to_owned()),
+            "Ka" | "Kd" | "Ks" | "Ke" | "Tf" => rgb(keyword, rest),
+            "Ns" | "Ni" | "d" | "Tr" => number(keyword, rest),
+            "illum" => illum(rest),
+            "Pr" | "Pm" | "Ps" | "Pc" | "Pcr" => match fraction(keyword, rest) {
+                Ok(_) => continue,
+                Err(what) => Err(what),
+            },
+            _ => continue,
+        };
+        match cleaned {
+            Ok(cleaned) => writeln!(clean, "{keyword} {cleaned}").expect("a String takes what it is given"),
+            Err(what) => left_out.push((line, what)),
         }
     }
-    // Files often have both; the format documents only d.
-    materials.iter_mut().for_each(|(_, spec)| spec.tr = spec.tr.filter(|_| spec.d.is_none()));
-    (materials, left_out)
+    (clean, left_out)
 }
 
-/// Sets the term of a statement. Statements of other terms change nothing.
-fn set_term(spec: &mut MaterialSpec, keyword: &str, rest: &str) -> Checked<()> {
-    match keyword {
-        "Ka" => spec.ka = Some(rgb(keyword, rest)?),
-        "Kd" => spec.kd = Some(rgb(keyword, rest)?),
-        "Ks" => spec.ks = Some(rgb(keyword, rest)?),
-        "Ke" => spec.ke = Some(rgb(keyword, rest)?),
-        "Tf" => spec.tf = Some(rgb(keyword, rest)?),
-        "Ns" => spec.ns = Some(number(keyword, rest)?),
-        "Ni" => spec.ni = Some(number(keyword, rest)?),
-        "d" => spec.d = Some(number(keyword, rest)?),
-        "Tr" => spec.tr = Some(number(keyword, rest)?),
-        "illum" => spec.illum = Some(illum(rest)?),
-        "Pr" | "Pm" | "Ps" | "Pc" | "Pcr" => drop(fraction(keyword, rest)?),
-        _ => {}
-    }
-    Ok(())
-}
-
-/// Returns a colour. One number alone is a grey.
-fn rgb(keyword: &str, rest: &str) -> Checked<[f32; 3]> {
-    let mut parts = Vec::new();
-    for word in words(rest) {
-        let part = finite(keyword, word)?;
-        if part < 0.0 {
-            return Err(format!("{keyword} `{word}` is below 0"));
+/// Returns `r g b`. One number alone is a grey.
+fn rgb(keyword: &str, rest: &str) -> Checked<String> {
+    let parts: Vec<&str> = words(rest).collect();
+    for part in &parts {
+        if finite(keyword, part)? < 0.0 {
+            return Err(format!("{keyword} `{part}` is below 0"));
         }
-        parts.push(part);
     }
     match parts[..] {
-        [grey] => Ok([grey; 3]),
-        [r, g, b] => Ok([r, g, b]),
+        [grey] => Ok([grey, grey, grey].join(" ")),
+        [_, _, _] => Ok(parts.join(" ")),
         _ => Err(format!("{keyword} has {} numbers: it takes 3, or 1 for a grey", parts.len())),
     }
 }
 
-fn number(keyword: &str, rest: &str) -> Checked<f32> {
+fn number(keyword: &str, rest: &str) -> Checked<String> {
     let mut parts = words(rest);
     // `d -halo x` is an opacity that varies with the angle of view; x is its value where the surface faces the eye.
     let word = parts.find(|part| *part != "-halo").unwrap_or_default();
@@ -491,14 +482,14 @@ fn number(keyword: &str, rest: &str) -> Checked<f32> {
         _ => 0.0..=1.0,
     };
     match range.contains(&number) {
-        true => Ok(number),
+        true => Ok(word.to_owned()),
         false => Err(format!("{keyword} = {number} is outside {} to {}", range.start(), range.end())),
     }
 }
 
-fn illum(rest: &str) -> Checked<u8> {
+fn illum(rest: &str) -> Checked<String> {
     match words(rest).next().unwrap_or_default().parse::<f32>() {
-        Ok(illum) if (0.0..=10.0).contains(&illum) && illum.fract() == 0.0 => Ok(illum as u8),
+        Ok(illum) if (0.0..=10.0).contains(&illum) && illum.fract() == 0.0 => Ok(illum.to_string()),
         _ => Err(format!("illum `{rest}` is not one of 0 to 10")),
     }
 }
@@ -510,5 +501,26 @@ fn finite(keyword: &str, word: &str) -> Checked<f32> {
             Err(format!("{keyword} `{word}` is not a number: decimals need a point in place of the comma"))
         }
         _ => Err(format!("{keyword} `{word}` is not a finite number")),
+    }
+}
+
+/// Converts a material of tobj, which keeps the terms that it does not know (Tf, Tr) as text.
+fn spec(material: &tobj::Material) -> MaterialSpec {
+    let unknown = |term: &str| -> Option<Vec<f32>> {
+        material.unknown_param.get(term).map(|text| text.split_whitespace().flat_map(str::parse).collect())
+    };
+    MaterialSpec {
+        ka: material.ambient,
+        kd: material.diffuse,
+        ks: material.specular,
+        ke: material.emissive,
+        tf: unknown("Tf").and_then(|tf| tf.try_into().ok()),
+        ns: material.shininess,
+        ni: material.optical_density,
+        d: material.dissolve,
+        // Files often have both; the format documents only d.
+        tr: unknown("Tr").filter(|_| material.dissolve.is_none()).and_then(|tr| tr.first().copied()),
+        illum: material.illumination_model,
+        ..MaterialSpec::default()
     }
 }
