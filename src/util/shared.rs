@@ -21,16 +21,17 @@ struct Value<T> {
 impl<T> Shared<T> {
     /// A value that is made when it is first read or changed. Threads do not wait for one another then, and the first
     /// result is kept: who reads the value in parallel calls [`Shared::make`] before.
-    pub fn lazy(make: impl Fn() -> T + Send + Sync + 'static) -> Self {
+    pub(crate) fn lazy(make: impl Fn() -> T + Send + Sync + 'static) -> Self {
         Self(Arc::new(Value { made: OnceLock::new(), make: Some(Box::new(make)) }))
     }
 
     /// Makes the value if it is not made.
-    pub fn make(&self) {
+    pub(crate) fn make(&self) {
         let _: &T = self;
     }
 
     /// Whether the value is made.
+    #[doc(hidden)]
     pub fn is_made(&self) -> bool {
         self.0.made.get().is_some()
     }
