@@ -204,8 +204,9 @@ fn submits_and_timers_do_not_change_the_tree() {
     let triangles = meshes::torus(30, 20);
     let whole = built(&builder(&context, &triangles, &KdTreeBuilderOptions::default())).1;
     for levels_per_submit in [0, 1, 100] {
+        let levels_per_submit = Some(levels_per_submit);
         let options = KdTreeBuilderOptions { levels_per_submit, ..KdTreeBuilderOptions::default() };
-        assert_eq!(built(&builder(&context, &triangles, &options)).1, whole, "{levels_per_submit}");
+        assert_eq!(built(&builder(&context, &triangles, &options)).1, whole, "{levels_per_submit:?}");
     }
     let builder = builder(&context, &triangles, &KdTreeBuilderOptions::default());
     let timer = Timer::new(&context, builder.n_stages()).expect("a timer");

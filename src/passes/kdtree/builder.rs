@@ -14,23 +14,22 @@ use crate::{
     passes::{device_build, kd_slabs::SlabBuilder, then},
 };
 
+/// Triangles up to which a command buffer builds all levels: an H200 takes some 6 ms.
+const WHOLE_BUILD: u32 = 1 << 18;
+/// Levels that a command buffer builds of more triangles.
+const LEVELS_PER_SUBMIT: u32 = 8;
+
 /// Options of a [`KdTreeBuilder`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct KdTreeBuilderOptions {
     /// The costs and the depth of the tree, and whether it has slabs. The tree has no more than 32 levels below the
     /// root. Its capacities are those of `room`, and `exact_planes` has no effect.
     pub tree: BuildOptions,
     /// The capacities of the tree and of its build.
     pub room: KdTreeRoom,
-    /// The number of levels that a command buffer builds, at least 1. A build of n levels has a command buffer for
-    /// every so many, since a driver stops a device that takes too long for one.
-    pub levels_per_submit: u32,
-}
-
-impl Default for KdTreeBuilderOptions {
-    fn default() -> Self {
-        Self { tree: BuildOptions::default(), room: KdTreeRoom::default(), levels_per_submit: 8 }
-    }
+    /// The number of levels that a command buffer builds, at least 1. By default these are 8, or all of up to 2^18
+    /// triangles: a driver stops a device that takes too long for one command buffer, and each takes the host time.
+    pub levels_per_submit: Option<u32>,
 }
 
 /// Kernels and memory that build the kd-tree of an array of triangles. A build can be repeated any number of times,
@@ -394,15 +393,16 @@ impl KdTreeBuilder {
         submit(&self.context, name, record)
     }
 
-    /// Records a command buffer for every `levels_per_submit` levels, one for what comes before them, and one for what
-    /// comes after.
+    /// Records the command buffers of a build: one for what comes before the levels, one or more for the levels, and
+    /// one for what comes after them.
     fn record(&self, n_triangles: u32, timer: Option<&Timer>) -> Result<Vec<CommandBuffer>, GpuError> {
         let record = |body: &dyn Fn(&Commands)| CommandBuffer::record(&self.context, "kdtree_build", timer, body);
         let mut command_buffers = vec![record(&|commands| {
             commands.reset_timer();
             self.passes.setup(commands, &self.buffers, n_triangles);
         })?];
-        let n_each = self.options.levels_per_submit.max(1);
+        let by_size = if n_triangles <= WHOLE_BUILD { self.n_levels() } else { LEVELS_PER_SUBMIT };
+        let n_each = self.options.levels_per_submit.unwrap_or(by_size).max(1);
         for first in (0..self.n_levels()).step_by(n_each as usize) {
             command_buffers.push(record(&|commands| {
                 then(commands);
