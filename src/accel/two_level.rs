@@ -2,6 +2,7 @@
 
 use std::{
     iter,
+    ops::Range,
     sync::{Arc, OnceLock, Weak},
 };
 
@@ -32,7 +33,13 @@ pub struct StoredRange {
 impl StoredRange {
     /// Returns the geometry's elements of an array with an element for each stored triangle.
     pub fn of<'a, T>(&self, stored: &'a [T]) -> &'a [T] {
-        &stored[self.first_row as usize..][..self.n_triangles as usize]
+        &stored[self.rows()]
+    }
+
+    /// The indices of the geometry's triangles.
+    pub fn rows(&self) -> Range<usize> {
+        let first = self.first_row as usize;
+        first..first + self.n_triangles as usize
     }
 }
 

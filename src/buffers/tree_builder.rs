@@ -62,8 +62,8 @@ impl TreeBuilder {
         Ok(Self { context, kernels, timer, corners, deform, deformed })
     }
 
-    /// Puts the triangles of a geometry into the builder, and what textures need at their corners. Returns the number
-    /// of words of corners there; 0 if those of the arrays stay.
+    /// Puts the triangles of a geometry into the builder, and the tangents and colours at their corners. Returns the
+    /// number of words of corners to copy to the arrays; 0 if the corners there are right already.
     pub fn take(&mut self, arrays: &Arrays, (all, ix): (&Geometries, usize)) -> Result<usize, GpuError> {
         let first_row = all.instances.ranges[ix].first_row as usize;
         if let Some(posed) = all.poses.get(ix) {
@@ -79,7 +79,7 @@ impl TreeBuilder {
         Ok(corners.len())
     }
 
-    /// Does what [`TreeBuilder::take`] does: of the mesh, only the pose is uploaded.
+    /// Does what [`TreeBuilder::take`] does for a mesh in a pose. Only the pose is uploaded.
     fn deform(
         &mut self,
         arrays: &Arrays,

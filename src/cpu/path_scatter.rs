@@ -125,7 +125,7 @@ impl BounceOfPaths<'_> {
     }
 
     fn is_lambertian(&self, hit: &Hit) -> bool {
-        // Groups of sixteen know no instances.
+        // The scatter of sixteen rays at a time reads triangles of flat worlds only.
         self.inputs.instanced.is_none()
             && self.are_lambertian[self.inputs.triangle_materials[hit.triangle_ix as usize] as usize]
     }

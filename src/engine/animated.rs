@@ -36,9 +36,9 @@ pub struct AnimatedWorld {
     poser: Option<Poser>,
     /// The scene at the last moment that the poser has shown, or else at the first one.
     scene: Scene,
-    /// The poses of meshes whose arrays in the scene are of an earlier moment.
+    /// The poses of the scene's meshes whose arrays are still those of an earlier moment, by index.
     poses: BTreeMap<usize, Arc<PosedMesh>>,
-    /// Its world.
+    /// The world of the scene.
     world: World,
     /// The meshes of the scene that differ from the world's: the last moment had no world.
     deformed: ChangedMeshes,

@@ -27,7 +27,7 @@ use crate::{
     scene::{
         Scene, Transform,
         deformation::{ChangedMeshes, PosedMesh, Vertex, triangle_of},
-        mesh::MAX_COORDINATE,
+        mesh::{self, MAX_COORDINATE},
     },
     util::{Shared, progress::Progress},
 };
@@ -45,6 +45,14 @@ pub struct Poses {
 struct Base {
     triangles: Shared<Vec<Triangle>>,
     corners: Shared<Vec<[CornerSurface; 3]>>,
+}
+
+/// A mesh that differs from that of the world before.
+struct Changed<'a> {
+    mesh_ix: usize,
+    geometry_ix: usize,
+    /// None if the scene's mesh has the new arrays.
+    pose: Option<&'a Arc<PosedMesh>>,
 }
 
 impl Poses {
@@ -67,45 +75,19 @@ impl World {
         let (Some(before), Accel::TwoLevel(two)) = (&self.scene().instances, self.accel()) else { return Ok(None) };
         let Some(geometry_of) = self.geometries_of(scene) else { return Ok(None) };
         scene.camera.check().map_err(|what| Mismatch::Scene(format!("camera: {what}")))?;
-        let mut flat = FlatScene {
-            lights: flat_lights(scene),
-            area_lights: area_lights(scene),
-            camera: scene.camera,
-            ..self.scene().clone()
-        };
-        let mut poses = self.0.poses.clone();
-        let changed = deformed.iter().filter_map(|(mesh_ix, pose)| Some((*mesh_ix, *geometry_of.get(mesh_ix)?, pose)));
-        let changed: Vec<(usize, usize, &Option<Arc<PosedMesh>>)> = changed.collect();
-        for (mesh_ix, geometry_ix, _) in changed.iter().filter(|(_, _, pose)| pose.is_none()) {
-            let range = before.ranges[*geometry_ix];
-            if !flat.replace((scene, *mesh_ix), range)? {
-                return Ok(None);
-            }
-            poses.of_geometries.remove(geometry_ix);
-        }
-        if poses.of_geometries.is_empty() || changed.iter().any(|(_, _, pose)| pose.is_none()) {
-            poses.base = Base { triangles: flat.triangles.clone(), corners: flat.textures.corners.clone() };
-        }
-        for (_, geometry_ix, pose) in &changed {
-            let Some(pose) = pose else { continue };
-            if pose.faces().len() != before.ranges[*geometry_ix].n_triangles as usize || !is_near(pose.positions()) {
-                return Ok(None);
-            }
-            poses.of_geometries.insert(*geometry_ix, pose.clone());
-        }
-        if changed.iter().any(|(_, _, pose)| pose.is_some()) {
-            flat.pose(&poses, &before.ranges);
-        }
-        let structure = |&(_, geometry_ix, pose): &(usize, usize, &Option<Arc<PosedMesh>>)| {
-            let range = before.ranges[geometry_ix];
-            let of_pose = |pose: &Arc<PosedMesh>| {
-                BottomLevel::of_corners(pose.faces().len(), |ix| pose.corners(ix), self.accel_options())
-            };
-            let build =
-                |triangles: &[Triangle]| BottomLevel::build(triangles, self.accel_options(), &Progress::default());
+        let changed = deformed.iter().filter_map(|(&mesh_ix, pose)| {
+            let geometry_ix = *geometry_of.get(&mesh_ix)?;
+            Some(Changed { mesh_ix, geometry_ix, pose: pose.as_ref() })
+        });
+        let changed: Vec<Changed> = changed.collect();
+        let Some((mut flat, poses)) = self.with_triangles(scene, (&changed, &before.ranges))? else { return Ok(None) };
+        let options = self.accel_options();
+        let structure = |&Changed { geometry_ix, pose, .. }: &Changed| {
+            let build = |triangles: &[Triangle]| BottomLevel::build(triangles, options, &Progress::default());
             let structure = match pose {
-                Some(pose) => of_pose(pose).unwrap_or_else(|| build(&pose.triangles())),
-                None => build(range.of(&flat.triangles)),
+                Some(pose) => BottomLevel::of_corners(pose.faces().len(), |ix| pose.corners(ix), options)
+                    .unwrap_or_else(|| build(&pose.triangles())),
+                None => build(before.ranges[geometry_ix].of(&flat.triangles)),
             };
             (geometry_ix, structure)
         };
@@ -114,6 +96,42 @@ impl World {
         let accel = Accel::TwoLevel(Box::new(two.deformed(structures, &instances.list)));
         flat.instances = Some(instances);
         Ok(Some(self.with_pose(flat, accel, poses)))
+    }
+
+    /// Returns this world's scene with the camera, the lights and the changed meshes of another one, and the poses;
+    /// none if a mesh has other faces or is too far from the origin.
+    fn with_triangles(
+        &self,
+        scene: &Scene,
+        (changed, ranges): (&[Changed], &[StoredRange]),
+    ) -> Result<Option<(FlatScene, Poses)>, Mismatch> {
+        let mut flat = FlatScene {
+            lights: flat_lights(scene),
+            area_lights: area_lights(scene),
+            camera: scene.camera,
+            ..self.scene().clone()
+        };
+        let mut poses = self.0.poses.clone();
+        let (posed, replaced): (Vec<&Changed>, Vec<&Changed>) = changed.iter().partition(|it| it.pose.is_some());
+        for it in &replaced {
+            if !flat.replace((scene, it.mesh_ix), ranges[it.geometry_ix])? {
+                return Ok(None);
+            }
+            poses.of_geometries.remove(&it.geometry_ix);
+        }
+        if poses.of_geometries.is_empty() || !replaced.is_empty() {
+            poses.base = Base { triangles: flat.triangles.clone(), corners: flat.textures.corners.clone() };
+        }
+        for (geometry_ix, pose) in posed.iter().filter_map(|it| Some((it.geometry_ix, it.pose?))) {
+            if pose.faces().len() != ranges[geometry_ix].n_triangles as usize || !is_near(pose.positions()) {
+                return Ok(None);
+            }
+            poses.of_geometries.insert(geometry_ix, pose.clone());
+        }
+        if !posed.is_empty() {
+            flat.pose(&poses, ranges);
+        }
+        Ok(Some((flat, poses)))
     }
 
     /// Makes the world of another pose. The ambient approximations stay if nothing shines within the scene: they do not
@@ -167,8 +185,8 @@ impl World {
         };
         let of_geometry = |(ix, range): (usize, &StoredRange)| match poses.get(ix) {
             Some(posed) => {
-                let corners = posed.faces().as_flattened().iter().map(|ix| posed.positions()[*ix as usize]);
-                corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)))
+                let corners = posed.faces().as_flattened().par_iter();
+                mesh::bounds_of(corners.map(|ix| posed.positions()[*ix as usize]))
             }
             None => bounds_of(range.of(&poses.base.triangles)),
         };
@@ -200,10 +218,6 @@ fn is_near(positions: &[Vec3]) -> bool {
     positions.par_iter().all(|p| p.is_finite() && p.abs().max_element() <= MAX_COORDINATE)
 }
 
-fn rows_of(range: &StoredRange) -> std::ops::Range<usize> {
-    range.first_row as usize..(range.first_row + range.n_triangles) as usize
-}
-
 impl FlatScene {
     /// Replaces the triangles of a geometry, and what belongs to their corners, by those of a mesh of a scene. Returns
     /// whether its faces are those of the geometry.
@@ -216,11 +230,11 @@ impl FlatScene {
         }
         let mut parts = Parts::default();
         parts.push(mesh, &Transform::IDENTITY, instance)?;
-        self.triangles[rows_of(&range)].copy_from_slice(&parts.triangles);
+        self.triangles[range.rows()].copy_from_slice(&parts.triangles);
         if !self.textures.corners.is_empty() {
             let corners = corner_surfaces(&[(mesh, &Transform::IDENTITY)]);
             if range.of(&self.textures.corners) != corners {
-                self.textures.corners[rows_of(&range)].copy_from_slice(&corners);
+                self.textures.corners[range.rows()].copy_from_slice(&corners);
             }
         }
         Ok(true)
@@ -254,7 +268,7 @@ fn with_posed<T: Copy + Send>(
     let mut all = base.to_vec();
     for (range, posed) in posed {
         let vertices = posed.vertices();
-        let rows = all[rows_of(range)].par_iter_mut().zip(&posed.faces()[..]);
+        let rows = all[range.rows()].par_iter_mut().zip(&posed.faces()[..]);
         rows.for_each(|(row, face)| write(row, face, &vertices));
     }
     all

@@ -51,8 +51,10 @@ impl SourceFile {
         self.read(1)
     }
 
-    /// Reads the file, which has to be no foreign one: one that is known to hold no scene. `is_text`: whether a text is
-    /// made of its content.
+    /// Reads a file that should hold a scene. `is_text`: the bytes are decoded to text, which takes more memory.
+    ///
+    /// # Errors
+    /// Fails as [`SourceFile::bytes`] does, or if the file is known to be of another kind.
     pub fn scene_bytes(&self, is_text: bool) -> Result<Vec<u8>, SceneError> {
         let bytes = self.read(if is_text { TEXT_COPIES } else { 1 })?;
         foreign::what_it_is(&bytes).map_or(Ok(bytes), |what| Err(self.error(what)))

@@ -63,7 +63,8 @@ pub struct Pose {
     pub joints: Vec<JointMatrix>,
 }
 
-/// A mesh in a pose. Its arrays are made where somebody needs them; devices make their own of the pose.
+/// A mesh in a pose. The host computes normals, tangents and triangles when they are needed; devices compute their own
+/// from the pose.
 #[derive(Clone, Debug)]
 pub struct PosedMesh {
     deformation: Arc<Deformation>,
@@ -72,8 +73,8 @@ pub struct PosedMesh {
     positions: Vec<Vec3>,
 }
 
-/// The indices of meshes that are deformed. A mesh with a pose differs from its earlier state in its positions, normals
-/// and tangents only, which are those of the pose; its own arrays are still the earlier ones.
+/// Meshes that are deformed, by index. With a pose, only positions, normals and tangents have changed: they are those
+/// of the pose, and the mesh's arrays still hold the earlier ones. Without a pose, the arrays hold the new values.
 pub type ChangedMeshes = BTreeMap<usize, Option<Arc<PosedMesh>>>;
 
 impl PosedMesh {
