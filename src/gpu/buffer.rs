@@ -381,19 +381,35 @@ fn copy_by_threads(to: &mut [u8], from: &[u8]) {
     chunks.for_each(|(to, from)| to.copy_from_slice(from));
 }
 
-/// A host-visible buffer for an upload or a download.
-struct Staging {
+/// A host-visible buffer for an upload or a download. Kernels may also access it, as storage.
+pub(super) struct Staging {
     buffer: Arc<AnyBuffer>,
     /// The buffer's memory, which stays mapped.
     mapped: NonNull<u8>,
 }
 
+// SAFETY: the memory belongs to no thread, and a shared reference leads to no access.
+unsafe impl Send for Staging {}
+// SAFETY: as above.
+unsafe impl Sync for Staging {}
+
 impl Staging {
-    fn new(context: &Arc<Context>, name: &str, bytes: u64, location: MemoryLocation) -> Result<Self, GpuError> {
-        let usage = vk::BufferUsageFlags::TRANSFER_SRC | vk::BufferUsageFlags::TRANSFER_DST;
+    pub fn new(context: &Arc<Context>, name: &str, bytes: u64, location: MemoryLocation) -> Result<Self, GpuError> {
+        let usage = vk::BufferUsageFlags::STORAGE_BUFFER
+            | vk::BufferUsageFlags::TRANSFER_SRC
+            | vk::BufferUsageFlags::TRANSFER_DST;
         let buffer = AnyBuffer::new(&context.device, &format!("{name} staging"), bytes, usage, location)?;
         let mapped = buffer.allocation.mapped_ptr().expect("host-visible memory stays mapped").cast();
         Ok(Self { buffer: Arc::new(buffer), mapped })
+    }
+
+    pub fn buffer(&self) -> &Arc<AnyBuffer> {
+        &self.buffer
+    }
+
+    /// Returns the address of the buffer's bytes, a multiple of 16.
+    pub fn mapped(&self) -> NonNull<u8> {
+        self.mapped
     }
 
     /// Returns the buffer's bytes. The device must not work on the buffer meanwhile: its owner waits for each copy.

@@ -20,6 +20,7 @@ mod context;
 mod device;
 mod devices;
 mod error;
+mod exchange;
 mod external;
 mod extras;
 mod failure_injection;
@@ -70,6 +71,7 @@ pub mod internal {
         commands::{Area, CommandBuffer, Commands, Dispatch, DrawDesc, PixelRows},
         context::Context,
         devices::Limits,
+        exchange::Exchange,
         image::{Target, TargetKind},
         overrides::DeviceOverrides,
         pipeline::{ComputeDesc, ComputePipeline, RasterDesc, RasterPipeline, RasterTargets},
