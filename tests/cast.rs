@@ -2,7 +2,13 @@
 
 mod support;
 
-use std::{ops::RangeInclusive, sync::Arc};
+use std::{
+    ops::RangeInclusive,
+    sync::{
+        Arc,
+        atomic::{AtomicUsize, Ordering},
+    },
+};
 
 use fearless_simd::Level;
 use glam::{Vec3, vec3};
@@ -13,14 +19,14 @@ use kdray::{
         kdtree::{BuildOptions, Traversal},
         wide_bvh::WideBvh,
     },
-    cast::{GpuCaster, Hit, NO_TRIANGLE, QueryPoint, Ray, cast_on_cpu},
+    cast::{CpuCaster, GpuCaster, Hit, NO_TRIANGLE, QueryPoint, RAYS_PER_CHUNK, Ray, cast_on_cpu},
     cpu::wide_traverser::WideTraverser,
     gpu::{Context, DeviceOverrides},
     layout::{KD_MAX_DEPTH, KD_WORD_DEPTH, PathRay},
     reference::{cast::cast_by, search_ray::SearchRay, traversal_ray::near_scene},
     world::Geometry,
 };
-use rayon::prelude::*;
+use rayon::{ThreadPoolBuilder, prelude::*};
 use support::{
     MeshWithTree,
     chain::chain,
@@ -259,6 +265,42 @@ fn streams_find_the_hits_of_casts() {
         let expected = caster.cast(&rays, Query::Closest, 1).expect("a cast").hits;
         assert_ne!(expected, found);
         assert_eq!(streamed(&mut caster, &rays, Query::Closest), expected);
+    }
+}
+
+/// Every chunk is whole but for the last, however many threads and submissions there are.
+#[test]
+fn streams_come_in_chunks() {
+    let device = Device::new();
+    let world = MeshWithTree::new(meshes::cube(9, 0.0));
+    let rays = some_rays(&world, 5 * RAYS_PER_CHUNK + 77, -1.0..=1.0);
+    let mut caster = device.caster(&world, Traversal::Mask).with_batches_of(2 * RAYS_PER_CHUNK + 999);
+    let on_cpu = CpuCaster::new(world.geometry(), Traversal::OF_CPU);
+    let expected = caster.cast(&rays, Query::Closest, 1).expect("a cast").hits;
+    for (n_threads, n) in [(1, rays.len()), (3, rays.len()), (3, RAYS_PER_CHUNK), (1, RAYS_PER_CHUNK + 1), (3, 7)] {
+        let pool = ThreadPoolBuilder::new().num_threads(n_threads).build().expect("threads");
+        for is_on_cpu in [false, true] {
+            let n_made = AtomicUsize::new(0);
+            let check = |first: usize, len: usize| {
+                assert!(first.is_multiple_of(RAYS_PER_CHUNK) && len == RAYS_PER_CHUNK.min(n - first), "{first} {len}");
+            };
+            let make = |first: usize, chunk: &mut [Ray]| {
+                check(first, chunk.len());
+                n_made.fetch_add(chunk.len(), Ordering::Relaxed);
+                chunk.copy_from_slice(&rays[first..][..chunk.len()]);
+            };
+            let n_taken = AtomicUsize::new(0);
+            let take = |first: usize, hits: &[Hit]| {
+                check(first, hits.len());
+                n_taken.fetch_add(hits.len(), Ordering::Relaxed);
+                device.agree(&expected[first..][..hits.len()], hits).unwrap();
+            };
+            pool.install(|| match is_on_cpu {
+                true => on_cpu.cast_stream(n, Query::Closest, make, take),
+                false => caster.cast_stream(n, Query::Closest, make, take).expect("a stream"),
+            });
+            assert_eq!((n_made.into_inner(), n_taken.into_inner()), (n, n));
+        }
     }
 }
 

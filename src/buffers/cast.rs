@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{AccelBuffers, accel, binding};
 use crate::{
-    gpu::{Binding, BindingLayout, BindingSet, Buffer, BufferUse, Context, ExternalBuffer, GpuError},
+    gpu::{Binding, BindingLayout, BindingSet, Buffer, BufferUse, Context, GpuError},
     layout::{BIND_CAST_HITS, BIND_CAST_RAYS, CastBatch, Hit, Ray},
 };
 
@@ -36,18 +36,21 @@ impl CastResources {
         layout_of(context, accel, &[BIND_CAST_RAYS, BIND_CAST_HITS])
     }
 
-    /// Makes the set over buffers of rays and hits that the caller gives.
+    /// Makes the set over any buffers of rays and hits.
     ///
     /// # Errors
     /// Memory runs out.
-    pub fn external(
+    pub fn set_over(
         bindings: &Arc<BindingLayout>,
         accel: &AccelBuffers,
-        rays: ExternalBuffer,
-        hits: ExternalBuffer,
+        name: &str,
+        [rays, hits]: [Binding; 2],
     ) -> Result<BindingSet, GpuError> {
-        let own = [(BIND_CAST_RAYS, Binding::External(rays)), (BIND_CAST_HITS, Binding::External(hits))];
-        BindingSet::new(bindings, "recorded cast", &[&accel.objects(), &own[..]].concat())
+        BindingSet::new(
+            bindings,
+            name,
+            &[&accel.objects(), &[(BIND_CAST_RAYS, rays), (BIND_CAST_HITS, hits)][..]].concat(),
+        )
     }
 
     /// Makes buffers for `len` rays, and the set over them.
@@ -79,9 +82,8 @@ impl CastResources {
         cast_rays: Buffer<Ray>,
         cast_hits: Buffer<Hit>,
     ) -> Result<Self, GpuError> {
-        let own =
-            [(BIND_CAST_RAYS, Binding::Buffer(cast_rays.any())), (BIND_CAST_HITS, Binding::Buffer(cast_hits.any()))];
-        let set = BindingSet::new(bindings, "cast", &[&accel.objects(), &own[..]].concat())?;
+        let buffers = [cast_rays.any(), cast_hits.any()].map(Binding::Buffer);
+        let set = Self::set_over(bindings, accel, "cast", buffers)?;
         Ok(Self { cast_rays, cast_hits, set })
     }
 }

@@ -149,7 +149,7 @@ impl GpuCaster {
         self.bindings = CastResources::bindings(&self.context, &self.tree)?;
         self.resources = CastResources::new(&self.context, &self.bindings, &self.tree, 0)?;
         (self.closest, self.any, self.point_search) = (None, None, None);
-        self.lanes.clear();
+        self.unbind_lanes();
         Ok(self)
     }
 
@@ -164,7 +164,7 @@ impl GpuCaster {
         let geometry = world.geometry();
         check_geometries(self.geometries_id.as_ref(), geometry)?;
         let shares_structures = self.structures_id == geometry.accel().structures_id();
-        self.lanes.clear();
+        self.unbind_lanes();
         let mut tree = self.tree.clone();
         if tree.shared().is_some() || shares_structures {
             tree.set_instances(&self.context, geometry)?;
@@ -180,6 +180,7 @@ impl GpuCaster {
         next.tree.hide_as(&self.context, &self.tree)?;
         next.bindings = CastResources::bindings(&next.context, &next.tree)?;
         next.resources = CastResources::new(&next.context, &next.bindings, &next.tree, 0)?;
+        next.lanes = mem::take(&mut self.lanes);
         *self = next.with_batches_of(self.rays_per_batch);
         Ok(())
     }

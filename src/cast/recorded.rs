@@ -6,7 +6,7 @@ use super::{GpuCaster, Hit, Ray, most_rays};
 use crate::{
     accel::Query,
     buffers::{CastResources, DeviceTrees, ResumePass, SuspendedRays},
-    gpu::{BindingSet, Context, ExternalBuffer, ExternalCommands, GpuError},
+    gpu::{Binding, BindingSet, Context, ExternalBuffer, ExternalCommands, GpuError},
     passes::{self, Masked},
 };
 
@@ -44,7 +44,7 @@ impl GpuCaster {
         Ok(RecordedCast {
             context: Arc::clone(&self.context),
             kernel: self.prepare_kernel(query)?,
-            set: CastResources::external(&self.bindings, &tree, rays, hits)?,
+            set: CastResources::set_over(&self.bindings, &tree, "recorded cast", [rays, hits].map(Binding::External))?,
             _trees: tree.shared(),
             suspended_rays: tree.suspended_rays,
             rays: self.masked(n_rays as u32),

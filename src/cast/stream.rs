@@ -1,38 +1,49 @@
 //! Streams of rays: while a device casts some of them, the host makes others, and takes the hits of others.
+//!
+//! Each thread has a lane: it makes rays in mapped memory, waits until the device has cast them, and takes their hits.
+//! A thread's own work takes longer than the device's, so that there are always rays to cast, and no thread needs the
+//! help of another one.
 
 use std::{
     mem,
     sync::atomic::{AtomicUsize, Ordering},
 };
 
-use bytemuck::{Zeroable, cast_slice_mut};
+use bytemuck::Zeroable;
 use rayon::prelude::*;
 
 use super::{CpuCaster, GpuCaster, Hit, Ray};
 use crate::{
     accel::Query,
-    buffers::{AccelBuffers, CastResources},
-    gpu::GpuError,
+    buffers::{AccelBuffers, CastResources, ResumePass},
+    gpu::{BindingSet, Commands, Exchange, GpuError},
+    passes,
 };
 
-/// Number of rays of a chunk: 16 MiB, and 8 MiB of hits. The device casts them in a fraction of a millisecond.
-pub const RAYS_PER_CHUNK: usize = 1 << 19;
-/// Number of chunks that are on their way at the same time. One is cast, one is uploaded or downloaded, and others are
-/// made or taken.
-const N_LANES: usize = 4;
+/// Number of rays that are made at a time, and of hits that are taken. Those of a thread stay in its cache: 256 KiB of
+/// rays, and 128 KiB of hits.
+pub const RAYS_PER_CHUNK: usize = 1 << 13;
+/// Bounds of the number of rays that the device casts at a time, if there are so many. Fewer do not fill a large
+/// device. More would leave threads without work at the stream's end.
+const RAYS_PER_SUBMISSION: [usize; 2] = [1 << 16, 1 << 17];
+/// The most lanes. Each has 4 MiB of rays and 2 MiB of hits.
+const MOST_LANES: usize = 32;
+/// Number of rays that the CPU casts at a time.
+const RAYS_PER_CPU_CAST: usize = 1 << 19;
 
-/// What a chunk on its way needs, on the device and on the host.
+/// What a thread casts its rays with. It waits for the device before it uses the memory again.
 pub(super) struct Lane {
-    tree: AccelBuffers,
-    resources: CastResources,
-    rays: Vec<Ray>,
-    hits: Vec<Hit>,
+    exchange: Exchange<Ray, Hit>,
+    /// The structure and the set over it and the lane's memory, until the world changes.
+    bound: Option<(AccelBuffers, BindingSet)>,
 }
 
 impl GpuCaster {
-    /// Casts `n_rays` rays of which only some are in memory at a time. `make` writes the rays from an index on, at most
-    /// [`RAYS_PER_CHUNK`], and `take` gets their hits. Both are called by several threads of the current rayon pool, in
-    /// any order, and once for each chunk.
+    /// Casts `n_rays` rays of which only some are in memory at a time. `make` writes the rays from an index on, and
+    /// `take` gets their hits: chunks of [`RAYS_PER_CHUNK`], which begin at multiples of this number, and a last one of
+    /// fewer; smaller ones if batches are limited to fewer ([`GpuCaster::with_batches_of`]). Both are called by several
+    /// threads of the current rayon pool, in any order, and once for each chunk. What `make` gets may be
+    /// write-combined memory: it should write the rays in order and not read them.
     ///
     /// # Errors
     /// Memory runs out, or a call fails. Then some chunks may have been taken.
@@ -44,8 +55,12 @@ impl GpuCaster {
         take: impl Fn(usize, &[Hit]) + Sync,
     ) -> Result<(), GpuError> {
         let kernel = self.prepare_kernel(query)?;
-        let most = RAYS_PER_CHUNK.min(self.rays_per_batch).min(n_rays.max(1));
-        let mut lanes = self.lanes(n_rays.div_ceil(most).min(N_LANES), most)?;
+        let n_threads = rayon::current_num_threads();
+        let most = rays_per_submission(n_rays, n_threads, self.rays_per_batch);
+        let n_lanes = n_rays.div_ceil(most).min(n_threads).min(MOST_LANES);
+        // A thread that shared its work with others could be made to run the whole of another lane meanwhile.
+        let chunks_per_task = if n_lanes == 1 { 1 } else { usize::MAX };
+        let mut lanes = self.lanes(n_lanes, most)?;
         let (next, caster) = (AtomicUsize::new(0), &*self);
         let run = |lane: &mut Lane| loop {
             let first = next.fetch_add(most, Ordering::Relaxed);
@@ -53,45 +68,73 @@ impl GpuCaster {
                 return Ok(());
             }
             let n = most.min(n_rays - first);
-            let Lane { tree, resources: CastResources { cast_rays, cast_hits, set }, rays, hits } = lane;
-            make(first, &mut rays[..n]);
-            cast_rays.upload(&rays[..n])?;
-            caster.run(tree, 1, |commands, pass| kernel.record(commands, set, caster.masked(n as u32), pass))?;
-            cast_hits.download_bytes(0, cast_slice_mut(&mut hits[..n]))?;
-            take(first, &hits[..n]);
+            let rays = lane.exchange.inputs()[..n].par_chunks_mut(RAYS_PER_CHUNK).enumerate();
+            rays.with_min_len(chunks_per_task).for_each(|(ix, rays)| make(first + ix * RAYS_PER_CHUNK, rays));
+            let hits = caster.cast_in_lane(lane, &kernel, n)?.par_chunks(RAYS_PER_CHUNK).enumerate();
+            hits.with_min_len(chunks_per_task).for_each(|(ix, hits)| take(first + ix * RAYS_PER_CHUNK, hits));
         };
-        let result = lanes.par_iter_mut().with_max_len(1).try_for_each(run);
+        let result = lanes[..n_lanes].par_iter_mut().with_max_len(1).try_for_each(run);
         self.lanes = lanes;
         result
     }
 
-    /// Takes the lanes, at least `n`, each with room for `len` rays.
+    /// Casts the first `n` rays of a lane's memory, and returns their hits.
+    fn cast_in_lane<'a>(&self, lane: &'a mut Lane, kernel: &passes::Cast, n: usize) -> Result<&'a [Hit], GpuError> {
+        let (tree, set) = lane.bound.as_ref().expect("the lanes of a cast are bound");
+        let record = |commands: &Commands, pass| kernel.record(commands, set, self.masked(n as u32), pass);
+        let begin = |commands: &Commands| {
+            tree.suspended_rays.reset(commands);
+            record(commands, ResumePass::Begin);
+        };
+        lane.exchange.run(n, begin, || Ok(tree.suspended_rays.finish(&self.context, record)? > 0))
+    }
+
+    /// Takes the lanes, each with room for `len` rays. At least the first `n` are bound.
     fn lanes(&mut self, n: usize, len: usize) -> Result<Vec<Lane>, GpuError> {
         let mut lanes = mem::take(&mut self.lanes);
-        lanes.retain(|lane| lane.rays.len() >= len);
+        lanes.retain(|lane| lane.exchange.room() >= len);
         while lanes.len() < n {
+            let exchange = Exchange::new(&self.context, ["stream_rays", "stream_hits"], len.next_power_of_two())?;
+            lanes.push(Lane { exchange, bound: None });
+        }
+        for lane in lanes[..n].iter_mut().filter(|lane| lane.bound.is_none()) {
             let tree = self.tree.with_own_suspended_rays(&self.context)?;
-            let resources = CastResources::new(&self.context, &self.bindings, &tree, len)?;
-            lanes.push(Lane { tree, resources, rays: vec![Ray::zeroed(); len], hits: vec![Hit::zeroed(); len] });
+            let set = CastResources::set_over(&self.bindings, &tree, "stream", lane.exchange.bindings())?;
+            lane.bound = Some((tree, set));
         }
         Ok(lanes)
     }
+
+    /// Lets go of the structure. The lanes' memory stays: to map it takes longer than many casts.
+    pub(super) fn unbind_lanes(&mut self) {
+        self.lanes.iter_mut().for_each(|lane| lane.bound = None);
+    }
+}
+
+/// Returns the number of rays of a submission: as many for each thread, within bounds, in whole chunks.
+fn rays_per_submission(n_rays: usize, n_threads: usize, rays_per_batch: usize) -> usize {
+    let [least, most] = RAYS_PER_SUBMISSION;
+    let n = (n_rays / n_threads).clamp(least, most).min(rays_per_batch);
+    if n > RAYS_PER_CHUNK { n / RAYS_PER_CHUNK * RAYS_PER_CHUNK } else { n }
 }
 
 impl CpuCaster<'_> {
-    /// Does what [`GpuCaster::cast_stream`] does, chunk after chunk.
+    /// Does what [`GpuCaster::cast_stream`] does.
     pub fn cast_stream(
         &self,
         n_rays: usize,
         query: Query,
-        make: impl Fn(usize, &mut [Ray]),
-        take: impl Fn(usize, &[Hit]),
+        make: impl Fn(usize, &mut [Ray]) + Sync,
+        take: impl Fn(usize, &[Hit]) + Sync,
     ) {
-        let mut rays = vec![Ray::zeroed(); RAYS_PER_CHUNK.min(n_rays)];
-        for first in (0..n_rays).step_by(RAYS_PER_CHUNK) {
-            let chunk = &mut rays[..RAYS_PER_CHUNK.min(n_rays - first)];
-            make(first, chunk);
-            take(first, &self.cast(chunk, query));
+        let mut rays = vec![Ray::zeroed(); RAYS_PER_CPU_CAST.min(n_rays)];
+        for first in (0..n_rays).step_by(RAYS_PER_CPU_CAST) {
+            let rays = &mut rays[..RAYS_PER_CPU_CAST.min(n_rays - first)];
+            let chunks = rays.par_chunks_mut(RAYS_PER_CHUNK).enumerate();
+            chunks.for_each(|(ix, rays)| make(first + ix * RAYS_PER_CHUNK, rays));
+            let hits = self.cast(rays, query);
+            let chunks = hits.par_chunks(RAYS_PER_CHUNK).enumerate();
+            chunks.for_each(|(ix, hits)| take(first + ix * RAYS_PER_CHUNK, hits));
         }
     }
 }
