@@ -1,6 +1,11 @@
 //! From hits to the columns of results.
 
-use glam::{DVec3, Vec3};
+use std::sync::{
+    OnceLock,
+    atomic::{AtomicUsize, Ordering},
+};
+
+use glam::DVec3;
 use kdray::{
     cast::{Hit, NO_TRIANGLE},
     layout::Triangle,
@@ -21,46 +26,89 @@ pub struct Columns<'a> {
     pub points: Option<&'a mut [[f32; 3]]>,
 }
 
+/// Rows whose faces are looked up at a time, before they are written column by column.
+const ROWS_AT_ONCE: usize = 256;
 /// Rows that one thread writes at a time.
-const ROWS_AT_ONCE: usize = 4096;
+const ROWS_PER_TASK: usize = 4096;
+
+/// The most triangles of a table of faces: 1 GiB.
+const MOST_FACES: usize = 1 << 25;
 
 /// The identifier of a miss.
 const INVALID_ID: u32 = u32::MAX;
 
-/// A hit in the terms of the scene.
-pub struct Found {
+/// A triangle in the terms of the scene. Half a cache line has all of it.
+#[derive(Clone, Copy)]
+#[repr(align(32))]
+pub struct Face {
     pub geometry_id: u32,
     pub primitive_id: u32,
-    pub uv: [f32; 2],
-    pub normal: Vec3,
-    pub point: Vec3,
+    normal: [f32; 3],
+    mirrors: bool,
 }
 
-impl Found {
-    const MISS: Self =
-        Self { geometry_id: INVALID_ID, primitive_id: INVALID_ID, uv: [0.0; 2], normal: Vec3::ZERO, point: Vec3::NAN };
+impl Face {
+    const MISS: Self = Self { geometry_id: INVALID_ID, primitive_id: INVALID_ID, normal: [0.0; 3], mirrors: false };
 
-    /// Corners are in the order in which the caller has given them, also where a transform mirrors.
-    pub fn of(placed: Placed, hit: &Hit) -> Self {
-        if hit.triangle_ix == NO_TRIANGLE {
+    /// The normal is that of corners in the order in which the caller has given them, also where a transform mirrors.
+    pub fn of(placed: Placed, triangle_ix: u32) -> Self {
+        if triangle_ix == NO_TRIANGLE {
             return Self::MISS;
         }
-        let scene = placed.world.scene();
-        let origin = scene.origin_of(hit.triangle_ix);
-        let Triangle { v0, v1, v2, .. } = scene.triangle(hit.triangle_ix as usize);
-        let [a, b, c] = [v0, v1, v2].map(|corner| corner.as_dvec3());
+        let origin = placed.world.scene().origin_of(triangle_ix);
+        let [a, b, c] = corners(placed, triangle_ix);
         let across = (b - a).cross(c - a);
         let place = &placed.places[origin.instance_ix as usize];
-        let (uv, side) = if place.mirrors { ([hit.v, hit.u], -1.0) } else { ([hit.u, hit.v], 1.0) };
-        let point = a + f64::from(hit.u) * (b - a) + f64::from(hit.v) * (c - a);
+        let side = if place.mirrors { -1.0 } else { 1.0 };
         Self {
             geometry_id: place.geometry_id,
             primitive_id: origin.face_ix,
-            uv,
-            normal: (side * across.normalize_or(DVec3::ZERO)).as_vec3(),
-            point: point.as_vec3(),
+            normal: (side * across.normalize_or(DVec3::ZERO)).as_vec3().to_array(),
+            mirrors: place.mirrors,
         }
     }
+
+    /// The weights of a hit, in the order of the caller's corners.
+    pub fn uv(&self, hit: &Hit) -> [f32; 2] {
+        if self.mirrors { [hit.v, hit.u] } else { [hit.u, hit.v] }
+    }
+}
+
+/// The faces of all triangles of a world, made when so many hits have been looked up that it pays: the scene's own
+/// arrays take several cache lines for each hit. Triangles of instances have a face for each instance.
+#[derive(Default)]
+pub struct FaceTable {
+    faces: OnceLock<Vec<Face>>,
+    n_looked_up: AtomicUsize,
+}
+
+impl FaceTable {
+    /// Prepares for so many more hits. `placed`: the world of this table.
+    pub fn expect(&self, placed: Placed, n_hits: usize) {
+        let n_looked_up = self.n_looked_up.fetch_add(n_hits, Ordering::Relaxed).saturating_add(n_hits);
+        let n_triangles = placed.world.scene().n_triangles();
+        if self.faces.get().is_none() && n_triangles <= n_looked_up.min(MOST_FACES) {
+            let face = |ix| Face::of(placed, ix);
+            let faces = (0..n_triangles as u32).into_par_iter().with_min_len(4096).map(face).collect();
+            // `get_or_init` could make a thread of rayon wait for itself.
+            drop(self.faces.set(faces));
+        }
+    }
+}
+
+fn corners(placed: Placed, triangle_ix: u32) -> [DVec3; 3] {
+    let Triangle { v0, v1, v2, .. } = placed.world.scene().triangle(triangle_ix as usize);
+    [v0, v1, v2].map(|corner| corner.as_dvec3())
+}
+
+/// Returns the point of a hit, NaN for a miss.
+fn point(placed: Placed, hit: &Hit) -> [f32; 3] {
+    if hit.triangle_ix == NO_TRIANGLE {
+        return [f32::NAN; 3];
+    }
+    let [a, b, c] = corners(placed, hit.triangle_ix);
+    let point = a + f64::from(hit.u) * (b - a) + f64::from(hit.v) * (c - a);
+    point.as_vec3().to_array()
 }
 
 impl<'a> Columns<'a> {
@@ -86,32 +134,60 @@ impl<'a> Columns<'a> {
 
     /// Writes hits, one per row.
     pub fn write(mut self, placed: Placed, hits: &[Hit]) {
-        let chunks = self.split_off_chunks(hits.len(), ROWS_AT_ONCE);
-        chunks
-            .into_par_iter()
-            .zip(hits.par_chunks(ROWS_AT_ONCE))
-            .for_each(|(chunk, hits)| chunk.write_rows(placed, hits));
+        let chunks = self.split_off_chunks(hits.len(), ROWS_PER_TASK);
+        let chunks = chunks.into_par_iter().zip(hits.par_chunks(ROWS_PER_TASK));
+        chunks.for_each(|(chunk, hits)| chunk.write_rows(placed, hits));
     }
 
-    fn write_rows(self, placed: Placed, hits: &[Hit]) {
-        let Columns { t, mut geometry_ids, mut primitive_ids, mut uvs, mut normals, mut points } = self;
-        t.into_iter().flatten().zip(hits).for_each(|(t, hit)| *t = hit.t);
-        let has_ids = geometry_ids.is_some() || primitive_ids.is_some();
-        if !(has_ids || uvs.is_some() || normals.is_some() || points.is_some()) {
+    /// Whether the columns tell which triangles were hit.
+    pub fn have_faces(&self) -> bool {
+        self.geometry_ids.is_some() || self.primitive_ids.is_some() || self.uvs.is_some() || self.normals.is_some()
+    }
+
+    /// Does the same on this thread alone.
+    pub fn write_rows(mut self, placed: Placed, hits: &[Hit]) {
+        if let Some(column) = self.t.take() {
+            column.iter_mut().zip(hits).for_each(|(t, hit)| *t = hit.t);
+        }
+        if let Some(column) = self.points.take() {
+            column.iter_mut().zip(hits).for_each(|(to, hit)| *to = point(placed, hit));
+        }
+        if !self.have_faces() {
             return;
         }
-        fn set<T>(column: &mut Option<&mut [T]>, row: usize, value: T) {
-            if let Some(column) = column {
-                column[row] = value;
-            }
+        let mut faces = [Face::MISS; ROWS_AT_ONCE];
+        for hits in hits.chunks(ROWS_AT_ONCE) {
+            let faces = &mut faces[..hits.len()];
+            placed.look_up(hits, faces);
+            self.split_off(hits.len()).write_faces(hits, faces);
         }
-        for (row, hit) in hits.iter().enumerate() {
-            let found = Found::of(placed, hit);
-            set(&mut geometry_ids, row, found.geometry_id);
-            set(&mut primitive_ids, row, found.primitive_id);
-            set(&mut uvs, row, found.uv);
-            set(&mut normals, row, found.normal.to_array());
-            set(&mut points, row, found.point.to_array());
+    }
+
+    fn write_faces(self, hits: &[Hit], faces: &[Face]) {
+        if let Some(column) = self.geometry_ids {
+            column.iter_mut().zip(faces).for_each(|(to, face)| *to = face.geometry_id);
+        }
+        if let Some(column) = self.primitive_ids {
+            column.iter_mut().zip(faces).for_each(|(to, face)| *to = face.primitive_id);
+        }
+        if let Some(column) = self.uvs {
+            column.iter_mut().zip(faces.iter().zip(hits)).for_each(|(to, (face, hit))| *to = face.uv(hit));
+        }
+        if let Some(column) = self.normals {
+            column.iter_mut().zip(faces).for_each(|(to, face)| *to = face.normal);
+        }
+    }
+}
+
+impl Placed<'_> {
+    /// Sets the faces of hits.
+    fn look_up(self, hits: &[Hit], faces: &mut [Face]) {
+        match self.table.faces.get() {
+            Some(all) => faces.iter_mut().zip(hits).for_each(|(face, hit)| {
+                // The index of a miss is greater than all others.
+                *face = *all.get(hit.triangle_ix as usize).unwrap_or(&Face::MISS);
+            }),
+            None => faces.iter_mut().zip(hits).for_each(|(face, hit)| *face = Face::of(self, hit.triangle_ix)),
         }
     }
 }

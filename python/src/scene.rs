@@ -21,14 +21,14 @@ use pyo3::{exceptions::PyRuntimeError, prelude::*};
 use rayon::prelude::*;
 
 use super::{
-    columns::{Columns, Found},
+    columns::{Columns, Face},
     process::{Selector, check_fork, engine, failed, is_forked, name_of, pool},
     state::{Placed, State},
     watched::watched,
 };
 
 /// Rays that are cast between two looks at Ctrl-C, by a GPU or by others: some tenths of a second.
-const RAYS_AT_ONCE: [usize; 2] = [16 * RAYS_PER_CHUNK, RAYS_PER_CHUNK / 2];
+const RAYS_AT_ONCE: [usize; 2] = [1 << 25, 1 << 18];
 /// The same number of queries that take longer.
 const QUERIES_AT_ONCE: [usize; 2] = [1 << 20, 1 << 16];
 
@@ -87,24 +87,34 @@ impl<'a> Rows<'a> {
         self.rows.len() / self.width
     }
 
-    /// Writes the rays from `first` on.
+    /// Writes the rays from `first` on, in order.
     fn write(&self, first: usize, rays: &mut [Ray]) {
-        let at = |values: &[f32], ix: usize| if values.len() == 1 { values[0] } else { values[ix] };
-        let ray = |ix: usize| {
-            let row = &self.rows[ix * self.width..][..self.width];
-            let (t_min, t_max) = match row {
-                [.., t_min, t_max] if self.width == 8 => (*t_min, *t_max),
-                _ => (at(self.t_min, ix), at(self.t_max, ix)),
-            };
-            Ray { origin: Vec3::from_slice(row), t_min, direction: Vec3::from_slice(&row[3..]), t_max }
+        let rows = &self.rows[first * self.width..][..rays.len() * self.width];
+        let ray = |row: &[f32; 6], t_min, t_max| {
+            let [x, y, z, dx, dy, dz] = *row;
+            Ray { origin: Vec3::new(x, y, z), t_min, direction: Vec3::new(dx, dy, dz), t_max }
         };
-        rays.par_iter_mut().enumerate().with_min_len(1024).for_each(|(ix, to)| *to = ray(first + ix));
+        if self.width == 8 {
+            let rows = rows.as_chunks::<8>().0;
+            rays.iter_mut().zip(rows).for_each(|(to, [row @ .., t_min, t_max])| *to = ray(row, *t_min, *t_max));
+            return;
+        }
+        let rows = rays.iter_mut().zip(rows.as_chunks::<6>().0);
+        if let ([t_min], [t_max]) = (self.t_min, self.t_max) {
+            rows.for_each(|(to, row)| *to = ray(row, *t_min, *t_max));
+            return;
+        }
+        let at = |values: &[f32], ix: usize| if values.len() == 1 { values[0] } else { values[ix] };
+        for (ix, (to, row)) in (first..).zip(rows) {
+            *to = ray(row, at(self.t_min, ix), at(self.t_max, ix));
+        }
     }
 
-    /// Returns the rays from `first` on, `n` at most.
+    /// Returns the rays of a range.
     fn rays(&self, range: ops::Range<usize>) -> Vec<Ray> {
         let mut rays = vec![Ray::zeroed(); range.len()];
-        self.write(range.start, &mut rays);
+        let chunks = rays.par_chunks_mut(RAYS_PER_CHUNK).enumerate();
+        chunks.for_each(|(ix, rays)| self.write(range.start + ix * RAYS_PER_CHUNK, rays));
         rays
     }
 }
@@ -326,11 +336,14 @@ impl Core {
         let rows = Rows::new(&rays, &range)?;
         let mut columns = columns_of(&mut outputs)?;
         self.in_chunks(py, (rows.len(), RAYS_AT_ONCE), (mask, n_threads), |range, (caster, placed)| {
+            if columns.have_faces() {
+                placed.table.expect(placed, range.len());
+            }
             let chunks = columns.split_off_chunks(range.len(), RAYS_PER_CHUNK);
             let chunks: Vec<_> = chunks.into_iter().map(|chunk| Mutex::new(Some(chunk))).collect();
             let take = |begin: usize, hits: &[Hit]| {
                 let chunk = locked(&chunks[begin / RAYS_PER_CHUNK]).take().expect("each chunk is taken once");
-                chunk.write(placed, hits);
+                chunk.write_rows(placed, hits);
             };
             let make = |begin: usize, rays: &mut [Ray]| rows.write(range.start + begin, rays);
             caster.cast_stream(range.len(), Query::Closest, make, take).map_err(failed)
@@ -402,11 +415,12 @@ impl Core {
             for (ix, ends) in range.zip(all.ray_splits.windows(2)) {
                 ray_ids.extend((ends[0]..ends[1]).map(|_| ix as u32));
             }
-            let found: Vec<_> = all.hits.par_iter().with_min_len(1024).map(|hit| Found::of(placed, hit)).collect();
+            let face = |hit: &Hit| Face::of(placed, hit.triangle_ix);
+            let faces: Vec<_> = all.hits.par_iter().with_min_len(1024).map(face).collect();
             t_hit.extend(all.hits.iter().map(|hit| hit.t));
-            geometry_ids.extend(found.iter().map(|it| it.geometry_id));
-            primitive_ids.extend(found.iter().map(|it| it.primitive_id));
-            uvs.extend(found.iter().flat_map(|it| it.uv));
+            geometry_ids.extend(faces.iter().map(|face| face.geometry_id));
+            primitive_ids.extend(faces.iter().map(|face| face.primitive_id));
+            uvs.extend(faces.iter().zip(&all.hits).flat_map(|(face, hit)| face.uv(hit)));
             Ok(())
         })?;
         Ok((

@@ -20,7 +20,7 @@ use pyo3::{
 };
 use rayon::prelude::*;
 
-use super::process::failed;
+use super::{columns::FaceTable, process::failed};
 
 /// Number of rays for which a structure is built when it is not known how many will follow.
 const EXPECTED_RAYS: u64 = 1 << 24;
@@ -62,6 +62,7 @@ pub struct Ready {
     pub world: World,
     /// One per instance of the world.
     pub places: Vec<Place>,
+    table: FaceTable,
     traversal: Traversal,
     on_device: Option<Caster<'static>>,
     on_cpu: Option<Caster<'static>>,
@@ -78,6 +79,7 @@ pub struct Ready {
 pub struct Placed<'a> {
     pub world: &'a World,
     pub places: &'a [Place],
+    pub table: &'a FaceTable,
 }
 
 /// A scene.
@@ -268,7 +270,7 @@ impl State {
         for caster in ready.on_device.iter_mut().chain(&mut ready.on_cpu) {
             caster.set_world(&ready.world)?;
         }
-        ready.places_at = self.places_at;
+        (ready.places_at, ready.table) = (self.places_at, FaceTable::default());
         Ok(ready)
     }
 
@@ -295,8 +297,8 @@ impl State {
             }
         };
         let (shapes_at, places_at) = (self.shapes_at, self.places_at);
-        let (on_device, on_cpu, n_small) = Default::default();
-        Ok(Ready { world, places, traversal, on_device, on_cpu, n_small, keeps, shapes_at, places_at })
+        let (table, on_device, on_cpu, n_small) = Default::default();
+        Ok(Ready { world, places, table, traversal, on_device, on_cpu, n_small, keeps, shapes_at, places_at })
     }
 
     /// Makes a world of which nothing is there.
@@ -349,7 +351,7 @@ impl Ready {
     /// Returns what casts `n` rays: the device, or the CPU if they are few and its structure costs little or has been
     /// waited for. It is made at the first use.
     fn caster(&mut self, [engine, cpu]: [&Engine; 2], n: usize) -> PyResult<(&mut Caster<'static>, Placed<'_>)> {
-        let Self { world, places, traversal, on_device, on_cpu, n_small, .. } = self;
+        let Self { world, places, table, traversal, on_device, on_cpu, n_small, .. } = self;
         let is_small = engine.device().is_some_and(|device| !device.is_software()) && n < SMALL_BATCH;
         let lacks_structure = on_cpu.is_none() && matches!(world.accel_options(), AccelOptions::LazyTree(_));
         let stays_on_device = is_small && lacks_structure && *n_small < BATCHES_BEFORE_BUILD;
@@ -359,7 +361,7 @@ impl Ready {
         } else {
             made(on_device, || engine.caster_of_world(world, *traversal))
         };
-        Ok((caster?, Placed { world, places }))
+        Ok((caster?, Placed { world, places, table }))
     }
 }
 

@@ -83,6 +83,40 @@ def test_vertices(device, random):
     assert_same_hits(scene.cast_rays(rays), expected.cast_rays(rays))
 
 
+def test_many_hits_are_described_as_few_are(device, random):
+    """Of many rays, hits are looked up in a table of all triangles, which is that of the scene as it is now."""
+    parts = [soup(random, 3000), soup(random, 3000)]
+    few, many, rays = fresh(device, parts), fresh(device, parts), random_rays(random, 5000)
+    mirrored, turned = (random_transforms(random, 2, mirrors) for mirrors in [True, False])
+    changes = [
+        lambda scene: None,
+        lambda scene: scene.update_transforms([1], mirrored[:1]),
+        lambda scene: scene.update_transforms([0, 1], [mirrored[1], turned[0]]),
+        lambda scene: scene.update_vertices(1, 0.5 * parts[1][0]),
+    ]
+    for change in changes:
+        change(few), change(many)
+        expected, hits = few.cast_rays(rays), many.cast_rays(np.tile(rays, (2, 1)))
+        assert np.mean(expected["t_hit"] < np.inf) > 0.2
+        for key in expected:
+            assert hits[key][:5000].tobytes() == expected[key].tobytes(), key
+
+
+@pytest.mark.parametrize("width", [6, 8])
+def test_ranges_of_rays(device, random, width):
+    """One range for all rays, or one for each, in rays or beside them."""
+    scene, rays = fresh(device, [soup(random, 100)]), random_rays(random, 20_000)
+    t = scene.cast_rays(rays)["t_hit"]
+    low, high = (random.uniform(0, 2, len(rays)).astype(np.float32) for _ in range(2))
+    for t_min, t_max in [(low, high), (0.25, high), (low, np.inf), (0.25, 1.5)]:
+        ends = {"t_min": t_min, "t_max": t_max}
+        wide = np.column_stack([rays, *(np.broadcast_to(it, len(rays)) for it in ends.values())]).astype(np.float32)
+        found = scene.cast_rays(wide)["t_hit"] if width == 8 else scene.cast_rays(rays, **ends)["t_hit"]
+        assert ((found == np.inf) | ((t_min < found) & (found <= t_max))).all()
+        is_within = (t_min < t) & (t <= t_max)
+        assert is_within.any() and (found[is_within] == t[is_within]).all()
+
+
 def test_remove(device, random):
     parts = [soup(random, 40) for _ in range(3)]
     scene, rays = fresh(device, parts), random_rays(random, 5000)
