@@ -73,7 +73,7 @@ pub(super) fn parse(json: &[u8]) -> Checked<Parsed> {
 }
 
 fn parse_strictly(json: &[u8]) -> Option<Parsed> {
-    let root: Root = serde_json::from_slice(json).ok()?;
+    let root = Root::from_slice(json).ok()?;
     let mut targets = root.meshes.iter().flat_map(|mesh| &mesh.primitives).flat_map(|primitive| &primitive.targets);
     let morph_targets = match targets.next() {
         Some(_) => serde_json::from_slice(json).ok()?,
@@ -210,7 +210,7 @@ impl Lists {
             self.left_out.count_element()?;
             *item = least.clone();
             item.as_object_mut().into_iter().for_each(|members| members.retain(|_, member| !member.is_object()));
-            read.push(serde_json::from_value(item.clone()).expect("the least element can be read"));
+            read.push(read_value(item).expect("the least element can be read"));
         }
         if name == "meshes" {
             self.lists.insert(name.to_owned(), Value::Array(items));
@@ -296,13 +296,21 @@ fn fill_in(element: &mut Value, least: &Value, path: &str, left_out: &mut LeftOu
     }
 }
 
+/// Reads an element. Whatever reads the crate's types from values calls this function: each other way to do so would be
+/// compiled for all of them once more.
+pub(super) fn read_value<T: DeserializeOwned>(
+    json: &Value,
+) -> Result<T, serde_path_to_error::Error<serde_json::Error>> {
+    serde_path_to_error::deserialize(json)
+}
+
 /// Reads an element, and removes what cannot be read. `path` is its JSON path.
 ///
 /// # Errors
 /// The element as a whole cannot be read.
 fn repaired<T: DeserializeOwned>(element: &mut Value, path: &str, left_out: &mut LeftOut) -> Checked<T> {
     for _ in 0..=MAX_LEFT_OUT {
-        let error = match serde_path_to_error::deserialize::<_, T>(&*element) {
+        let error = match read_value(element) {
             Ok(read) => return Ok(read),
             Err(error) => error,
         };

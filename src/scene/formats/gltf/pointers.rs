@@ -10,6 +10,7 @@ use serde_json::json;
 use super::{
     animation::{DRIVEN_BEFORE, Driven, Keys, name_of, playing},
     document::{Document, item},
+    lenient::read_value,
 };
 use crate::scene::model::{LoadOptions, error::Checked};
 
@@ -175,6 +176,6 @@ fn set_in<T: Serialize + DeserializeOwned>(
     let mut json = serde_json::to_value(&list[ix]).map_err(|error| error.to_string())?;
     let place = member.split('/').skip(1).fold(&mut json, |json, key| &mut json[key]);
     *place = value;
-    list[ix] = serde_json::from_value(json).map_err(|error| error.to_string())?;
+    list[ix] = read_value(&json).map_err(|error| error.inner().to_string())?;
     Ok(())
 }
