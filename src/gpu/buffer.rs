@@ -76,36 +76,7 @@ impl<T: Pod> Buffer<T> {
     /// The buffer exceeds the device's limits, or memory is exhausted.
     pub fn new(context: &Arc<Context>, name: &str, len: usize, usage: BufferUse) -> Result<Self, GpuError> {
         let bytes = (len.max(1) * size_of::<T>()) as u64;
-        let is_bound = matches!(usage, BufferUse::Storage | BufferUse::Uniform | BufferUse::Indirect);
-        let limit = if is_bound { context.limits().storage_range } else { context.limits().buffer_bytes };
-        if bytes > limit {
-            return Err(GpuError::TooLarge { object: name.to_owned(), bytes, limit });
-        }
-        let has_texels = matches!(usage, BufferUse::Texels | BufferUse::Address);
-        let usage = match usage {
-            BufferUse::Storage => vk::BufferUsageFlags::STORAGE_BUFFER,
-            BufferUse::Uniform => vk::BufferUsageFlags::UNIFORM_BUFFER,
-            BufferUse::Indirect => vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::INDIRECT_BUFFER,
-            BufferUse::Index => vk::BufferUsageFlags::INDEX_BUFFER,
-            BufferUse::Texels => vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER,
-            BufferUse::Address => {
-                vk::BufferUsageFlags::STORAGE_BUFFER
-                    | vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER
-                    | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS
-            }
-            BufferUse::Structure => {
-                vk::BufferUsageFlags::STORAGE_BUFFER
-                    | vk::BufferUsageFlags::ACCELERATION_STRUCTURE_STORAGE_KHR
-                    | vk::BufferUsageFlags::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR
-                    | vk::BufferUsageFlags::SHADER_BINDING_TABLE_KHR
-                    | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS
-            }
-        } | vk::BufferUsageFlags::TRANSFER_SRC
-            | vk::BufferUsageFlags::TRANSFER_DST;
-        let mut any = AnyBuffer::new(&context.device, name, bytes, usage, MemoryLocation::GpuOnly)?;
-        if has_texels {
-            any.add_texels(texel_bytes::<T>())?;
-        }
+        let any = AnyBuffer::on_device(context, name, bytes, usage, texel_bytes::<T>())?;
         Ok(Self { any: Arc::new(any), len, element: PhantomData, context: Arc::clone(context) })
     }
 
@@ -280,7 +251,52 @@ impl<T: Pod> Buffer<T> {
     }
 }
 
+impl BufferUse {
+    fn flags(self) -> vk::BufferUsageFlags {
+        let own = match self {
+            Self::Storage => vk::BufferUsageFlags::STORAGE_BUFFER,
+            Self::Uniform => vk::BufferUsageFlags::UNIFORM_BUFFER,
+            Self::Indirect => vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::INDIRECT_BUFFER,
+            Self::Index => vk::BufferUsageFlags::INDEX_BUFFER,
+            Self::Texels => vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER,
+            Self::Address => {
+                vk::BufferUsageFlags::STORAGE_BUFFER
+                    | vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER
+                    | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS
+            }
+            Self::Structure => {
+                vk::BufferUsageFlags::STORAGE_BUFFER
+                    | vk::BufferUsageFlags::ACCELERATION_STRUCTURE_STORAGE_KHR
+                    | vk::BufferUsageFlags::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR
+                    | vk::BufferUsageFlags::SHADER_BINDING_TABLE_KHR
+                    | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS
+            }
+        };
+        own | vk::BufferUsageFlags::TRANSFER_SRC | vk::BufferUsageFlags::TRANSFER_DST
+    }
+}
+
 impl AnyBuffer {
+    /// Does the work of [`Buffer::new`]. `texel_bytes`: the size of a texel, if the use includes texels.
+    fn on_device(
+        context: &Arc<Context>,
+        name: &str,
+        bytes: u64,
+        usage: BufferUse,
+        texel_bytes: u64,
+    ) -> Result<Self, GpuError> {
+        let is_bound = matches!(usage, BufferUse::Storage | BufferUse::Uniform | BufferUse::Indirect);
+        let limit = if is_bound { context.limits().storage_range } else { context.limits().buffer_bytes };
+        if bytes > limit {
+            return Err(GpuError::TooLarge { object: name.to_owned(), bytes, limit });
+        }
+        let mut buffer = Self::new(&context.device, name, bytes, usage.flags(), MemoryLocation::GpuOnly)?;
+        if matches!(usage, BufferUse::Texels | BufferUse::Address) {
+            buffer.add_texels(texel_bytes)?;
+        }
+        Ok(buffer)
+    }
+
     fn new(
         device: &Arc<RawDevice>,
         name: &str,

@@ -90,6 +90,19 @@ impl CommandBuffer {
         timer: Option<&Timer>,
         body: impl FnOnce(&Commands),
     ) -> Result<Self, GpuError> {
+        let mut body = Some(body);
+        Self::record_once(context, name, timer, &mut |commands| {
+            body.take().into_iter().for_each(|body| body(commands));
+        })
+    }
+
+    /// Does what [`CommandBuffer::record`] does. Its many callers would each get a copy of this code.
+    fn record_once(
+        context: &Arc<Context>,
+        name: &str,
+        timer: Option<&Timer>,
+        body: &mut dyn FnMut(&Commands),
+    ) -> Result<Self, GpuError> {
         let device = &context.device;
         device.count_creation("vkAllocateCommandBuffers", name)?;
         let pool = device.take_pool(name)?;
@@ -162,19 +175,27 @@ impl Commands<'_> {
 
     /// Records `body` under a debug label, if commands get labels.
     fn labelled(&self, name: &str, body: impl FnOnce()) {
-        let label = CString::new(name).unwrap_or_default();
-        let debug_utils = self.device.debug_utils.as_ref().filter(|_| self.device.has_labels);
-        // SAFETY: the commands are being recorded, and each label that begins also ends.
-        unsafe {
-            if let Some(debug_utils) = debug_utils {
-                let label = vk::DebugUtilsLabelEXT::default().label_name(&label);
-                debug_utils.cmd_begin_debug_utils_label(self.raw, &label);
-            }
-            body();
-            if let Some(debug_utils) = debug_utils {
-                debug_utils.cmd_end_debug_utils_label(self.raw);
-            }
-        }
+        self.begin_label(name);
+        body();
+        self.end_label();
+    }
+
+    fn begin_label(&self, name: &str) {
+        let Some(debug_utils) = self.debug_utils() else { return };
+        let name = CString::new(name).unwrap_or_default();
+        let label = vk::DebugUtilsLabelEXT::default().label_name(&name);
+        // SAFETY: the commands are being recorded.
+        unsafe { debug_utils.cmd_begin_debug_utils_label(self.raw, &label) };
+    }
+
+    fn end_label(&self) {
+        let Some(debug_utils) = self.debug_utils() else { return };
+        // SAFETY: the commands are being recorded, and a label has begun.
+        unsafe { debug_utils.cmd_end_debug_utils_label(self.raw) };
+    }
+
+    fn debug_utils(&self) -> Option<&ash::ext::debug_utils::Device> {
+        self.device.debug_utils.as_ref().filter(|_| self.device.has_labels)
     }
 
     /// Resets the timer, if there is one: its rows are then those of the passes that follow.
