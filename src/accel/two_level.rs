@@ -136,7 +136,7 @@ impl TwoLevel {
     }
 
     /// Whether devices build some of the trees.
-    pub fn has_device_trees(&self) -> bool {
+    pub fn has_device_structures(&self) -> bool {
         self.structures.iter().any(|it| it.as_lazy().is_some())
     }
 

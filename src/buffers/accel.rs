@@ -7,11 +7,11 @@ use rayon::prelude::*;
 
 use super::{
     SuspendedRays,
-    device_trees::{Arrays, DeviceTrees, Geometries, with_room_for},
+    device_structures::{Arrays, DeviceStructures, Geometries, with_room_for},
     scene_arrays::{Content, Contents, SceneAccess, SceneArrays},
+    structure_builder::builder_options,
     surface_features::SurfaceFeatures,
     texture_words::TextureWords,
-    tree_builder::builder_options,
     two_level::{Joined, instance_rows, leaf_triangle},
 };
 use crate::{
@@ -26,10 +26,7 @@ use crate::{
         AccelConstants, BIND_ACCEL, BIND_SUSPENDED_RAYS, BRUTE_MAX_TRIANGLES, KD_WORD_DEPTH, KdRope, LeafTriangle,
         NO_WORDS, Slab, TRIANGLE_HIDDEN, Triangle, constants,
     },
-    passes::{
-        grid::GridBuilder,
-        kdtree::{DeviceTree, KdTreeBuilder},
-    },
+    passes::{grid::GridBuilder, kdtree::KdTreeBuilder, structures::StructureArrays},
     world::{Emitters, Geometry, Instances, Poses, World},
 };
 
@@ -70,7 +67,7 @@ pub struct AccelBuffers {
     /// The contents of `constants`.
     uploaded: AccelConstants,
     /// Where the trees of geometries are; none unless the device has built some of them.
-    trees: Option<Arc<DeviceTrees>>,
+    trees: Option<Arc<DeviceStructures>>,
 }
 
 impl AccelBuffers {
@@ -147,7 +144,7 @@ impl AccelBuffers {
                 let instances = geometry.instances().expect("a structure of two levels is over instances");
                 let all = Geometries { two, instances, geometry, poses: &Poses::default() };
                 let of_host = || Self::of_two_level(context, triangles, (two, instances), common());
-                match two.has_device_trees().then(|| Self::of_device_trees(context, &all, common)) {
+                match two.has_device_structures().then(|| Self::of_device_structures(context, &all, common)) {
                     Some(Err(error)) if error.is_lack_of_room() => {
                         tracing::warn!("the host builds the kd-trees, since the device has too little room: {error}");
                         of_host()
@@ -205,13 +202,13 @@ impl AccelBuffers {
 
     /// Uploads the geometries, some of whose trees the device builds. `common`: returns the contents without a
     /// structure.
-    fn of_device_trees<'a>(
+    fn of_device_structures<'a>(
         context: &Arc<Context>,
         all: &Geometries<'a>,
         common: impl Fn() -> Contents<'a>,
     ) -> Result<Self, GpuError> {
         let on_device = Buffer::with(context, "triangles", all.geometry.triangles(), BufferUse::Texels)?;
-        let (trees, new) = DeviceTrees::build(context, &on_device, all)?;
+        let (trees, new) = DeviceStructures::build(context, &on_device, all)?;
         let mut constants = AccelConstants::default();
         let rows = instance_rows(all.two, all.instances, &trees.roots(), &mut constants);
         let reserved = || Contents { instance_rows: Content::Elements(&rows), ..trees.reserved(common()) };
@@ -468,7 +465,7 @@ impl AccelBuffers {
     }
 
     /// Returns what makes others notice that these buffers are in use, as a clone does.
-    pub(crate) fn shared(&self) -> Option<Arc<DeviceTrees>> {
+    pub(crate) fn shared(&self) -> Option<Arc<DeviceStructures>> {
         self.trees.clone()
     }
 
@@ -566,7 +563,7 @@ pub(crate) fn hidden_words(n_triangles: usize, hidden: &[u32]) -> Vec<u32> {
 }
 
 /// Returns the contents with trees that a device has built, in arrays for `usage`.
-fn with_trees<'a>(trees: DeviceTree, usage: BufferUse, contents: Contents<'a>) -> Contents<'a> {
+fn with_trees<'a>(trees: StructureArrays, usage: BufferUse, contents: Contents<'a>) -> Contents<'a> {
     Contents {
         kd_nodes: Content::OnDevice(trees.nodes, usage),
         kd_parents: Content::OnDevice(trees.parents, usage),

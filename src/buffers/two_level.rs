@@ -9,7 +9,7 @@ use crate::{
     gpu::GpuError,
     layout::{
         AccelConstants, GEOMETRY_ROWS, GridCell, INSTANCE_ROWS, InstanceRow, KD_LEAF, KD_NODE_BYTES, KD_PAIR_SHIFT,
-        KdNode, KdPlace, KdRope, LeafTriangle, Plane, Slab, TOP_NODE_ROWS, Triangle,
+        KdNode, KdRope, LeafTriangle, Plane, Slab, StructurePlace, TOP_NODE_ROWS, Triangle,
     },
     world::Instances,
 };
@@ -90,8 +90,8 @@ impl<'a> Joined<'a> {
 
     pub fn write_nodes(&self, first: usize, chunk: &mut [KdNode]) {
         Self::write(self.first_nodes, first, chunk, |geometry_ix, ix| {
-            let place = KdPlace {
-                first_node: self.first_nodes[geometry_ix] as u32,
+            let place = StructurePlace {
+                first_element: self.first_nodes[geometry_ix] as u32,
                 first_entry: self.first_entries[geometry_ix] as u32,
                 first_row: self.first_rows[geometry_ix],
             };
@@ -149,10 +149,12 @@ impl<'a> Joined<'a> {
 }
 
 /// Returns a tree's node as it is among those of several trees. Twin of glsl/passes/kdtree_relocate.comp.
-pub fn relocated(KdNode { split_or_first, axis_and_child }: KdNode, place: &KdPlace) -> KdNode {
+pub fn relocated(KdNode { split_or_first, axis_and_child }: KdNode, place: &StructurePlace) -> KdNode {
     match axis_and_child & KD_LEAF != 0 {
         true => KdNode { split_or_first: split_or_first + place.first_entry, axis_and_child },
-        false => KdNode { split_or_first, axis_and_child: axis_and_child + ((place.first_node / 2) << KD_PAIR_SHIFT) },
+        false => {
+            KdNode { split_or_first, axis_and_child: axis_and_child + ((place.first_element / 2) << KD_PAIR_SHIFT) }
+        }
     }
 }
 

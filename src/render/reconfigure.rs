@@ -84,8 +84,8 @@ impl GpuRenderer {
     /// was possible.
     fn set_pose(&mut self, world: &World) -> Result<bool, GpuError> {
         let lights = [world, &self.world].map(|world| &world.scene().lights);
-        let has_device_trees = self.resources.accel.shared().is_some();
-        if lights[0].len() != lights[1].len() || !(has_device_trees || world.shares_geometries(&self.world)) {
+        let has_device_structures = self.resources.accel.shared().is_some();
+        if lights[0].len() != lights[1].len() || !(has_device_structures || world.shares_geometries(&self.world)) {
             return Ok(false);
         }
         let of_paths = self.in_use.integrator == Integrator::Path;
@@ -105,7 +105,7 @@ impl GpuRenderer {
             None
         };
         // The successor, and the present resources, which are released.
-        if has_device_trees && !resources.accel.set_pose(&self.context, world, 2)? {
+        if has_device_structures && !resources.accel.set_pose(&self.context, world, 2)? {
             return Ok(false);
         }
         self.reset_samples();

@@ -11,7 +11,7 @@ use bytemuck::cast_slice;
 
 use super::{
     scene_arrays::{Content, Contents, SceneArrays},
-    tree_builder::{TreeBuilder, has_slabs},
+    structure_builder::{StructureBuilder, has_slabs},
     two_level::{leaf_triangle, relocated},
 };
 use crate::{
@@ -23,10 +23,13 @@ use crate::{
     },
     gpu::{AnyBuffer, Buffer, BufferUse, Context, GpuError},
     layout::{
-        CornerSurface, KD_LEAF, KD_NODE_BYTES, KD_PAIR_SHIFT, KdBox, KdNode, KdPlace, KdRope, LeafTriangle, Plane,
-        Slab, Triangle,
+        CornerSurface, KD_LEAF, KD_NODE_BYTES, KD_PAIR_SHIFT, KdBox, KdNode, KdRope, LeafTriangle, Plane, Slab,
+        StructurePlace, Triangle,
     },
-    passes::kdtree::{BufferCopy, BuiltTree, DeviceTree, Target},
+    passes::{
+        kdtree::BuiltTree,
+        structures::{BufferCopy, StructureArrays, Target},
+    },
     util::Shared,
     world::{Geometry, Instances, Poses},
 };
@@ -53,10 +56,10 @@ impl Region {
         n_nodes <= self.nodes.len() && n_entries <= self.entries.len()
     }
 
-    fn place(&self) -> KdPlace {
-        let [first_node, first_entry, first_row] =
+    fn place(&self) -> StructurePlace {
+        let [first_element, first_entry, first_row] =
             [self.nodes.start, self.entries.start, self.first_row].map(|n| n as u32);
-        KdPlace { first_node, first_entry, first_row }
+        StructurePlace { first_element, first_entry, first_row }
     }
 }
 
@@ -69,7 +72,7 @@ struct Shown {
 }
 
 /// Where the trees of geometries are in the arrays, and what builds them again.
-pub struct DeviceTrees {
+pub struct DeviceStructures {
     geometries_id: GeometriesId,
     regions: Vec<Region>,
     /// Behind all regions.
@@ -82,7 +85,7 @@ struct State {
     /// What each region holds.
     shown: Vec<Shown>,
     /// Builds trees again. It is kept from the first time on, with room for the largest geometry so far.
-    builder: Option<TreeBuilder>,
+    builder: Option<StructureBuilder>,
 }
 
 /// Returns the contents with room for trees of so many nodes and entries, and for their links.
@@ -141,9 +144,9 @@ impl<'a> Geometries<'a> {
 
 /// The trees that a device has built for a new world, until they are in the arrays: the index of each geometry, and its
 /// tree.
-pub type NewTrees = Vec<(usize, BuiltTree, DeviceTree)>;
+pub type NewStructures = Vec<(usize, BuiltTree, StructureArrays)>;
 
-impl DeviceTrees {
+impl DeviceStructures {
     /// Builds all trees that devices build. `triangles`: the stored triangles.
     ///
     /// # Errors
@@ -152,7 +155,7 @@ impl DeviceTrees {
         context: &Arc<Context>,
         triangles: &Buffer<Triangle>,
         all: &Geometries,
-    ) -> Result<(Self, NewTrees), GpuError> {
+    ) -> Result<(Self, NewStructures), GpuError> {
         let Geometries { two, instances, .. } = all;
         let mut regions = vec![Region::default(); two.structures().len()];
         let mut end = Region::default();
@@ -166,7 +169,7 @@ impl DeviceTrees {
         }
         let largest = all.lazy().max_by_key(|(_, tree)| tree.n_triangles());
         let (_, largest) = largest.expect("a tree that devices build");
-        let builder = TreeBuilder::new(context, (largest.n_triangles(), 0), largest)?;
+        let builder = StructureBuilder::new(context, (largest.n_triangles(), 0), largest)?;
         let (mut trees, mut reports) = (Vec::new(), Vec::new());
         for (ix, tree) in all.lazy() {
             let first_row = instances.ranges[ix].first_row as usize;
@@ -205,10 +208,10 @@ impl DeviceTrees {
         &self,
         context: &Arc<Context>,
         usage: BufferUse,
-        (all, new): (&Geometries, NewTrees),
-    ) -> Result<DeviceTree, GpuError> {
+        (all, new): (&Geometries, NewStructures),
+    ) -> Result<StructureArrays, GpuError> {
         let [n_nodes, n_entries] = [self.end.nodes.end, self.end.entries.end];
-        let arrays = DeviceTree::new(context, (n_nodes, n_entries), self.has_slabs, usage)?;
+        let arrays = StructureArrays::new(context, (n_nodes, n_entries), self.has_slabs, usage)?;
         let mut state = self.lock();
         let of_host = all.of_host(0..self.regions.len());
         self.upload(context, &arrays, (all, &of_host, &[]))?;
@@ -279,7 +282,7 @@ impl DeviceTrees {
     /// room.
     fn rebuild(
         &self,
-        builder: &mut TreeBuilder,
+        builder: &mut StructureBuilder,
         arrays: &Arrays,
         (all, ix, tree): (&Geometries, usize, &LazyTree),
         reports: &mut Vec<DeviceBuild>,
@@ -320,7 +323,7 @@ impl DeviceTrees {
     fn upload(
         &self,
         context: &Arc<Context>,
-        arrays: &DeviceTree,
+        arrays: &StructureArrays,
         (all, trees, more): (&Geometries, &[(usize, &KdTree)], &[BufferCopy]),
     ) -> Result<(), GpuError> {
         let Some(&(first, _)) = trees.first() else { return Ok(()) };
@@ -334,7 +337,7 @@ impl DeviceTrees {
             nodes.resize(n_nodes, KdNode::default());
             nodes.extend(tree.nodes().iter().map(|node| relocated(*node, &place)));
             parents.resize(n_nodes / 2, 0);
-            parents.extend(tree.parents().iter().map(|parent| parent + place.first_node));
+            parents.extend(tree.parents().iter().map(|parent| parent + place.first_element));
             entries.resize(n_entries, LeafTriangle::default());
             let triangles = all.triangles(ix);
             let entry = |&triangle_ix: &u32| LeafTriangle {
@@ -351,7 +354,7 @@ impl DeviceTrees {
             }
         }
         let usage = BufferUse::Texels;
-        let new = DeviceTree {
+        let new = StructureArrays {
             nodes: Buffer::with(context, "new nodes", &nodes, usage)?,
             parents: Buffer::with(context, "new parents", &parents, usage)?,
             leaf_triangles: Buffer::with(context, "new leaf_triangles", &entries, usage)?,
@@ -430,13 +433,13 @@ impl State {
         context: &Arc<Context>,
         tree: &LazyTree,
         n_corner_words: usize,
-    ) -> Result<Option<&mut TreeBuilder>, GpuError> {
+    ) -> Result<Option<&mut StructureBuilder>, GpuError> {
         let n_triangles = tree.n_triangles();
         let sizes = (n_triangles, n_triangles * n_corner_words);
-        let is_enough = |it: &TreeBuilder| it.kernels.triangles().len() >= sizes.0 && it.corners.len() >= sizes.1;
+        let is_enough = |it: &StructureBuilder| it.kernels.triangles().len() >= sizes.0 && it.corners.len() >= sizes.1;
         if !self.builder.as_ref().is_some_and(is_enough) {
             self.builder = None; // its memory serves the larger one
-            match TreeBuilder::new(context, sizes, tree) {
+            match StructureBuilder::new(context, sizes, tree) {
                 Err(error) if error.is_lack_of_room() => return Ok(None),
                 made => self.builder = Some(made?),
             }
@@ -456,8 +459,8 @@ pub struct Arrays<'a> {
 
 impl Arrays<'_> {
     /// Returns the arrays that hold trees.
-    fn trees(&self) -> DeviceTree {
-        DeviceTree {
+    fn trees(&self) -> StructureArrays {
+        StructureArrays {
             nodes: self.arrays.kd_nodes.clone(),
             parents: self.arrays.kd_parents.clone(),
             leaf_triangles: self.arrays.leaf_triangles.clone(),

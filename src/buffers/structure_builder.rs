@@ -5,7 +5,7 @@ use std::{collections::HashMap, sync::Arc};
 
 use super::{
     deform::DeformTarget,
-    device_trees::{Arrays, Geometries},
+    device_structures::{Arrays, Geometries},
 };
 use crate::{
     accel::{
@@ -22,7 +22,7 @@ use crate::{
 };
 
 /// Builds trees of geometries, one after the other.
-pub(super) struct TreeBuilder {
+pub(super) struct StructureBuilder {
     context: Arc<Context>,
     pub kernels: KdTreeBuilder,
     timer: Timer,
@@ -47,7 +47,7 @@ impl Deformed {
     }
 }
 
-impl TreeBuilder {
+impl StructureBuilder {
     /// `tree`: the options of a tree of a world.
     pub fn new(
         context: &Arc<Context>,
@@ -79,7 +79,7 @@ impl TreeBuilder {
         Ok(corners.len())
     }
 
-    /// Does what [`TreeBuilder::take`] does for a mesh in a pose. Only the pose is uploaded.
+    /// Does what [`StructureBuilder::take`] does for a mesh in a pose. Only the pose is uploaded.
     fn deform(
         &mut self,
         arrays: &Arrays,
