@@ -1,5 +1,6 @@
-//! Kd-trees of geometries that a device builds. The arrays of the scene hold the trees of all geometries, each in a
-//! region with some room. If a geometry is deformed, its tree alone is built again and put into its region.
+//! Kd-trees or grids of geometries that a device builds. The arrays of the scene hold the structures of all geometries,
+//! each in a region with some room. If a geometry is deformed, its structure alone is built again and put into its
+//! region.
 
 use std::{
     borrow::Cow,
@@ -11,54 +12,54 @@ use bytemuck::cast_slice;
 
 use super::{
     scene_arrays::{Content, Contents, SceneArrays},
-    structure_builder::{StructureBuilder, has_slabs},
-    two_level::{leaf_triangle, relocated},
+    structure_builder::{StructureBuilder, kind},
+    two_level::{leaf_triangle, relocated, relocated_cell},
 };
 use crate::{
     accel::{
         DeviceBuild,
-        bottom_level::BottomLevel,
-        kdtree::{KdTree, LazyTree, Traversal, TraversalLinks},
-        two_level::{GeometriesId, TwoLevel},
+        bottom_level::{BottomLevel, LazyStructure},
+        grid::Lattice,
+        kdtree::{Traversal, TraversalLinks},
+        two_level::{GeometriesId, GeometryPlace, TwoLevel},
     },
     gpu::{AnyBuffer, Buffer, BufferUse, Context, GpuError},
     layout::{
-        CornerSurface, KD_LEAF, KD_NODE_BYTES, KD_PAIR_SHIFT, KdBox, KdNode, KdRope, LeafTriangle, Plane, Slab,
-        StructurePlace, Triangle,
+        CornerSurface, GeometryConstants, GridCell, InstanceRow, KD_LEAF, KD_NODE_BYTES, KD_PAIR_SHIFT, KdBox, KdNode,
+        KdRope, LeafTriangle, Plane, Slab, StructurePlace, Triangle,
     },
-    passes::{
-        kdtree::BuiltTree,
-        structures::{BufferCopy, StructureArrays, Target},
-    },
+    passes::structures::{BufferCopy, Source, StructureArrays, StructureKind, Target},
     util::Shared,
     world::{Geometry, Instances, Poses},
 };
 
-/// A region is larger than its first tree by this part of it. The trees of a deformed mesh differ a little in size.
+/// A region is larger than its first structure by this part of it. The structures of a deformed mesh differ a little in
+/// size.
 const ROOM: usize = 4;
 
-/// The part of the arrays that holds a geometry's tree. Nodes begin and end at even indices.
+/// The part of the arrays that holds a geometry's structure.
 #[derive(Clone, Debug, Default)]
 struct Region {
-    nodes: Range<usize>,
+    /// Nodes of a kd-tree, or cells of a grid. They begin and end at even indices.
+    elements: Range<usize>,
     entries: Range<usize>,
     first_row: usize,
 }
 
 impl Region {
-    /// Returns the region behind `end`, with room for a tree of so many nodes and entries and a little more.
-    fn after(end: &Self, first_row: usize, (n_nodes, n_entries): (usize, usize)) -> Self {
+    /// Returns the region behind `end`, with room for a structure of so many elements and entries and a little more.
+    fn after(end: &Self, first_row: usize, (n_elements, n_entries): (usize, usize)) -> Self {
         let behind = |range: &Range<usize>, n: usize| range.end..range.end + (n + n / ROOM).next_multiple_of(2);
-        Self { nodes: behind(&end.nodes, n_nodes), entries: behind(&end.entries, n_entries), first_row }
+        Self { elements: behind(&end.elements, n_elements), entries: behind(&end.entries, n_entries), first_row }
     }
 
-    fn holds(&self, (n_nodes, n_entries): (usize, usize)) -> bool {
-        n_nodes <= self.nodes.len() && n_entries <= self.entries.len()
+    fn holds(&self, (n_elements, n_entries): (usize, usize)) -> bool {
+        n_elements <= self.elements.len() && n_entries <= self.entries.len()
     }
 
     fn place(&self) -> StructurePlace {
         let [first_element, first_entry, first_row] =
-            [self.nodes.start, self.entries.start, self.first_row].map(|n| n as u32);
+            [self.elements.start, self.entries.start, self.first_row].map(|n| n as u32);
         StructurePlace { first_element, first_entry, first_row }
     }
 }
@@ -66,35 +67,40 @@ impl Region {
 /// What a region holds.
 #[derive(Clone)]
 struct Shown {
-    /// The structure whose tree this is; none after a failure.
+    /// None after a failure.
     structure: Weak<BottomLevel>,
-    n_nodes: usize,
+    n_elements: usize,
+    /// The lattice of a grid that the device has built.
+    lattice: Option<Lattice>,
 }
 
-/// Where the trees of geometries are in the arrays, and what builds them again.
+/// Where the structures of geometries are in the arrays, and what builds them again.
 pub struct DeviceStructures {
     geometries_id: GeometriesId,
     regions: Vec<Region>,
     /// Behind all regions.
     end: Region,
-    has_slabs: bool,
+    kind: StructureKind,
     state: Mutex<State>,
 }
 
 struct State {
     /// What each region holds.
     shown: Vec<Shown>,
-    /// Builds trees again. It is kept from the first time on, with room for the largest geometry so far.
+    /// Builds structures again. It is kept from the first time on, with room for the largest geometry so far.
     builder: Option<StructureBuilder>,
 }
 
-/// Returns the contents with room for trees of so many nodes and entries, and for their links.
+/// Returns the contents with room for structures of so many elements and entries, and for their links.
 pub(super) fn with_room_for(
-    (n_nodes, n_entries): (usize, usize),
-    has_slabs: bool,
+    (n_elements, n_entries): (usize, usize),
+    kind: StructureKind,
     contents: Contents<'_>,
 ) -> Contents<'_> {
+    let (n_nodes, n_cells) = if kind == StructureKind::Grid { (0, n_elements) } else { (n_elements, 0) };
+    let has_slabs = kind == StructureKind::KdTree { has_slabs: true };
     Contents {
+        grid_cells: Content::Reserved(n_cells),
         kd_nodes: Content::Reserved(n_nodes),
         kd_parents: Content::Reserved(n_nodes / 2),
         leaf_triangles: Content::Reserved(n_entries),
@@ -128,29 +134,26 @@ impl<'a> Geometries<'a> {
         }
     }
 
-    fn lazy(&self) -> impl Iterator<Item = (usize, &'a LazyTree)> {
+    fn lazy(&self) -> impl Iterator<Item = (usize, LazyStructure<'a>)> {
         self.two.structures().iter().enumerate().filter_map(|(ix, it)| Some((ix, it.as_lazy()?)))
     }
 
-    /// The host's trees among those with these indices.
-    fn of_host(&self, ixs: impl IntoIterator<Item = usize>) -> Vec<(usize, &'a KdTree)> {
-        let of_host = |ix: usize| match &**self.structure(ix) {
-            BottomLevel::KdTree(tree) => Some((ix, tree)),
-            _ => None,
-        };
-        ixs.into_iter().filter_map(of_host).collect()
+    /// The host's structures among those with these indices.
+    fn of_host(&self, ixs: impl IntoIterator<Item = usize>) -> Vec<(usize, &'a BottomLevel)> {
+        let all = ixs.into_iter().map(|ix| (ix, &**self.structure(ix)));
+        all.filter(|(_, structure)| structure.as_lazy().is_none()).collect()
     }
 }
 
-/// The trees that a device has built for a new world, until they are in the arrays: the index of each geometry, and its
-/// tree.
-pub type NewStructures = Vec<(usize, BuiltTree, StructureArrays)>;
+/// The structures that a device has built for a new world, until they are in the arrays: the index of each geometry,
+/// its numbers of elements and entries, and its structure.
+pub type NewStructures = Vec<(usize, (usize, usize), StructureArrays)>;
 
 impl DeviceStructures {
-    /// Builds all trees that devices build. `triangles`: the stored triangles.
+    /// Builds all structures that devices build. `triangles`: the stored triangles.
     ///
     /// # Errors
-    /// The trees exceed the device's limits or memory, or a call fails.
+    /// The structures exceed the device's limits or memory, or a call fails.
     pub fn build(
         context: &Arc<Context>,
         triangles: &Buffer<Triangle>,
@@ -164,43 +167,54 @@ impl DeviceStructures {
             end.clone()
         };
         // Those of the host come first, so that they are uploaded together.
-        for (ix, tree) in all.of_host(0..regions.len()) {
-            regions[ix] = reserve(ix, (tree.nodes().len(), tree.leaf_triangles().len()));
+        for (ix, structure) in all.of_host(0..regions.len()) {
+            regions[ix] = reserve(ix, structure.sizes());
         }
-        let largest = all.lazy().max_by_key(|(_, tree)| tree.n_triangles());
-        let (_, largest) = largest.expect("a tree that devices build");
+        let largest = all.lazy().max_by_key(|(_, structure)| structure.n_triangles());
+        let (_, largest) = largest.expect("a structure that devices build");
         let builder = StructureBuilder::new(context, (largest.n_triangles(), 0), largest)?;
-        let (mut trees, mut reports) = (Vec::new(), Vec::new());
-        for (ix, tree) in all.lazy() {
-            let first_row = instances.ranges[ix].first_row as usize;
-            builder.kernels.take(triangles, (first_row, tree.n_triangles()))?;
-            let (built, sizes) = builder.build(tree.n_triangles(), tree, &mut reports)?;
-            regions[ix] = reserve(ix, sizes);
-            let copy = builder.kernels.copy_relocated(&built, &regions[ix].place(), BufferUse::Storage)?;
-            trees.push((ix, built, copy));
+        let mut shown = vec![Shown { structure: Weak::new(), n_elements: 0, lattice: None }; regions.len()];
+        let (mut structures, mut reports) = (Vec::new(), Vec::new());
+        for (ix, structure) in all.lazy() {
+            builder.take_stored(triangles, instances.ranges[ix])?;
+            let built = builder.build(structure, &mut reports)?;
+            regions[ix] = reserve(ix, built.sizes());
+            let copy = builder.copy_relocated(&built, &regions[ix].place())?;
+            shown[ix].lattice = built.lattice();
+            structures.push((ix, built.sizes(), copy));
         }
         if let Some(sum) = DeviceBuild::sum(reports) {
             two.note(sum);
         }
-        check("nodes of all kd-trees", end.nodes.end, u32::MAX / KD_NODE_BYTES)?;
+        let kind = kind(context, largest);
+        match kind {
+            StructureKind::KdTree { .. } => {
+                check("nodes of all kd-trees", end.elements.end, u32::MAX / KD_NODE_BYTES)?;
+            }
+            StructureKind::Grid => check("cells of all grids", end.elements.end, u32::MAX)?,
+        }
         check("entries of all leaves", end.entries.end, u32::MAX)?;
-        let shown = vec![Shown { structure: Weak::new(), n_nodes: 0 }; regions.len()];
         let made = Self {
             geometries_id: two.geometries_id().clone(),
             regions,
             end,
-            has_slabs: has_slabs(context, largest),
+            kind,
             state: Mutex::new(State { shown, builder: None }),
         };
-        Ok((made, trees))
+        Ok((made, structures))
     }
 
-    /// Returns the contents with room for the trees and their links.
+    /// The numbers of elements and entries for which there is room.
+    fn room(&self) -> (usize, usize) {
+        (self.end.elements.end, self.end.entries.end)
+    }
+
+    /// Returns the contents with room for the structures and their links.
     pub fn reserved<'a>(&self, contents: Contents<'a>) -> Contents<'a> {
-        with_room_for((self.end.nodes.end, self.end.entries.end), self.has_slabs, contents)
+        with_room_for(self.room(), self.kind, contents)
     }
 
-    /// Makes the arrays of all trees.
+    /// Makes the arrays of all structures.
     ///
     /// # Errors
     /// An array exceeds the device's limits, memory runs out, or a copy fails.
@@ -210,33 +224,34 @@ impl DeviceStructures {
         usage: BufferUse,
         (all, new): (&Geometries, NewStructures),
     ) -> Result<StructureArrays, GpuError> {
-        let [n_nodes, n_entries] = [self.end.nodes.end, self.end.entries.end];
-        let arrays = StructureArrays::new(context, (n_nodes, n_entries), self.has_slabs, usage)?;
+        let arrays = StructureArrays::new(context, self.kind, self.room(), usage)?;
         let mut state = self.lock();
         let of_host = all.of_host(0..self.regions.len());
         self.upload(context, &arrays, (all, &of_host, &[]))?;
-        for (ix, tree) in of_host {
-            state.shown[ix] = Shown::of(all.structure(ix), tree.nodes().len());
+        for (ix, structure) in of_host {
+            state.shown[ix].show(all.structure(ix), structure.sizes().0);
         }
-        for (ix, built, tree) in new {
-            let sizes = (built.n_nodes as usize, built.n_entries as usize);
-            let target = Target { trees: &arrays, place: self.regions[ix].place(), more: &[] };
-            tree.copy_to(context, sizes, &target)?;
-            state.shown[ix] = Shown::of(all.structure(ix), sizes.0);
+        for (ix, sizes, structure) in new {
+            let target = Target { arrays: &arrays, place: self.regions[ix].place(), more: &[] };
+            structure.copy_to(context, sizes, &target)?;
+            state.shown[ix].show(all.structure(ix), sizes.0);
         }
         drop(state);
         Ok(arrays)
     }
 
-    /// The place of each geometry's root among all nodes.
-    pub fn roots(&self) -> Vec<usize> {
-        self.regions.iter().map(|region| region.nodes.start).collect()
+    /// The places of all structures that are in the arrays now.
+    pub fn places(&self) -> Vec<GeometryPlace> {
+        let shown = &self.lock().shown;
+        let place =
+            |(region, shown): (&Region, &Shown)| GeometryPlace { place: region.place(), lattice: shown.lattice };
+        self.regions.iter().zip(shown).map(place).collect()
     }
 
-    /// Builds the trees of geometries that have changed since the last time, and puts them, their triangles and what
-    /// textures need at the corners into the arrays. Commands that were submitted before still see the previous ones.
-    /// Returns whether that was possible. It is not if a tree has no room, if the geometries are not those of the
-    /// world before, or if something has changed and `others_read` the arrays.
+    /// Builds the structures of geometries that have changed since the last time, and puts them, their triangles and
+    /// what textures need at the corners into the arrays. Commands that were submitted before still see the previous
+    /// ones. Returns whether that was possible. It is not if a structure has no room, if the geometries are not those
+    /// of the world before, or if something has changed and `others_read` the arrays.
     ///
     /// # Errors
     /// Memory runs out, or a call fails. Those geometries that have not changed then change at the next call.
@@ -257,20 +272,23 @@ impl DeviceStructures {
         }
         let mut reports = Vec::new();
         for ix in changed {
-            let placed = match &**all.structure(ix) {
-                BottomLevel::LazyTree(tree) => {
-                    let Some(builder) = state.builder_for(context, tree, arrays.n_corner_words())? else {
+            let placed = match all.structure(ix).as_lazy() {
+                Some(structure) => {
+                    let Some(builder) = state.builder_for(context, structure, arrays.n_corner_words())? else {
                         return Ok(false);
                     };
-                    self.rebuild(builder, arrays, (all, ix, tree), &mut reports)?
+                    self.rebuild(builder, arrays, (all, ix, structure), &mut reports)?
                 }
-                _ => self.replace(context, arrays, (all, ix))?,
+                None => self.replace(context, arrays, (all, ix))?,
             };
-            let Some(n_nodes) = placed else {
-                tracing::info!("the kd-tree of geometry {ix} has outgrown its room, so everything is uploaded again");
+            let Some(placed) = placed else {
+                tracing::info!(
+                    "the {} of geometry {ix} has outgrown its room, so everything is uploaded again",
+                    self.name()
+                );
                 return Ok(false);
             };
-            state.shown[ix] = Shown::of(all.structure(ix), n_nodes);
+            state.shown[ix] = placed;
         }
         if let Some(sum) = DeviceBuild::sum(reports) {
             all.two.note(sum);
@@ -278,78 +296,115 @@ impl DeviceStructures {
         Ok(true)
     }
 
-    /// Builds a tree on the device and puts it into its region. Returns the number of its nodes; none if there was no
-    /// room.
+    /// The name of a structure in a sentence.
+    fn name(&self) -> &'static str {
+        if self.kind == StructureKind::Grid { "grid" } else { "kd-tree" }
+    }
+
+    /// Builds a structure on the device and puts it into its region. Returns what the region holds then; none if there
+    /// was no room.
     fn rebuild(
         &self,
         builder: &mut StructureBuilder,
         arrays: &Arrays,
-        (all, ix, tree): (&Geometries, usize, &LazyTree),
+        (all, ix, structure): (&Geometries, usize, LazyStructure),
         reports: &mut Vec<DeviceBuild>,
-    ) -> Result<Option<usize>, GpuError> {
+    ) -> Result<Option<Shown>, GpuError> {
         let region = &self.regions[ix];
         let n_words = builder.take(arrays, (all, ix))?;
-        let (built, sizes) = builder.build(tree.n_triangles(), tree, reports)?;
-        if !region.holds(sizes) {
+        let built = builder.build(structure, reports)?;
+        if !region.holds(built.sizes()) {
             return Ok(None);
         }
-        let triangles = (builder.kernels.triangles(), tree.n_triangles());
-        let more = arrays.copies(triangles, (&builder.corners, n_words), region);
-        builder.kernels.place(&built, &Target { trees: &arrays.trees(), place: region.place(), more: &more })?;
-        Ok(Some(sizes.0))
+        let mut more =
+            arrays.copies((builder.triangles(), structure.n_triangles()), (&builder.corners, n_words), region);
+        let placed = Shown {
+            structure: Arc::downgrade(all.structure(ix)),
+            n_elements: built.sizes().0,
+            lattice: built.lattice(),
+        };
+        more.extend(self.constants(arrays, (all, ix), placed.lattice));
+        builder.place(&built, &Target { arrays: &arrays.structures(), place: region.place(), more: &more })?;
+        Ok(Some(placed))
     }
 
-    /// Uploads a tree that the host has built. Returns the number of its nodes; none if there was no room.
+    /// Returns the copies of a grid's lattice to the rows of the geometry, in which searches find it. They come
+    /// together with the grid, so that no search takes one for another. A kd-tree has none.
+    fn constants(
+        &self,
+        arrays: &Arrays,
+        (all, ix): (&Geometries, usize),
+        lattice: Option<Lattice>,
+    ) -> impl Iterator<Item = BufferCopy> {
+        let constants = all.structure(ix).geometry_constants(&self.regions[ix].place(), lattice.as_ref());
+        let begin = arrays.geometries_begin * size_of::<InstanceRow>() + ix * size_of::<GeometryConstants>();
+        let copy = move |rows: &Buffer<InstanceRow>| BufferCopy {
+            from: Source::Words(cast_slice(&[constants]).to_vec()),
+            to: (rows.any().clone(), begin),
+        };
+        let rows = [&arrays.arrays.instance_rows, arrays.rows_before].map(copy);
+        rows.into_iter().take(if self.kind == StructureKind::Grid { 2 } else { 0 })
+    }
+
+    /// Uploads a structure that the host has built. Returns what the region holds then; none if there was no room.
     fn replace(
         &self,
         context: &Arc<Context>,
         arrays: &Arrays,
         (all, ix): (&Geometries, usize),
-    ) -> Result<Option<usize>, GpuError> {
-        let (of_host, region) = (all.of_host([ix]), &self.regions[ix]);
-        let sizes = of_host.first().map(|(_, tree)| (tree.nodes().len(), tree.leaf_triangles().len()));
-        let Some(sizes) = sizes.filter(|sizes| region.holds(*sizes)) else { return Ok(None) };
+    ) -> Result<Option<Shown>, GpuError> {
+        let (structure, region) = (all.structure(ix), &self.regions[ix]);
+        if !region.holds(structure.sizes()) {
+            return Ok(None);
+        }
         let own = all.triangles(ix);
         let triangles = Buffer::with(context, "new triangles", &own, BufferUse::Storage)?;
         let own_corners = arrays.corners_of(region.first_row, own.len());
         let corners = Buffer::with(context, "new corners", own_corners, BufferUse::Storage)?;
-        let more = arrays.copies((&triangles, own.len()), (&corners, own_corners.len()), region);
-        self.upload(context, &arrays.trees(), (all, &of_host, &more))?;
-        Ok(Some(sizes.0))
+        let mut more = arrays.copies((&triangles, own.len()), (&corners, own_corners.len()), region);
+        more.extend(self.constants(arrays, (all, ix), None));
+        self.upload(context, &arrays.structures(), (all, &[(ix, &**structure)], &more))?;
+        let n_elements = structure.sizes().0;
+        Ok(Some(Shown { structure: Arc::downgrade(structure), n_elements, lattice: None }))
     }
 
-    /// Uploads trees that the host has built, all at once. `trees`: with the indices of their geometries, whose regions
-    /// follow one another. `more`: what is copied together with them.
+    /// Uploads structures that the host has built, all at once. `structures`: with the indices of their geometries,
+    /// whose regions follow one another. `more`: what is copied together with them.
     fn upload(
         &self,
         context: &Arc<Context>,
         arrays: &StructureArrays,
-        (all, trees, more): (&Geometries, &[(usize, &KdTree)], &[BufferCopy]),
+        (all, structures, more): (&Geometries, &[(usize, &BottomLevel)], &[BufferCopy]),
     ) -> Result<(), GpuError> {
-        let Some(&(first, _)) = trees.first() else { return Ok(()) };
+        let Some(&(first, _)) = structures.first() else { return Ok(()) };
         let begin = &self.regions[first];
-        let (mut nodes, mut parents, mut slabs) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut nodes, mut parents, mut slabs, mut cells) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let (mut entries, mut planes) = (Vec::new(), Vec::new());
-        for &(ix, tree) in trees {
+        for &(ix, structure) in structures {
             let (region, place) = (&self.regions[ix], self.regions[ix].place());
-            let [n_nodes, n_entries] =
-                [region.nodes.start - begin.nodes.start, region.entries.start - begin.entries.start];
-            nodes.resize(n_nodes, KdNode::default());
-            nodes.extend(tree.nodes().iter().map(|node| relocated(*node, &place)));
-            parents.resize(n_nodes / 2, 0);
-            parents.extend(tree.parents().iter().map(|parent| parent + place.first_element));
+            let [n_elements, n_entries] =
+                [region.elements.start - begin.elements.start, region.entries.start - begin.entries.start];
+            if let Some(grid) = structure.as_grid() {
+                cells.resize(n_elements, GridCell::default());
+                cells.extend((0..grid.cells().len()).map(|ix| relocated_cell(grid, ix, &place)));
+            } else {
+                nodes.resize(n_elements, KdNode::default());
+                nodes.extend(structure.nodes().iter().map(|node| relocated(*node, &place)));
+                parents.resize(n_elements / 2, 0);
+                parents.extend(structure.parents().iter().map(|parent| parent + place.first_element));
+            }
             entries.resize(n_entries, LeafTriangle::default());
             let triangles = all.triangles(ix);
             let entry = |&triangle_ix: &u32| LeafTriangle {
                 triangle_ix: place.first_row + triangle_ix,
                 ..leaf_triangle(&triangles, triangle_ix)
             };
-            entries.extend(tree.leaf_triangles().iter().map(entry));
+            entries.extend(structure.leaf_triangles().iter().map(entry));
             planes.resize(n_entries, Plane::default());
-            planes.extend(tree.leaf_planes());
-            if self.has_slabs {
-                slabs.resize(n_nodes, Slab::default());
-                slabs.extend(tree.slabs());
+            planes.extend(structure.leaf_planes());
+            if self.kind == (StructureKind::KdTree { has_slabs: true }) {
+                slabs.resize(n_elements, Slab::default());
+                slabs.extend(structure.slabs());
                 slabs.resize(nodes.len(), Slab::default());
             }
         }
@@ -360,9 +415,10 @@ impl DeviceStructures {
             leaf_triangles: Buffer::with(context, "new leaf_triangles", &entries, usage)?,
             leaf_planes: Buffer::with(context, "new leaf_planes", &planes, usage)?,
             slabs: Buffer::with(context, "new slabs", &slabs, usage)?,
+            cells: Buffer::with(context, "new cells", &cells, usage)?,
         };
-        let target = Target { trees: arrays, place: begin.place(), more };
-        new.copy_to(context, (nodes.len(), entries.len()), &target)
+        let target = Target { arrays, place: begin.place(), more };
+        new.copy_to(context, (nodes.len() + cells.len(), entries.len()), &target)
     }
 
     /// Returns what a traversal reads beside the trees, in their regions.
@@ -380,22 +436,22 @@ impl DeviceStructures {
             return Ok(all);
         }
         if traversal.needs_boxes() {
-            all.boxes.resize(self.end.nodes.end, KdBox::default());
+            all.boxes.resize(self.end.elements.end, KdBox::default());
         }
         if traversal.needs_ropes() {
-            all.ropes.resize(6 * self.end.nodes.end, KdRope::default());
+            all.ropes.resize(6 * self.end.elements.end, KdRope::default());
         }
         let state = self.lock();
         for ((region, shown), structure) in self.regions.iter().zip(&state.shown).zip(two.structures()) {
-            let first = region.nodes.start;
+            let first = region.elements.start;
             let TraversalLinks { boxes, mut ropes } = match structure.as_lazy() {
-                Some(tree) => {
-                    let mut nodes = nodes.download_range(first, shown.n_nodes)?;
+                Some(LazyStructure::KdTree(tree)) => {
+                    let mut nodes = nodes.download_range(first, shown.n_elements)?;
                     let splits = nodes.iter_mut().filter(|node| node.axis_and_child & KD_LEAF == 0);
                     splits.for_each(|node| node.axis_and_child -= (first as u32 / 2) << KD_PAIR_SHIFT);
                     tree.links_of(nodes, traversal)
                 }
-                None => structure.as_kdtree().map(|it| TraversalLinks::new(it, traversal)).unwrap_or_default(),
+                _ => structure.as_kdtree().map(|it| TraversalLinks::new(it, traversal)).unwrap_or_default(),
             };
             // 0 leads out of the geometry.
             ropes.iter_mut().filter(|rope| rope.node_ix != 0).for_each(|rope| rope.node_ix += first as u32);
@@ -416,8 +472,8 @@ impl DeviceStructures {
 }
 
 impl Shown {
-    fn of(structure: &Arc<BottomLevel>, n_nodes: usize) -> Self {
-        Self { structure: Arc::downgrade(structure), n_nodes }
+    fn show(&mut self, structure: &Arc<BottomLevel>, n_elements: usize) {
+        (self.structure, self.n_elements) = (Arc::downgrade(structure), n_elements);
     }
 
     fn is_of(&self, structure: &Arc<BottomLevel>) -> bool {
@@ -426,20 +482,20 @@ impl Shown {
 }
 
 impl State {
-    /// Returns what builds a tree again; none if the device has too little room. It is made if there is none, or none
-    /// large enough.
+    /// Returns what builds a structure again; none if the device has too little room. It is made if there is none, or
+    /// none large enough.
     fn builder_for(
         &mut self,
         context: &Arc<Context>,
-        tree: &LazyTree,
+        structure: LazyStructure,
         n_corner_words: usize,
     ) -> Result<Option<&mut StructureBuilder>, GpuError> {
-        let n_triangles = tree.n_triangles();
+        let n_triangles = structure.n_triangles();
         let sizes = (n_triangles, n_triangles * n_corner_words);
-        let is_enough = |it: &StructureBuilder| it.kernels.triangles().len() >= sizes.0 && it.corners.len() >= sizes.1;
+        let is_enough = |it: &StructureBuilder| it.triangles().len() >= sizes.0 && it.corners.len() >= sizes.1;
         if !self.builder.as_ref().is_some_and(is_enough) {
             self.builder = None; // its memory serves the larger one
-            match StructureBuilder::new(context, sizes, tree) {
+            match StructureBuilder::new(context, sizes, structure) {
                 Err(error) if error.is_lack_of_room() => return Ok(None),
                 made => self.builder = Some(made?),
             }
@@ -451,6 +507,9 @@ impl State {
 /// The scene's arrays, and what textures need at the corners of all stored triangles.
 pub struct Arrays<'a> {
     pub arrays: &'a SceneArrays,
+    /// The `instance_rows` that those of `arrays` succeed, and where the geometries' rows begin in both.
+    pub rows_before: &'a Buffer<InstanceRow>,
+    pub geometries_begin: usize,
     /// Tangents and colours; none if the scene has none.
     pub corners: Option<&'a Shared<Vec<[CornerSurface; 3]>>>,
     /// Where the corners are in `texture_words`.
@@ -458,14 +517,15 @@ pub struct Arrays<'a> {
 }
 
 impl Arrays<'_> {
-    /// Returns the arrays that hold trees.
-    fn trees(&self) -> StructureArrays {
+    /// Returns the arrays that hold structures.
+    fn structures(&self) -> StructureArrays {
         StructureArrays {
             nodes: self.arrays.kd_nodes.clone(),
             parents: self.arrays.kd_parents.clone(),
             leaf_triangles: self.arrays.leaf_triangles.clone(),
             leaf_planes: self.arrays.leaf_planes.clone(),
             slabs: self.arrays.kd_slabs.clone(),
+            cells: self.arrays.grid_cells.clone(),
         }
     }
 
@@ -490,14 +550,13 @@ impl Arrays<'_> {
         (triangles, n_triangles): (&Buffer<Triangle>, usize),
         (corners, n_words): (&Buffer<u32>, usize),
         region: &Region,
-    ) -> [BufferCopy; 2] {
+    ) -> Vec<BufferCopy> {
         let copy = |from: &Arc<AnyBuffer>, to: &Arc<AnyBuffer>, begin: usize, bytes: usize| BufferCopy {
-            from: from.clone(),
+            from: Source::Buffer(from.clone(), bytes),
             to: (to.clone(), begin),
-            bytes,
         };
         let bytes_of = |n_triangles: usize| n_triangles * size_of::<Triangle>();
-        [
+        vec![
             copy(triangles.any(), self.arrays.triangles.any(), bytes_of(region.first_row), bytes_of(n_triangles)),
             copy(
                 corners.any(),

@@ -13,7 +13,7 @@
 //! resources       all of these, with the frame's descriptor set
 //! grid            the build of a grid
 //! kdtree          the build of a kd-tree
-//! device_structures   the kd-trees of geometries that the device builds, and builds again
+//! device_structures   the kd-trees or grids of geometries that the device builds, and builds again
 //! kd_slabs        the slabs of a kd-tree, while they are computed
 //! deform          a mesh that is deformed
 //! cast            given rays, their hits, and the cast's descriptor set

@@ -5,7 +5,11 @@ use bytemuck::{Pod, cast_slice};
 use rayon::prelude::*;
 
 use crate::{
-    accel::{bottom_level::BottomLevel, two_level::TwoLevel},
+    accel::{
+        bottom_level::BottomLevel,
+        grid::Grid,
+        two_level::{GeometryPlace, TwoLevel},
+    },
     gpu::GpuError,
     layout::{
         AccelConstants, GEOMETRY_ROWS, GridCell, INSTANCE_ROWS, InstanceRow, KD_LEAF, KD_NODE_BYTES, KD_PAIR_SHIFT,
@@ -118,11 +122,13 @@ impl<'a> Joined<'a> {
 
     pub fn write_cells(&self, first: usize, chunk: &mut [GridCell]) {
         Self::write(&self.first_cells, first, chunk, |geometry_ix, ix| {
+            let place = StructurePlace {
+                first_element: self.first_cells[geometry_ix] as u32,
+                first_entry: self.first_entries[geometry_ix] as u32,
+                first_row: self.first_rows[geometry_ix],
+            };
             let grid = self.structure(geometry_ix).as_grid().expect("only grids have cells");
-            let GridCell { first, count } = grid.cells()[ix];
-            let is_block = grid.n_levels() == 2 && ix < grid.lattice().n_cubes();
-            let begins = if is_block { &self.first_cells } else { &self.first_entries };
-            GridCell { first: first + begins[geometry_ix] as u32, count }
+            relocated_cell(grid, ix, &place)
         });
     }
 
@@ -158,17 +164,24 @@ pub fn relocated(KdNode { split_or_first, axis_and_child }: KdNode, place: &Stru
     }
 }
 
+/// Returns a grid's cell as it is among those of several grids. Twin of glsl/passes/grid_relocate.comp.
+pub fn relocated_cell(grid: &Grid, ix: usize, place: &StructurePlace) -> GridCell {
+    let GridCell { first, count } = grid.cells()[ix];
+    let is_block = grid.n_levels() == 2 && ix < grid.lattice().n_cubes();
+    GridCell { first: first + if is_block { place.first_element } else { place.first_entry }, count }
+}
+
 /// Returns a leaf's entry of a stored triangle.
 pub fn leaf_triangle(stored: &[Triangle], triangle_ix: u32) -> LeafTriangle {
     let Triangle { v0, v1, v2, .. } = stored[triangle_ix as usize];
     LeafTriangle { v0, triangle_ix, v1, v2, ..LeafTriangle::default() }
 }
 
-/// Returns the rows of `instance_rows`, and notes where its parts begin. `roots`: the index of each tree's root.
+/// Returns the rows of `instance_rows`, and notes where its parts begin. `places`: of the structures.
 pub fn instance_rows(
     two: &TwoLevel,
     instances: &Instances,
-    roots: &[usize],
+    places: &[GeometryPlace],
     constants: &mut AccelConstants,
 ) -> Vec<InstanceRow> {
     let firsts: Vec<u32> = instances.list.iter().map(|it| it.first_triangle).collect();
@@ -182,7 +195,7 @@ pub fn instance_rows(
     let mut rows: Vec<InstanceRow> = cast_slice(&instances.list).to_vec();
     debug_assert_eq!(rows.len(), INSTANCE_ROWS as usize * instances.list.len());
     constants.geometries_begin = rows.len() as u32;
-    rows.extend_from_slice(cast_slice(&two.geometry_constants(roots)));
+    rows.extend_from_slice(cast_slice(&two.geometry_constants(places)));
     constants.top_nodes_begin = rows.len() as u32;
     debug_assert_eq!(
         constants.top_nodes_begin - constants.geometries_begin,

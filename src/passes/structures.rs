@@ -2,48 +2,92 @@
 
 use std::{iter, sync::Arc};
 
+use bytemuck::Pod;
+
 use crate::{
     gpu::{Access, AnyBuffer, Buffer, BufferUse, CommandBuffer, Commands, Context, GpuError},
-    layout::{KdNode, LeafTriangle, Plane, Slab, StructurePlace},
+    layout::{GridCell, KdNode, LeafTriangle, Plane, Slab, StructurePlace},
 };
 
-/// Arrays that hold a tree, or several.
+/// The kind of the structures in arrays. All are of one kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StructureKind {
+    /// Kd-trees, whose elements are nodes.
+    KdTree {
+        /// Whether the nodes have slabs.
+        has_slabs: bool,
+    },
+    /// Grids, whose elements are cells.
+    Grid,
+}
+
+/// Arrays that hold a structure, or several. Those of the other kind are empty.
 #[derive(Clone)]
 pub struct StructureArrays {
-    /// The nodes.
+    /// The nodes of kd-trees.
     pub nodes: Buffer<KdNode>,
     /// The parent of each pair of nodes.
     pub parents: Buffer<u32>,
-    /// The triangles of the leaves, with their indices.
+    /// A slab for each node; empty for trees without slabs.
+    pub slabs: Buffer<Slab>,
+    /// The cells of grids.
+    pub cells: Buffer<GridCell>,
+    /// The triangles of the leaves or cells, with their indices.
     pub leaf_triangles: Buffer<LeafTriangle>,
     /// The plane of each of `leaf_triangles`.
     pub leaf_planes: Buffer<Plane>,
-    /// A slab for each node; empty for a tree without slabs.
-    pub slabs: Buffer<Slab>,
 }
 
 impl StructureArrays {
-    /// Makes arrays for so many nodes and entries, of which none is defined.
+    /// Makes arrays for so many elements and entries, of which none is defined.
     ///
     /// # Errors
     /// An array exceeds the device's limits, or memory runs out.
     pub fn new(
         context: &Arc<Context>,
-        (n_nodes, n_entries): (usize, usize),
-        has_slabs: bool,
+        kind: StructureKind,
+        (n_elements, n_entries): (usize, usize),
         usage: BufferUse,
     ) -> Result<Self, GpuError> {
+        let [n_nodes, n_slabs, n_cells] = match kind {
+            StructureKind::KdTree { has_slabs: true } => [n_elements, n_elements, 0],
+            StructureKind::KdTree { has_slabs: false } => [n_elements, 0, 0],
+            StructureKind::Grid => [0, 0, n_elements],
+        };
         Ok(Self {
             nodes: Buffer::new(context, "kd_nodes", n_nodes, usage)?,
             parents: Buffer::new(context, "kd_parents", n_nodes / 2, usage)?,
+            slabs: Buffer::new(context, "kd_slabs", n_slabs, usage)?,
+            cells: Buffer::new(context, "grid_cells", n_cells, usage)?,
             leaf_triangles: Buffer::new(context, "leaf_triangles", n_entries, usage)?,
             leaf_planes: Buffer::new(context, "leaf_planes", n_entries, usage)?,
-            slabs: Buffer::new(context, "kd_slabs", if has_slabs { n_nodes } else { 0 }, usage)?,
         })
     }
 
-    /// Copies trees of so many nodes and entries, which have the indices of the target already, to their place there.
-    /// Does not wait for the device, as [`KdTreeBuilder::place`](super::kdtree::KdTreeBuilder::place).
+    /// Copies a structure at the beginning of these arrays to new ones of its size, and waits for the device.
+    ///
+    /// # Errors
+    /// An array exceeds the device's limits, memory runs out, or a call fails.
+    pub fn copied(
+        &self,
+        context: &Arc<Context>,
+        kind: StructureKind,
+        sizes: (usize, usize),
+        usage: BufferUse,
+    ) -> Result<Self, GpuError> {
+        let to = Self::new(context, kind, sizes, usage)?;
+        context.run("structure_copy", |commands| {
+            commands.barrier(Access::ComputeWrite, Access::TransferRead); // the build's arrays
+            let target = Target { arrays: &to, place: StructurePlace::default(), more: &[] };
+            target.record(commands, self, sizes);
+            commands.barrier(Access::TransferWrite, Access::AnyUse); // the copies
+        })?;
+        Ok(to)
+    }
+
+    /// Copies a structure at the beginning of these arrays, which has the indices of the target already, to its place
+    /// there. Does not wait for the device: the copies come after all commands that were submitted before, and before
+    /// all later ones.
     ///
     /// # Errors
     /// Out of memory; a Vulkan call fails. Nothing has been copied then.
@@ -51,24 +95,49 @@ impl StructureArrays {
     /// # Panics
     /// The arrays have no room there.
     pub fn copy_to(&self, context: &Arc<Context>, sizes: (usize, usize), target: &Target) -> Result<(), GpuError> {
-        let from = self.sizes(0, 0).map(|(buffer, _)| buffer);
-        submit(context, "kdtree_copy", |commands| target.record(commands, from, sizes))
+        submit(context, "structure_copy", |commands| target.record(commands, self, sizes))
     }
 
-    /// Returns the arrays, each with the number of bytes of a tree of so many nodes and entries.
-    pub(super) fn sizes(&self, n_nodes: usize, n_entries: usize) -> [(&Arc<AnyBuffer>, usize); 5] {
-        let n_slabs = if self.slabs.is_empty() { 0 } else { n_nodes };
+    /// Does what [`StructureArrays::copy_to`] does, after kernels that give the structure the indices of its place.
+    ///
+    /// # Errors
+    /// Fails as [`StructureArrays::copy_to`].
+    ///
+    /// # Panics
+    /// The arrays have no room there.
+    pub(super) fn place(
+        &self,
+        context: &Arc<Context>,
+        sizes: (usize, usize),
+        (target, relocate): (&Target, impl FnOnce(&Commands)),
+    ) -> Result<(), GpuError> {
+        submit(context, "structure_place", |commands| {
+            relocate(commands);
+            commands.barrier(Access::ComputeWrite, Access::TransferRead); // the relocated arrays
+            target.record(commands, self, sizes);
+        })
+    }
+
+    /// Returns the arrays, each with the number of bytes of a structure of so many elements and entries.
+    fn sizes(&self, (n_elements, n_entries): (usize, usize)) -> [(&Arc<AnyBuffer>, usize); 6] {
+        fn sized<T: Pod>(buffer: &Buffer<T>, n: usize) -> (&Arc<AnyBuffer>, usize) {
+            (buffer.any(), if buffer.is_empty() { 0 } else { n * size_of::<T>() })
+        }
         [
-            (self.nodes.any(), n_nodes * size_of::<KdNode>()),
-            (self.parents.any(), n_nodes / 2 * size_of::<u32>()),
-            (self.leaf_triangles.any(), n_entries * size_of::<LeafTriangle>()),
-            (self.leaf_planes.any(), n_entries * size_of::<Plane>()),
-            (self.slabs.any(), n_slabs * size_of::<Slab>()),
+            sized(&self.nodes, n_elements),
+            sized(&self.parents, n_elements / 2),
+            sized(&self.slabs, n_elements),
+            sized(&self.cells, n_elements),
+            sized(&self.leaf_triangles, n_entries),
+            sized(&self.leaf_planes, n_entries),
         ]
     }
 }
 
 /// Submits commands between whatever else uses their buffers, without a wait.
+///
+/// # Errors
+/// Out of memory; a Vulkan call fails.
 pub fn submit(context: &Arc<Context>, name: &str, record: impl FnOnce(&Commands)) -> Result<(), GpuError> {
     let commands = CommandBuffer::record(context, name, None, |commands| {
         commands.barrier(Access::AnyUse, Access::AnyUse); // arrays of builds and frames before
@@ -78,36 +147,53 @@ pub fn submit(context: &Arc<Context>, name: &str, record: impl FnOnce(&Commands)
     context.submit(vec![commands]).map(drop)
 }
 
-/// Arrays that hold the trees of several geometries, one after the other, and the place of one of them.
+/// Arrays that hold the structures of several geometries, one after the other, and the place of one of them.
 pub struct Target<'a> {
-    /// The arrays of trees.
-    pub trees: &'a StructureArrays,
+    /// The arrays of structures.
+    pub arrays: &'a StructureArrays,
     /// Where the geometry's parts of the arrays begin.
     pub place: StructurePlace,
-    /// What is copied together with the tree.
+    /// What is copied together with the structure.
     pub more: &'a [BufferCopy],
 }
 
-/// A copy of the first bytes of a buffer to another one, from the byte `begin` of that one on.
+/// A copy to a buffer.
 pub struct BufferCopy {
     /// The source.
-    pub from: Arc<AnyBuffer>,
+    pub from: Source,
     /// The destination, and the byte at which the copy begins.
     pub to: (Arc<AnyBuffer>, usize),
-    /// The number of bytes.
-    pub bytes: usize,
+}
+
+/// The source of a copy.
+pub enum Source {
+    /// The first bytes of a buffer.
+    Buffer(Arc<AnyBuffer>, usize),
+    /// Words that the host has.
+    Words(Vec<u32>),
+}
+
+impl BufferCopy {
+    fn record(&self, commands: &Commands) {
+        let to = (&self.to.0, self.to.1 as u64);
+        match &self.from {
+            Source::Buffer(_, 0) => {}
+            Source::Buffer(from, bytes) => commands.copy_buffer_range((from, 0), to, *bytes as u64),
+            Source::Words(words) => commands.update_buffer_at(to, words),
+        }
+    }
 }
 
 impl Target<'_> {
-    /// Records the copies of the arrays of a tree of so many nodes and entries.
-    pub(super) fn record(&self, commands: &Commands, from: [&Arc<AnyBuffer>; 5], (n_nodes, n_entries): (usize, usize)) {
-        let sizes = self.trees.sizes(n_nodes, n_entries);
-        let begins = self.trees.sizes(self.place.first_element as usize, self.place.first_entry as usize);
+    /// Records the copies of the arrays of a structure of so many elements and entries.
+    fn record(&self, commands: &Commands, from: &StructureArrays, sizes: (usize, usize)) {
+        let begins = self.arrays.sizes((self.place.first_element as usize, self.place.first_entry as usize));
+        let to = iter::zip(self.arrays.sizes(sizes), begins);
         let arrays =
-            iter::zip(from, sizes).zip(begins).map(|((from, (to, bytes)), (_, begin))| (from, to, begin, bytes));
-        let more = self.more.iter().map(|it| (&it.from, &it.to.0, it.to.1, it.bytes));
-        for (from, to, begin, bytes) in arrays.chain(more).filter(|(.., bytes)| *bytes > 0) {
+            iter::zip(from.sizes(sizes), to).map(|((from, _), ((to, bytes), (_, begin)))| (from, to, begin, bytes));
+        for (from, to, begin, bytes) in arrays.filter(|(.., bytes)| *bytes > 0) {
             commands.copy_buffer_range((from, 0), (to, begin as u64), bytes as u64);
         }
+        self.more.iter().for_each(|copy| copy.record(commands));
     }
 }

@@ -1,6 +1,6 @@
 //! Builds a kd-tree on a device, in buffers that are allocated once.
 
-use std::{iter, sync::Arc};
+use std::sync::Arc;
 
 use super::KdTreePasses;
 use crate::{
@@ -9,12 +9,12 @@ use crate::{
         kdtree::{BuildOptions, KdArrays, Statistics},
     },
     buffers::{KdTreeBuffers, KdTreeRoom, TreeBuffers},
-    gpu::{Access, AnyBuffer, Buffer, BufferUse, CommandBuffer, Commands, Context, GpuError, Timer, TimerRow},
+    gpu::{Buffer, BufferUse, CommandBuffer, Commands, Context, GpuError, Timer, TimerRow},
     layout::{KD_MOST_ENTRIES, KdBuild, LeafTriangle, Slab, StructurePlace, Triangle},
     passes::{
         device_build,
         kd_slabs::SlabBuilder,
-        structures::{StructureArrays, Target, submit},
+        structures::{StructureArrays, StructureKind, Target, submit},
         then,
     },
 };
@@ -46,6 +46,8 @@ pub struct KdTreeBuilder {
     passes: KdTreePasses,
     buffers: KdTreeBuffers,
     slabs: Option<SlabStage>,
+    /// The finished tree, at the beginning.
+    arrays: StructureArrays,
 }
 
 /// The last stage of a build of a tree with slabs.
@@ -89,6 +91,16 @@ pub struct BuiltTree {
 }
 
 impl BuiltTree {
+    /// The numbers of nodes and of entries.
+    pub fn sizes(&self) -> (usize, usize) {
+        (self.n_nodes as usize, self.n_entries as usize)
+    }
+
+    /// The kind of the tree's arrays.
+    pub fn kind(&self) -> StructureKind {
+        StructureKind::KdTree { has_slabs: self.has_slabs }
+    }
+
     /// Returns what is known of the tree's sizes, and the times of its build, by kernel.
     pub fn report(&self, n_triangles: usize) -> DeviceBuild {
         let sizes = [self.n_nodes, self.n_entries].map(u64::from);
@@ -113,8 +125,18 @@ impl KdTreeBuilder {
         }
         let bindings = KdTreeBuffers::bindings(context)?;
         let buffers = KdTreeBuffers::new(context, &bindings, triangles, options.room, &options.tree)?;
+        let slabs = options.tree.slabs.then(|| SlabStage::new(context, &buffers)).transpose()?;
+        let empty = StructureArrays::new(context, StructureKind::Grid, (0, 0), BufferUse::Storage)?;
         Ok(Self {
-            slabs: options.tree.slabs.then(|| SlabStage::new(context, &buffers)).transpose()?,
+            arrays: StructureArrays {
+                nodes: buffers.nodes.clone(),
+                parents: buffers.parents.clone(),
+                leaf_triangles: buffers.leaf_triangles.clone(),
+                leaf_planes: buffers.leaf_planes.clone(),
+                slabs: slabs.as_ref().map_or(empty.slabs, |stage| stage.slabs.clone()),
+                cells: empty.cells,
+            },
+            slabs,
             buffers,
             passes: KdTreePasses::new(context, &bindings)?,
             triangles: triangles.clone(),
@@ -156,27 +178,6 @@ impl KdTreeBuilder {
     /// There are more than [`KdTreeBuilder::capacity`].
     pub fn upload(&self, triangles: &[Triangle]) -> Result<(), GpuError> {
         self.triangles.upload_at(0, triangles)
-    }
-
-    /// Overwrites the first triangles by those of another array, `len` from the index `first` on. Later builds use
-    /// them.
-    ///
-    /// # Errors
-    /// Out of memory; a Vulkan call fails.
-    pub fn take(&self, from: &Buffer<Triangle>, (first, len): (usize, usize)) -> Result<(), GpuError> {
-        let [first, len] = [first, len].map(|n| (n * size_of::<Triangle>()) as u64);
-        self.submit("kdtree_take", |commands| {
-            commands.copy_buffer_range((from.any(), first), (self.triangles.any(), 0), len);
-        })
-    }
-
-    /// Submits commands that write the first triangles. They come after all commands that were submitted before, and
-    /// before all later ones.
-    ///
-    /// # Errors
-    /// Out of memory; a Vulkan call fails.
-    pub fn fill(&self, record: impl FnOnce(&Commands)) -> Result<(), GpuError> {
-        self.submit("kdtree_fill", record)
     }
 
     /// Builds the tree and waits for the device. `timer`: takes the times of the dispatches; it must have room for
@@ -237,13 +238,7 @@ impl KdTreeBuilder {
     /// # Errors
     /// Out of memory; a Vulkan call fails.
     pub fn copy(&self, built: &BuiltTree, usage: BufferUse) -> Result<StructureArrays, GpuError> {
-        let (n_nodes, n_entries) = (built.n_nodes as usize, built.n_entries as usize);
-        let to = StructureArrays::new(&self.context, (n_nodes, n_entries), built.has_slabs, usage)?;
-        let arrays: Vec<_> = iter::zip(self.arrays(), to.sizes(n_nodes, n_entries))
-            .map(|(from, (to, bytes))| (from, to, bytes))
-            .collect();
-        device_build::copy(&self.context, "kdtree_copy", &arrays)?;
-        Ok(to)
+        self.arrays.copied(&self.context, built.kind(), built.sizes(), usage)
     }
 
     /// Copies the tree of the last build as [`KdTreeBuilder::copy`] does, with the indices that it has in arrays of
@@ -257,7 +252,7 @@ impl KdTreeBuilder {
         place: &StructurePlace,
         usage: BufferUse,
     ) -> Result<StructureArrays, GpuError> {
-        self.submit("kdtree_relocate", |commands| self.relocate(commands, built, place))?;
+        submit(&self.context, "kdtree_relocate", |commands| self.relocate(commands, built, place))?;
         self.copy(built, usage)
     }
 
@@ -271,31 +266,12 @@ impl KdTreeBuilder {
     /// # Panics
     /// The arrays have no room there.
     pub fn place(&self, built: &BuiltTree, target: &Target) -> Result<(), GpuError> {
-        self.submit("kdtree_place", |commands| {
-            self.relocate(commands, built, &target.place);
-            commands.barrier(Access::ComputeWrite, Access::TransferRead); // the relocated arrays
-            target.record(commands, self.arrays(), (built.n_nodes as usize, built.n_entries as usize));
-        })
-    }
-
-    /// The buffer of the triangles.
-    pub fn triangles(&self) -> &Buffer<Triangle> {
-        &self.triangles
-    }
-
-    /// The arrays of the tree in the order of [`StructureArrays::sizes`]. Without slabs, the last one is another one.
-    fn arrays(&self) -> [&Arc<AnyBuffer>; 5] {
-        let KdTreeBuffers { nodes, parents, leaf_triangles, leaf_planes, .. } = &self.buffers;
-        let slabs = self.slabs.as_ref().map_or(nodes.any(), |stage| stage.slabs.any());
-        [nodes.any(), parents.any(), leaf_triangles.any(), leaf_planes.any(), slabs]
+        let relocate = |commands: &Commands| self.relocate(commands, built, &target.place);
+        self.arrays.place(&self.context, built.sizes(), (target, relocate))
     }
 
     fn relocate(&self, commands: &Commands, built: &BuiltTree, place: &StructurePlace) {
         self.passes.relocate(commands, &self.buffers, built.n_nodes.max(built.n_entries), place);
-    }
-
-    fn submit(&self, name: &str, record: impl FnOnce(&Commands)) -> Result<(), GpuError> {
-        submit(&self.context, name, record)
     }
 
     /// Records the command buffers of a build: one for what comes before the levels, one or more for the levels, and
