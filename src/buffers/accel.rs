@@ -7,7 +7,8 @@ use rayon::prelude::*;
 
 use super::{
     SuspendedRays,
-    device_structures::{Arrays, DeviceStructures, Geometries, with_room_for},
+    device_structures::{DeviceStructures, with_room_for},
+    geometries::{Arrays, Geometries},
     scene_arrays::{Content, Contents, SceneAccess, SceneArrays},
     structure_builder::builder_options,
     surface_features::SurfaceFeatures,

@@ -3,7 +3,6 @@
 //! region.
 
 use std::{
-    borrow::Cow,
     ops::Range,
     sync::{Arc, Mutex, MutexGuard, PoisonError, Weak},
 };
@@ -11,7 +10,8 @@ use std::{
 use bytemuck::cast_slice;
 
 use super::{
-    scene_arrays::{Content, Contents, SceneArrays},
+    geometries::{Arrays, Geometries},
+    scene_arrays::{Content, Contents},
     structure_builder::{StructureBuilder, kind},
     two_level::{leaf_triangle, relocated, relocated_cell},
 };
@@ -23,14 +23,12 @@ use crate::{
         kdtree::{Traversal, TraversalLinks},
         two_level::{GeometriesId, GeometryPlace, TwoLevel},
     },
-    gpu::{AnyBuffer, Buffer, BufferUse, Context, GpuError},
+    gpu::{Buffer, BufferUse, Context, GpuError},
     layout::{
-        CornerSurface, GeometryConstants, GridCell, InstanceRow, KD_LEAF, KD_NODE_BYTES, KD_PAIR_SHIFT, KdBox, KdNode,
-        KdRope, LeafTriangle, Plane, Slab, StructurePlace, Triangle,
+        GeometryConstants, GridCell, InstanceRow, KD_LEAF, KD_NODE_BYTES, KD_PAIR_SHIFT, KdBox, KdNode, KdRope,
+        LeafTriangle, Plane, Slab, StructurePlace, Triangle,
     },
     passes::structures::{BufferCopy, Source, StructureArrays, StructureKind, Target},
-    util::Shared,
-    world::{Geometry, Instances, Poses},
 };
 
 /// A region is larger than its first structure by this part of it. The structures of a deformed mesh differ a little in
@@ -108,40 +106,6 @@ pub(super) fn with_room_for(
         kd_slabs: Content::Reserved(if has_slabs { n_nodes } else { 0 }),
         kd_links: Content::Reserved(6 * n_nodes),
         ..contents
-    }
-}
-
-/// The geometries of a world, and their triangles.
-#[derive(Clone, Copy)]
-pub struct Geometries<'a> {
-    pub two: &'a TwoLevel,
-    pub instances: &'a Instances,
-    /// All of them. Their triangles are made where they are first asked for.
-    pub geometry: Geometry<'a>,
-    /// What the device makes the triangles of some of them of, when they change.
-    pub poses: &'a Poses,
-}
-
-impl<'a> Geometries<'a> {
-    fn structure(&self, ix: usize) -> &'a Arc<BottomLevel> {
-        &self.two.structures()[ix]
-    }
-
-    pub fn triangles(&self, ix: usize) -> Cow<'a, [Triangle]> {
-        match self.poses.get(ix) {
-            Some(posed) => posed.triangles().into(),
-            None => self.instances.ranges[ix].of(self.geometry.triangles()).into(),
-        }
-    }
-
-    fn lazy(&self) -> impl Iterator<Item = (usize, LazyStructure<'a>)> {
-        self.two.structures().iter().enumerate().filter_map(|(ix, it)| Some((ix, it.as_lazy()?)))
-    }
-
-    /// The host's structures among those with these indices.
-    fn of_host(&self, ixs: impl IntoIterator<Item = usize>) -> Vec<(usize, &'a BottomLevel)> {
-        let all = ixs.into_iter().map(|ix| (ix, &**self.structure(ix)));
-        all.filter(|(_, structure)| structure.as_lazy().is_none()).collect()
     }
 }
 
@@ -316,8 +280,11 @@ impl DeviceStructures {
         if !region.holds(built.sizes()) {
             return Ok(None);
         }
-        let mut more =
-            arrays.copies((builder.triangles(), structure.n_triangles()), (&builder.corners, n_words), region);
+        let mut more = arrays.copies(
+            (builder.triangles(), structure.n_triangles()),
+            (&builder.corners, n_words),
+            region.first_row,
+        );
         let placed = Shown {
             structure: Arc::downgrade(all.structure(ix)),
             n_elements: built.sizes().0,
@@ -361,7 +328,7 @@ impl DeviceStructures {
         let triangles = Buffer::with(context, "new triangles", &own, BufferUse::Storage)?;
         let own_corners = arrays.corners_of(region.first_row, own.len());
         let corners = Buffer::with(context, "new corners", own_corners, BufferUse::Storage)?;
-        let mut more = arrays.copies((&triangles, own.len()), (&corners, own_corners.len()), region);
+        let mut more = arrays.copies((&triangles, own.len()), (&corners, own_corners.len()), region.first_row);
         more.extend(self.constants(arrays, (all, ix), None));
         self.upload(context, &arrays.structures(), (all, &[(ix, &**structure)], &more))?;
         let n_elements = structure.sizes().0;
@@ -501,70 +468,6 @@ impl State {
             }
         }
         Ok(self.builder.as_mut())
-    }
-}
-
-/// The scene's arrays, and what textures need at the corners of all stored triangles.
-pub struct Arrays<'a> {
-    pub arrays: &'a SceneArrays,
-    /// The `instance_rows` that those of `arrays` succeed, and where the geometries' rows begin in both.
-    pub rows_before: &'a Buffer<InstanceRow>,
-    pub geometries_begin: usize,
-    /// Tangents and colours; none if the scene has none.
-    pub corners: Option<&'a Shared<Vec<[CornerSurface; 3]>>>,
-    /// Where the corners are in `texture_words`.
-    pub corners_begin: usize,
-}
-
-impl Arrays<'_> {
-    /// Returns the arrays that hold structures.
-    fn structures(&self) -> StructureArrays {
-        StructureArrays {
-            nodes: self.arrays.kd_nodes.clone(),
-            parents: self.arrays.kd_parents.clone(),
-            leaf_triangles: self.arrays.leaf_triangles.clone(),
-            leaf_planes: self.arrays.leaf_planes.clone(),
-            slabs: self.arrays.kd_slabs.clone(),
-            cells: self.arrays.grid_cells.clone(),
-        }
-    }
-
-    /// The number of words of a triangle's corners.
-    pub fn n_corner_words(&self) -> usize {
-        self.corners.map_or(0, |_| size_of::<[CornerSurface; 3]>() / size_of::<u32>())
-    }
-
-    /// The words of the corners of some triangles.
-    pub fn corners_of(&self, first_row: usize, n_triangles: usize) -> &[u32] {
-        self.corners.map_or(&[], |corners| cast_slice(&corners[first_row..][..n_triangles]))
-    }
-
-    /// The place of the first corner of a triangle in `texture_words`.
-    pub fn first_word(&self, row: usize) -> usize {
-        self.corners_begin + row * self.n_corner_words()
-    }
-
-    /// Returns the copies of a geometry's first triangles, and of the words of their corners, to their places.
-    fn copies(
-        &self,
-        (triangles, n_triangles): (&Buffer<Triangle>, usize),
-        (corners, n_words): (&Buffer<u32>, usize),
-        region: &Region,
-    ) -> Vec<BufferCopy> {
-        let copy = |from: &Arc<AnyBuffer>, to: &Arc<AnyBuffer>, begin: usize, bytes: usize| BufferCopy {
-            from: Source::Buffer(from.clone(), bytes),
-            to: (to.clone(), begin),
-        };
-        let bytes_of = |n_triangles: usize| n_triangles * size_of::<Triangle>();
-        vec![
-            copy(triangles.any(), self.arrays.triangles.any(), bytes_of(region.first_row), bytes_of(n_triangles)),
-            copy(
-                corners.any(),
-                self.arrays.texture_words.any(),
-                self.first_word(region.first_row) * size_of::<u32>(),
-                n_words * size_of::<u32>(),
-            ),
-        ]
     }
 }
 

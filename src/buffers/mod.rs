@@ -14,6 +14,7 @@
 //! grid            the build of a grid
 //! kdtree          the build of a kd-tree
 //! device_structures   the kd-trees or grids of geometries that the device builds, and builds again
+//! geometries      the geometries of a world, and the arrays of the scene into which they go
 //! kd_slabs        the slabs of a kd-tree, while they are computed
 //! deform          a mesh that is deformed
 //! cast            given rays, their hits, and the cast's descriptor set
@@ -27,6 +28,7 @@ mod cast;
 mod closest_point;
 mod deform;
 mod device_structures;
+mod geometries;
 mod grid;
 mod kd_slabs;
 mod kdtree;

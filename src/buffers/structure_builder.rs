@@ -5,7 +5,7 @@ use std::{collections::HashMap, sync::Arc};
 
 use super::{
     deform::DeformTarget,
-    device_structures::{Arrays, Geometries},
+    geometries::{Arrays, Geometries},
 };
 use crate::{
     accel::{
