@@ -8,8 +8,10 @@ use glam::{Vec3, vec3};
 use kdray::{
     accel::grid::{Grid, GridLevels, GridOptions},
     gpu::{Buffer, BufferUse, Context, DeviceOverrides, Timer},
-    layout::{GRID_BLOCK_SIZE, GRID_GROUPS_X, GRID_MAX_SORT_GROUPS, GridCell, LeafTriangle, Plane, Triangle},
-    passes::grid::{DeviceGrid, GridBuilder},
+    layout::{
+        GRID_BLOCK_SIZE, GRID_GROUPS_X, GRID_MAX_SORT_GROUPS, GridCell, LeafTriangle, Plane, StructurePlace, Triangle,
+    },
+    passes::grid::{BuiltGrid, GridBuilder},
 };
 use support::{assert_silent, device, meshes, random::Random};
 
@@ -55,15 +57,16 @@ impl Content {
         }
     }
 
-    fn of_device(grid: &DeviceGrid) -> Self {
-        let leaf_triangles = grid.leaf_triangles.download().expect("leaf_triangles");
+    fn of_device(builder: &GridBuilder, built: &BuiltGrid) -> Self {
+        let arrays = builder.copy(built, BufferUse::Texels).expect("arrays");
+        let leaf_triangles = arrays.leaf_triangles.download().expect("leaf_triangles");
         Self {
-            lattice: lattice_bits(&grid.lattice),
-            n_cells: grid.lattice.n_cells,
-            n_coarser: grid.n_coarser,
-            cells: grid.cells.download().expect("cells"),
+            lattice: lattice_bits(&built.lattice),
+            n_cells: built.lattice.n_cells,
+            n_coarser: built.n_coarser,
+            cells: arrays.cells.download().expect("cells"),
             leaf_triangles: leaf_triangles.into_iter().map(bytemuck::cast).collect(),
-            leaf_planes: grid.leaf_planes.download().expect("leaf_planes").iter().map(plane_bits).collect(),
+            leaf_planes: arrays.leaf_planes.download().expect("leaf_planes").iter().map(plane_bits).collect(),
         }
     }
 
@@ -91,8 +94,8 @@ fn check(context: &Arc<Context>, name: &str, triangles: &[Triangle], options: &G
     let buffer = Buffer::with(context, "triangles", triangles, BufferUse::Storage).expect("triangles");
     let builder = GridBuilder::new(context, &buffer, options).expect("a builder");
     let expected = Grid::build(triangles, builder.options());
-    let found = builder.build(None, BufferUse::Texels).expect("a grid");
-    let difference = Content::of_host(triangles, &expected).difference(&Content::of_device(&found));
+    let found = builder.build(None).expect("a grid");
+    let difference = Content::of_host(triangles, &expected).difference(&Content::of_device(&builder, &found));
     assert_eq!(difference, None, "{name}, {:?}, {:?}", options.levels, expected.statistics());
     expected
 }
@@ -225,10 +228,49 @@ fn the_same_build_twice_gives_the_same_bits() {
     let buffer = Buffer::with(&context, "triangles", &triangles, BufferUse::Storage).expect("triangles");
     for (kind, options) in kinds() {
         let builder = GridBuilder::new(&context, &buffer, &options).expect("a builder");
-        let build = || Content::of_device(&builder.build(None, BufferUse::Storage).expect("a grid"));
+        let build = || Content::of_device(&builder, &builder.build(None).expect("a grid"));
         assert_eq!(build().difference(&build()), None, "{kind}");
     }
     assert_silent(&context);
+}
+
+#[test]
+fn relocated_grids_have_the_indices_of_their_places() {
+    let context = device();
+    for (n, (kind, options)) in
+        [1, GRID_BLOCK_SIZE as usize / 3, 3000].into_iter().flat_map(|n| kinds().map(|it| (n, it)))
+    {
+        let triangles = meshes::soup(n, 4);
+        // There is room for more triangles than the grid has.
+        let buffer = Buffer::with(&context, "triangles", &meshes::soup(n + 500, 9), BufferUse::Storage).expect("room");
+        buffer.upload(&triangles).expect("triangles");
+        let builder = GridBuilder::new(&context, &buffer, &options).expect("a builder");
+        let grid = Grid::build(&triangles, builder.options());
+        let mut expected = Content::of_host(&triangles, &grid);
+        let built = builder.build_first(n, None).expect("a grid");
+        assert_eq!(expected.difference(&Content::of_device(&builder, &built)), None, "{kind}, {n} triangles");
+        let n_blocks = if grid.n_levels() == 2 { grid.lattice().n_cubes() } else { 0 };
+        let (blocks, lowest) = expected.cells.split_at_mut(n_blocks);
+        blocks.iter_mut().for_each(|cell| cell.first += 14);
+        lowest.iter_mut().for_each(|cell| cell.first += 1001);
+        expected.leaf_triangles.iter_mut().for_each(|entry| entry[3] += 77);
+        let place = StructurePlace { first_element: 14, first_entry: 1001, first_row: 77 };
+        builder.copy_relocated(&built, &place, BufferUse::Storage).expect("a copy");
+        assert_eq!(
+            expected.difference(&Content::of_device(&builder, &built)),
+            None,
+            "{kind}, {n} triangles, relocated"
+        );
+    }
+    assert_silent(&context);
+}
+
+#[test]
+#[should_panic(expected = "4 triangles, room for 3")]
+fn more_triangles_than_there_is_room_for_are_refused() {
+    let context = device();
+    let buffer = Buffer::with(&context, "triangles", &meshes::soup(3, 1), BufferUse::Storage).expect("triangles");
+    let _ = GridBuilder::new(&context, &buffer, &GridOptions::uniform()).expect("a builder").build_first(4, None);
 }
 
 #[test]
@@ -263,7 +305,7 @@ fn each_stage_has_its_row() {
     for (kind, options) in kinds() {
         let builder = GridBuilder::new(&context, &buffer, &options).expect("a builder");
         let timer = Timer::new(&context, builder.n_stages()).expect("a timer");
-        let grid = builder.build(Some(&timer), BufferUse::Storage).expect("a grid");
+        let grid = builder.build(Some(&timer)).expect("a grid");
         assert_eq!(grid.stages.len(), builder.n_stages() as usize, "{kind}");
         assert!(grid.stages.iter().all(|row| row.name.starts_with("grid_")));
     }

@@ -7,7 +7,7 @@
 #include "layout.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;
-layout(push_constant) uniform PlaceBlock { KdPlace place; };
+layout(push_constant) uniform PlaceBlock { StructurePlace place; };
 layout(std430, set = 0, binding = BIND_KD_BUILD) readonly buffer BuildBlock { KdBuild build; };
 layout(std430, set = 0, binding = BIND_KD_NODES) buffer NodesBlock { KdNode nodes[]; };
 layout(std430, set = 0, binding = BIND_KD_PARENTS) buffer ParentsBlock { uint parents[]; };
@@ -19,7 +19,7 @@ void relocate_node(uint node_ix) {
     if ((node.axis_and_child & KD_LEAF) != 0u) {
         node.split_or_first += place.first_entry;
     } else {
-        node.axis_and_child += place.first_node / 2u << KD_PAIR_SHIFT;
+        node.axis_and_child += place.first_element / 2u << KD_PAIR_SHIFT;
     }
     nodes[node_ix] = node;
 }
@@ -30,7 +30,7 @@ void main() {
     for (uint row = 0u; row < KD_ROWS; ++row) {
         uint i = begin + row * SCAN_GROUP_SIZE;
         if (i < 2u * build.n_pairs) relocate_node(i);
-        if (i < build.n_pairs) parents[i] += place.first_node;
+        if (i < build.n_pairs) parents[i] += place.first_element;
         if (i < build.n_entries) leaf_triangles[3u * i].w += place.first_row;
     }
 }

@@ -1559,11 +1559,11 @@ struct KdStage {
     uint level_ix;
 };
 
-// Push constants of the kernel that relocates a kd-tree: where its arrays begin among those of all kd-trees.
+// Push constants of the kernels that relocate a structure: where its arrays begin among those of all structures.
 //
-// - `first_node`: of its root; even. `first_entry`: of its leaves. `first_row`: of its triangles.
-struct KdPlace {
-    uint first_node;
+// - `first_element`: of a kd-tree's nodes; even. `first_entry`: of its leaves. `first_row`: of its triangles.
+struct StructurePlace {
+    uint first_element;
     uint first_entry;
     uint first_row;
 };

@@ -77,14 +77,16 @@ pub struct DeviceBuild {
 }
 
 impl DeviceBuild {
-    /// Returns the report of builds of kd-trees that a device has made one after the other: the sums of their sizes
-    /// and times. None if there are none.
+    /// Returns the report of builds of structures of one kind that a device has made one after the other: the sums of
+    /// their sizes and times. None if there are none.
     pub(crate) fn sum(builds: Vec<Self>) -> Option<Self> {
         builds.into_iter().reduce(|mut sum, build| {
             sum.ms = sum.ms.zip(build.ms).map(|(sum, ms)| sum + ms);
             build.stages.into_iter().for_each(|stage| stage.add_to(&mut sum.stages));
-            if let (Statistics::KdTree(sum), Statistics::KdTree(own)) = (&mut sum.statistics, &build.statistics) {
-                sum.add(own);
+            match (&mut sum.statistics, &build.statistics) {
+                (Statistics::KdTree(sum), Statistics::KdTree(own)) => sum.add(own),
+                (Statistics::Grid(sum), Statistics::Grid(own)) => sum.add(own),
+                _ => unreachable!("all geometries have one kind of structure"),
             }
             sum
         })

@@ -12,12 +12,12 @@ use rayon::prelude::*;
 use super::{
     AccelOptions, DeviceBuild, Statistics,
     bottom_level::BottomLevel,
-    grid::{self, Grid},
+    grid::{self, Lattice},
     kdtree::{self, BuildOptions, KdTree},
     top_level::TopLevel,
 };
 use crate::{
-    layout::{GeometryConstants, Instance, KD_MAX_ORIGIN_DISTANCE, KD_NODE_BYTES, Triangle},
+    layout::{GeometryConstants, Instance, KD_MAX_ORIGIN_DISTANCE, StructurePlace, Triangle},
     util::{once::made_once, progress::Progress},
 };
 
@@ -63,6 +63,14 @@ impl PartialEq for GeometriesId {
     }
 }
 
+/// Where a geometry's structure is in the arrays of all.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct GeometryPlace {
+    pub place: StructurePlace,
+    /// The lattice of a grid that a device has built.
+    pub lattice: Option<Lattice>,
+}
+
 /// The structures of all geometries, and the hierarchy over their instances.
 #[derive(Clone, Debug)]
 pub struct TwoLevel {
@@ -72,7 +80,7 @@ pub struct TwoLevel {
     node_begins: Arc<OnceLock<Vec<usize>>>,
     top: TopLevel,
     geometries_id: GeometriesId,
-    /// The report of the first device that has built trees for this world.
+    /// The report of the first device that has built structures for this world.
     on_device: OnceLock<DeviceBuild>,
 }
 
@@ -135,12 +143,12 @@ impl TwoLevel {
         &self.geometries_id
     }
 
-    /// Whether devices build some of the trees.
-    pub fn has_device_trees(&self) -> bool {
+    /// Whether devices build some of the structures.
+    pub fn has_device_structures(&self) -> bool {
         self.structures.iter().any(|it| it.as_lazy().is_some())
     }
 
-    /// Builds the trees on the host that only devices have built. `stored`: the triangles of all geometries.
+    /// Builds the structures on the host that only devices have built. `stored`: the triangles of all geometries.
     pub fn build_on_host(&self, stored: &[Triangle]) {
         let geometries = self.with_triangles(stored).collect::<Vec<_>>();
         geometries.into_par_iter().for_each(|(structure, triangles)| structure.build_on_host(triangles));
@@ -158,7 +166,7 @@ impl TwoLevel {
         let _ = self.on_device.set(build);
     }
 
-    /// The report of the first device that has built trees for this world, if there is one.
+    /// The report of the first device that has built structures for this world, if there is one.
     pub fn device_build(&self) -> Option<&DeviceBuild> {
         self.on_device.get()
     }
@@ -186,14 +194,9 @@ impl TwoLevel {
         self.structures.iter().filter_map(|it| it.as_kdtree())
     }
 
-    /// The grids of all geometries; none if they have kd-trees.
-    fn grids(&self) -> impl Iterator<Item = &Grid> {
-        self.structures.iter().filter_map(|it| it.as_grid())
-    }
-
     /// The number of levels of the grids' cells, 1 or 2; 0 for kd-trees.
     pub fn n_grid_levels(&self) -> u32 {
-        self.grids().next().map_or(0, Grid::n_levels)
+        self.structures.first().map_or(0, |it| it.n_grid_levels())
     }
 
     /// The hierarchy over the instances.
@@ -223,13 +226,13 @@ impl TwoLevel {
     }
 
     /// Computes the statistics of all structures together. `options`: those that they were built with. `stored`: the
-    /// triangles of all geometries. The host builds the trees that only devices build, and none has built.
+    /// triangles of all geometries. The host builds the structures that only devices build, and none has built.
     pub fn statistics(&self, options: &AccelOptions, stored: &[Triangle]) -> Statistics {
         match options {
             AccelOptions::KdTree(options) | AccelOptions::LazyTree(options) => {
                 Statistics::KdTree(self.tree_statistics(options, stored))
             }
-            AccelOptions::Grid(_) => Statistics::Grid(self.grid_statistics()),
+            AccelOptions::Grid(_) => Statistics::Grid(self.grid_statistics(stored)),
         }
     }
 
@@ -255,17 +258,19 @@ impl TwoLevel {
         all
     }
 
-    fn grid_statistics(&self) -> grid::Statistics {
-        let mut all = grid::Statistics { n_levels: self.n_grid_levels(), ..Default::default() };
-        for own in self.grids().map(Grid::statistics) {
-            all.resolution = [0, 1, 2].map(|axis| all.resolution[axis].max(own.resolution[axis]));
-            all.n_upper_cells += own.n_upper_cells;
-            all.n_cells += own.n_cells;
-            all.n_empty_cells += own.n_empty_cells;
-            all.n_references += own.n_references;
-            all.n_coarser = all.n_coarser.max(own.n_coarser);
-            all.bytes += own.bytes;
-        }
+    fn grid_statistics(&self, stored: &[Triangle]) -> grid::Statistics {
+        let own = |(structure, triangles): (&BottomLevel, &[Triangle])| {
+            let statistics = match structure {
+                BottomLevel::LazyGrid(grid) => grid.statistics(triangles),
+                _ => Statistics::Grid(structure.as_grid()?.statistics()),
+            };
+            if let Statistics::Grid(own) = statistics { Some(own) } else { None }
+        };
+        let none = grid::Statistics { n_levels: self.n_grid_levels(), ..Default::default() };
+        let mut all = self.with_triangles(stored).filter_map(own).fold(none, |mut sum, own| {
+            sum.add(&own);
+            sum
+        });
         all.references_per_triangle = all.n_references as f64 / self.n_stored().max(1) as f64;
         all.bytes += size_of_val(&self.top.nodes[..]) as u64;
         all
@@ -298,29 +303,28 @@ impl TwoLevel {
         begins(self.structures.iter().map(|it| it.cells().len()))
     }
 
-    /// Returns what a search through each geometry needs beside the arrays. `roots`: the index of each tree's root
-    /// among the nodes of all.
-    pub fn geometry_constants(&self, roots: &[usize]) -> Vec<GeometryConstants> {
+    /// Returns where each of the host's structures begins where all are stored one after the other.
+    ///
+    /// # Panics
+    /// The host has not built all.
+    pub fn host_places(&self) -> Vec<GeometryPlace> {
         let rows = begins(self.structures.iter().map(|it| it.n_triangles()));
-        let cells = self.cell_begins();
-        let constants = |(ix, structure): (usize, &Arc<BottomLevel>)| {
-            let own = structure.constants();
-            GeometryConstants {
-                box_min: own.box_min,
-                plane_epsilon: own.plane_epsilon,
-                box_max: own.box_max,
-                origin_reach: own.origin_reach,
-                root_offset: KD_NODE_BYTES * roots[ix] as u32,
-                first_row: rows[ix] as u32,
-                n_triangles: structure.n_triangles() as u32,
-                first_cell: cells[ix] as u32,
-                n_cells_x: own.n_cells_x,
-                n_cells_y: own.n_cells_y,
-                n_cells_z: own.n_cells_z,
-                cell_size: own.cell_size,
-            }
+        let sizes = || self.structures.iter().map(|it| it.sizes());
+        let elements = begins(sizes().map(|(n_elements, _)| n_elements));
+        let entries = begins(sizes().map(|(_, n_entries)| n_entries));
+        let place = |ix: usize| {
+            let [first_element, first_entry, first_row] = [elements[ix], entries[ix], rows[ix]].map(|n| n as u32);
+            GeometryPlace { place: StructurePlace { first_element, first_entry, first_row }, lattice: None }
         };
-        self.structures.iter().enumerate().map(constants).collect()
+        (0..self.structures.len()).map(place).collect()
+    }
+
+    /// Returns what a search through each geometry needs beside the arrays.
+    pub fn geometry_constants(&self, places: &[GeometryPlace]) -> Vec<GeometryConstants> {
+        let constants = |(structure, it): (&Arc<BottomLevel>, &GeometryPlace)| {
+            structure.geometry_constants(&it.place, it.lattice.as_ref())
+        };
+        self.structures.iter().zip(places).map(constants).collect()
     }
 }
 

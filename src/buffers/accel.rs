@@ -7,11 +7,12 @@ use rayon::prelude::*;
 
 use super::{
     SuspendedRays,
-    device_trees::{Arrays, DeviceTrees, Geometries, with_room_for},
+    device_structures::{DeviceStructures, with_room_for},
+    geometries::{Arrays, Geometries},
     scene_arrays::{Content, Contents, SceneAccess, SceneArrays},
+    structure_builder::builder_options,
     surface_features::SurfaceFeatures,
     texture_words::TextureWords,
-    tree_builder::builder_options,
     two_level::{Joined, instance_rows, leaf_triangle},
 };
 use crate::{
@@ -26,10 +27,7 @@ use crate::{
         AccelConstants, BIND_ACCEL, BIND_SUSPENDED_RAYS, BRUTE_MAX_TRIANGLES, KD_WORD_DEPTH, KdRope, LeafTriangle,
         NO_WORDS, Slab, TRIANGLE_HIDDEN, Triangle, constants,
     },
-    passes::{
-        grid::GridBuilder,
-        kdtree::{DeviceTree, KdTreeBuilder},
-    },
+    passes::{grid::GridBuilder, kdtree::KdTreeBuilder, structures::StructureArrays},
     world::{Emitters, Geometry, Instances, Poses, World},
 };
 
@@ -69,8 +67,8 @@ pub struct AccelBuffers {
     surface_features: SurfaceFeatures,
     /// The contents of `constants`.
     uploaded: AccelConstants,
-    /// Where the trees of geometries are; none unless the device has built some of them.
-    trees: Option<Arc<DeviceTrees>>,
+    /// Where the structures of geometries are; none unless the device has built some of them.
+    structures: Option<Arc<DeviceStructures>>,
 }
 
 impl AccelBuffers {
@@ -147,9 +145,10 @@ impl AccelBuffers {
                 let instances = geometry.instances().expect("a structure of two levels is over instances");
                 let all = Geometries { two, instances, geometry, poses: &Poses::default() };
                 let of_host = || Self::of_two_level(context, triangles, (two, instances), common());
-                match two.has_device_trees().then(|| Self::of_device_trees(context, &all, common)) {
+                match two.has_device_structures().then(|| Self::of_device_structures(context, &all, common)) {
                     Some(Err(error)) if error.is_lack_of_room() => {
-                        tracing::warn!("the host builds the kd-trees, since the device has too little room: {error}");
+                        let what = if two.n_grid_levels() > 0 { "grids" } else { "kd-trees" };
+                        tracing::warn!("the host builds the {what}, since the device has too little room: {error}");
                         of_host()
                     }
                     Some(made) => made,
@@ -173,7 +172,7 @@ impl AccelBuffers {
         let joined = Joined::new(two, instances);
         joined.check()?;
         let mut constants = AccelConstants::default();
-        let rows = instance_rows(two, instances, two.node_begins(), &mut constants);
+        let rows = instance_rows(two, instances, &two.host_places(), &mut constants);
         let (n_nodes, n_entries) = (joined.n_nodes(), joined.n_entries());
         let n_slabs = if context.predicates_branches() { 0 } else { joined.n_slabs() };
         let write_entries = |first: usize, chunk: &mut [LeafTriangle]| joined.write_entries(triangles, first, chunk);
@@ -203,23 +202,27 @@ impl AccelBuffers {
         Self::with(context, contents, &constants, structure)
     }
 
-    /// Uploads the geometries, some of whose trees the device builds. `common`: returns the contents without a
+    /// Uploads the geometries, some of whose structures the device builds. `common`: returns the contents without a
     /// structure.
-    fn of_device_trees<'a>(
+    fn of_device_structures<'a>(
         context: &Arc<Context>,
         all: &Geometries<'a>,
         common: impl Fn() -> Contents<'a>,
     ) -> Result<Self, GpuError> {
         let on_device = Buffer::with(context, "triangles", all.geometry.triangles(), BufferUse::Texels)?;
-        let (trees, new) = DeviceTrees::build(context, &on_device, all)?;
+        let (structures, new) = DeviceStructures::build(context, &on_device, all)?;
         let mut constants = AccelConstants::default();
-        let rows = instance_rows(all.two, all.instances, &trees.roots(), &mut constants);
-        let reserved = || Contents { instance_rows: Content::Elements(&rows), ..trees.reserved(common()) };
+        let rows = instance_rows(all.two, all.instances, &structures.places(), &mut constants);
+        let reserved = || Contents { instance_rows: Content::Elements(&rows), ..structures.reserved(common()) };
         let usage = SceneAccess::of(context, &reserved()).buffer_use();
-        let arrays = trees.arrays(context, usage, (all, new))?;
-        let contents = with_triangles(on_device, usage, with_trees(arrays, usage, reserved()));
-        let made = Self::with(context, contents, &constants, Structure::KdTree { mask_words: 1 })?;
-        Ok(Self { trees: Some(Arc::new(trees)), ..made })
+        let arrays = structures.arrays(context, usage, (all, new))?;
+        let contents = with_triangles(on_device, usage, with_structures(arrays, usage, reserved()));
+        let structure = match all.two.n_grid_levels() {
+            0 => Structure::KdTree { mask_words: 1 },
+            n_levels => Structure::Grid { n_levels },
+        };
+        let made = Self::with(context, contents, &constants, structure)?;
+        Ok(Self { structures: Some(Arc::new(structures)), ..made })
     }
 
     /// Uploads triangles and their kd-tree.
@@ -260,13 +263,12 @@ impl AccelBuffers {
         let builder = KdTreeBuilder::new(context, &on_device, &builder_options(context, tree))?;
         let timer = Timer::new(context, builder.n_stages())?;
         let built = builder.build(Some(&timer))?;
-        let sizes = (built.n_nodes as usize, built.n_entries as usize);
-        let reserved = || with_room_for(sizes, built.has_slabs, common());
+        let reserved = || with_room_for(built.sizes(), built.kind(), common());
         let usage = SceneAccess::of(context, &reserved()).buffer_use();
         let arrays = builder.copy(&built, usage)?;
         drop(builder); // its memory is larger than the tree's
         tree.note(built.report(triangles.len()));
-        let contents = with_triangles(on_device, usage, with_trees(arrays, usage, reserved()));
+        let contents = with_triangles(on_device, usage, with_structures(arrays, usage, reserved()));
         Self::with(context, contents, &tree.constants(), Structure::KdTree { mask_words: 1 })
     }
 
@@ -280,18 +282,13 @@ impl AccelBuffers {
         let on_device = Buffer::with(context, "triangles", triangles, BufferUse::Texels)?;
         let builder = GridBuilder::new(context, &on_device, grid.options())?;
         let timer = Timer::new(context, builder.n_stages())?;
-        let built = builder.build(Some(&timer), BufferUse::Texels)?;
+        let built = builder.build(Some(&timer))?;
+        let arrays = builder.copy(&built, BufferUse::Texels)?;
         drop(builder); // its memory is larger than the grid's
         grid.note(built.report(triangles.len()));
         let constants = built.constants(grid.origin_reach());
         let structure = Structure::Grid { n_levels: built.n_levels };
-        let contents = Contents {
-            triangles: Content::OnDevice(on_device, BufferUse::Texels),
-            grid_cells: Content::OnDevice(built.cells, BufferUse::Texels),
-            leaf_triangles: Content::OnDevice(built.leaf_triangles, BufferUse::Texels),
-            leaf_planes: Content::OnDevice(built.leaf_planes, BufferUse::Texels),
-            ..common
-        };
+        let contents = with_triangles(on_device, BufferUse::Texels, with_structures(arrays, BufferUse::Texels, common));
         Self::with(context, contents, &constants, structure)
     }
 
@@ -348,7 +345,7 @@ impl AccelBuffers {
             structure,
             is_instanced: false,
             uploaded,
-            trees: None,
+            structures: None,
         };
         made.upload_constants(context)?;
         Ok(made)
@@ -394,17 +391,17 @@ impl AccelBuffers {
         if traversal == Traversal::Brute && value > limit {
             return Err(GpuError::Limit { what: "triangles without a tree", value, limit });
         }
-        let mut links = match (accel, &self.trees) {
+        let mut links = match (accel, &self.structures) {
             // The nodes may be the device's own.
             (Accel::LazyTree(tree), _) if traversal.needs_boxes() || traversal.needs_ropes() => {
                 tree.links_of(self.arrays.kd_nodes.download()?, traversal)
             }
             (Accel::LazyTree(_), _) => TraversalLinks::default(),
-            (Accel::TwoLevel(two), Some(trees)) => trees.links(&self.arrays.kd_nodes, two, traversal)?,
+            (Accel::TwoLevel(two), Some(structures)) => structures.links(&self.arrays.kd_nodes, two, traversal)?,
             _ => TraversalLinks::of(accel, geometry.triangles(), traversal),
         };
         let joined = match (accel, instances) {
-            (Accel::TwoLevel(two), Some(instances)) if self.trees.is_none() => Some(Joined::new(two, instances)),
+            (Accel::TwoLevel(two), Some(instances)) if self.structures.is_none() => Some(Joined::new(two, instances)),
             _ => None,
         };
         if let (Some(joined), false) = (&joined, links.ropes.is_empty()) {
@@ -438,38 +435,44 @@ impl AccelBuffers {
     pub(crate) fn set_instances(&mut self, context: &Arc<Context>, geometry: Geometry) -> Result<(), GpuError> {
         let (Accel::TwoLevel(two), Some(instances)) = (geometry.accel(), geometry.instances()) else { return Ok(()) };
         let mut next = self.clone();
-        let roots = self.trees.as_ref().map_or_else(|| two.node_begins().to_vec(), |trees| trees.roots());
-        let rows = instance_rows(two, instances, &roots, &mut next.uploaded);
+        let places = self.structures.as_ref().map_or_else(|| two.host_places(), |structures| structures.places());
+        let rows = instance_rows(two, instances, &places, &mut next.uploaded);
         next.arrays.instance_rows = Content::Elements(&rows).upload(context, "instance_rows", self.access)?;
         next.upload_constants(context)?;
         *self = next;
         Ok(())
     }
 
-    /// Builds the trees of geometries that are deformed in another pose of the world, and uploads their triangles and
-    /// what textures need at their corners, into the arrays that are there. `n_owners`: the number of clones of these
-    /// buffers that may see the change. Returns whether it was possible; if not, everything has to be uploaded.
+    /// Builds the structures of geometries that are deformed in another pose of the world, and uploads their triangles
+    /// and what textures need at their corners, into the arrays that are there. `before`: the buffers that these ones
+    /// succeed, which alone may see the change. Returns whether it was possible; if not, everything has to be uploaded.
     ///
     /// # Errors
     /// Memory runs out, or a call fails. Some of the geometries may have changed then.
-    pub(crate) fn set_pose(&self, context: &Arc<Context>, world: &World, n_owners: usize) -> Result<bool, GpuError> {
+    pub(crate) fn set_pose(&self, context: &Arc<Context>, world: &World, before: &Self) -> Result<bool, GpuError> {
         let geometry = world.geometry();
         let (Accel::TwoLevel(two), Some(instances)) = (geometry.accel(), geometry.instances()) else {
             return Ok(false);
         };
-        let Some(trees) = &self.trees else { return Ok(false) };
+        let Some(structures) = &self.structures else { return Ok(false) };
         // Links are those of certain trees.
-        let others_read = Arc::strong_count(trees) > n_owners || !self.arrays.kd_links.is_empty();
+        let others_read = Arc::strong_count(structures) > 2 || !self.arrays.kd_links.is_empty();
         let all = Geometries { two, instances, geometry, poses: world.poses() };
         let corners_begin = self.uploaded.corners_begin;
         let corners = (corners_begin != NO_WORDS).then(|| &world.scene().textures.corners);
-        let arrays = Arrays { arrays: &self.arrays, corners, corners_begin: corners_begin as usize };
-        trees.update(context, &arrays, (&all, others_read))
+        let arrays = Arrays {
+            arrays: &self.arrays,
+            rows_before: &before.arrays.instance_rows,
+            geometries_begin: self.uploaded.geometries_begin as usize,
+            corners,
+            corners_begin: corners_begin as usize,
+        };
+        structures.update(context, &arrays, (&all, others_read))
     }
 
     /// Returns what makes others notice that these buffers are in use, as a clone does.
-    pub(crate) fn shared(&self) -> Option<Arc<DeviceTrees>> {
-        self.trees.clone()
+    pub(crate) fn shared(&self) -> Option<Arc<DeviceStructures>> {
+        self.structures.clone()
     }
 
     /// Hides the triangles that other buffers of the same triangles hide.
@@ -565,14 +568,15 @@ pub(crate) fn hidden_words(n_triangles: usize, hidden: &[u32]) -> Vec<u32> {
     words
 }
 
-/// Returns the contents with trees that a device has built, in arrays for `usage`.
-fn with_trees<'a>(trees: DeviceTree, usage: BufferUse, contents: Contents<'a>) -> Contents<'a> {
+/// Returns the contents with structures that a device has built, in arrays for `usage`.
+fn with_structures<'a>(arrays: StructureArrays, usage: BufferUse, contents: Contents<'a>) -> Contents<'a> {
     Contents {
-        kd_nodes: Content::OnDevice(trees.nodes, usage),
-        kd_parents: Content::OnDevice(trees.parents, usage),
-        leaf_triangles: Content::OnDevice(trees.leaf_triangles, usage),
-        leaf_planes: Content::OnDevice(trees.leaf_planes, usage),
-        kd_slabs: Content::OnDevice(trees.slabs, usage),
+        kd_nodes: Content::OnDevice(arrays.nodes, usage),
+        kd_parents: Content::OnDevice(arrays.parents, usage),
+        leaf_triangles: Content::OnDevice(arrays.leaf_triangles, usage),
+        leaf_planes: Content::OnDevice(arrays.leaf_planes, usage),
+        kd_slabs: Content::OnDevice(arrays.slabs, usage),
+        grid_cells: Content::OnDevice(arrays.cells, usage),
         ..contents
     }
 }

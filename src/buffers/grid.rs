@@ -10,7 +10,8 @@ use crate::{
         BIND_GRID_BLOCKS, BIND_GRID_BUILD, BIND_GRID_CELLS, BIND_GRID_FIRST_COLUMNS, BIND_GRID_FIRST_PAIRS,
         BIND_GRID_LEAF_PLANES, BIND_GRID_LEAF_TRIANGLES, BIND_GRID_PAIRS_FROM, BIND_GRID_PAIRS_TO,
         BIND_GRID_SCAN_BLOCKS, BIND_GRID_TRIANGLES, BIND_GRID_UPPER_PAIRS, GRID_BLOCK_SIZE, GRID_DIGITS,
-        GRID_MAX_RESOLUTION, GRID_MAX_SORT_GROUPS, GridBuild, GridCell, GridSort, LeafTriangle, Plane, Triangle,
+        GRID_MAX_RESOLUTION, GRID_MAX_SORT_GROUPS, GridBuild, GridCell, GridSort, LeafTriangle, Plane, StructurePlace,
+        Triangle,
     },
 };
 
@@ -112,10 +113,14 @@ impl GridBuffers {
     /// # Errors
     /// Memory runs out.
     pub fn bindings(context: &Arc<Context>) -> Result<Arc<BindingLayout>, GpuError> {
-        BindingLayout::new(context, &BINDINGS.map(binding), size_of::<GridSort>() as u32)
+        BindingLayout::new(
+            context,
+            &BINDINGS.map(binding),
+            size_of::<StructurePlace>().max(size_of::<GridSort>()) as u32,
+        )
     }
 
-    /// Makes the buffers and sets of a build over the triangles.
+    /// Makes the buffers and sets of a build over the triangles, or over the first ones.
     ///
     /// # Errors
     /// A buffer is beyond the device's limits, or memory runs out.
@@ -165,9 +170,15 @@ impl GridBuffers {
         Ok(buffers)
     }
 
-    /// The state that the host writes into `build` before a build.
-    pub fn initial(&self) -> &GridBuild {
-        &self.initial
+    /// Returns the state that the host writes into `build` before a build over the first triangles. `own`: the
+    /// capacities of a build over so many triangles.
+    pub fn initial(&self, own: &GridCapacities) -> GridBuild {
+        GridBuild {
+            n_triangles: own.n_triangles,
+            max_references: own.n_references,
+            max_columns: own.n_columns,
+            ..self.initial
+        }
     }
 
     /// Makes the sets over two of the arrays of pairs, which are given by their indices.

@@ -12,7 +12,8 @@ use crate::{
         BIND_KD_LEVELS, BIND_KD_NODES, BIND_KD_PARENTS, BIND_KD_PLACES, BIND_KD_REFERENCES_FROM, BIND_KD_REFERENCES_TO,
         BIND_KD_SCALE_COUNTS, BIND_KD_SCAN_BLOCKS, BIND_KD_SIDES, BIND_KD_SLAB_TREE, BIND_KD_TRIANGLES, KD_BIN_BLOCK,
         KD_BIN_WORDS, KD_BLOCK_SIZE, KD_LEVEL_RECORDS, KD_MOST_ENTRIES, KD_SCALES, KD_WORD_DEPTH, KdBuild, KdCell,
-        KdLevel, KdNode, KdPlace, KdReference, KdSlabPatch, KdSlabTree, LeafTriangle, Plane, SCAN_GROUP_SIZE, Triangle,
+        KdLevel, KdNode, KdReference, KdSlabPatch, KdSlabTree, LeafTriangle, Plane, SCAN_GROUP_SIZE, StructurePlace,
+        Triangle,
     },
 };
 
@@ -123,7 +124,7 @@ impl KdTreeBuffers {
     /// # Errors
     /// Memory runs out.
     pub fn bindings(context: &Arc<Context>) -> Result<Arc<BindingLayout>, GpuError> {
-        BindingLayout::new(context, &BINDINGS.map(binding), size_of::<KdPlace>() as u32)
+        BindingLayout::new(context, &BINDINGS.map(binding), size_of::<StructurePlace>() as u32)
     }
 
     /// Makes the buffers and sets of a build over the triangles, or over the first ones.

@@ -13,7 +13,8 @@
 //! resources       all of these, with the frame's descriptor set
 //! grid            the build of a grid
 //! kdtree          the build of a kd-tree
-//! device_trees    the kd-trees of geometries that the device builds, and builds again
+//! device_structures   the kd-trees or grids of geometries that the device builds, and builds again
+//! geometries      the geometries of a world, and the arrays of the scene into which they go
 //! kd_slabs        the slabs of a kd-tree, while they are computed
 //! deform          a mesh that is deformed
 //! cast            given rays, their hits, and the cast's descriptor set
@@ -26,7 +27,8 @@ mod all_hits;
 mod cast;
 mod closest_point;
 mod deform;
-mod device_trees;
+mod device_structures;
+mod geometries;
 mod grid;
 mod kd_slabs;
 mod kdtree;
@@ -35,10 +37,10 @@ mod queue;
 mod raster_queue;
 mod resources;
 mod scene_arrays;
+mod structure_builder;
 mod surface_features;
 mod suspended_rays;
 mod texture_words;
-mod tree_builder;
 mod two_level;
 mod vertex_indices;
 
@@ -58,7 +60,7 @@ pub use self::{
     scene_arrays::{SceneAccess, SceneArrays},
     suspended_rays::{ResumePass, SuspendedRays},
 };
-pub(crate) use self::{accel::hidden_words, device_trees::DeviceTrees, pixels::uses_graphics_pipeline};
+pub(crate) use self::{accel::hidden_words, device_structures::DeviceStructures, pixels::uses_graphics_pipeline};
 use crate::{
     gpu::BindingKind,
     layout::{BIND_ACCEL, BIND_FRAME, BIND_KD_BUILD, BIND_NOISE_TILES, BIND_TEXELS, BIND_TRIANGLE_IDS},

@@ -5,11 +5,15 @@ use bytemuck::{Pod, cast_slice};
 use rayon::prelude::*;
 
 use crate::{
-    accel::{bottom_level::BottomLevel, two_level::TwoLevel},
+    accel::{
+        bottom_level::BottomLevel,
+        grid::Grid,
+        two_level::{GeometryPlace, TwoLevel},
+    },
     gpu::GpuError,
     layout::{
         AccelConstants, GEOMETRY_ROWS, GridCell, INSTANCE_ROWS, InstanceRow, KD_LEAF, KD_NODE_BYTES, KD_PAIR_SHIFT,
-        KdNode, KdPlace, KdRope, LeafTriangle, Plane, Slab, TOP_NODE_ROWS, Triangle,
+        KdNode, KdRope, LeafTriangle, Plane, Slab, StructurePlace, TOP_NODE_ROWS, Triangle,
     },
     world::Instances,
 };
@@ -90,8 +94,8 @@ impl<'a> Joined<'a> {
 
     pub fn write_nodes(&self, first: usize, chunk: &mut [KdNode]) {
         Self::write(self.first_nodes, first, chunk, |geometry_ix, ix| {
-            let place = KdPlace {
-                first_node: self.first_nodes[geometry_ix] as u32,
+            let place = StructurePlace {
+                first_element: self.first_nodes[geometry_ix] as u32,
                 first_entry: self.first_entries[geometry_ix] as u32,
                 first_row: self.first_rows[geometry_ix],
             };
@@ -118,11 +122,13 @@ impl<'a> Joined<'a> {
 
     pub fn write_cells(&self, first: usize, chunk: &mut [GridCell]) {
         Self::write(&self.first_cells, first, chunk, |geometry_ix, ix| {
+            let place = StructurePlace {
+                first_element: self.first_cells[geometry_ix] as u32,
+                first_entry: self.first_entries[geometry_ix] as u32,
+                first_row: self.first_rows[geometry_ix],
+            };
             let grid = self.structure(geometry_ix).as_grid().expect("only grids have cells");
-            let GridCell { first, count } = grid.cells()[ix];
-            let is_block = grid.n_levels() == 2 && ix < grid.lattice().n_cubes();
-            let begins = if is_block { &self.first_cells } else { &self.first_entries };
-            GridCell { first: first + begins[geometry_ix] as u32, count }
+            relocated_cell(grid, ix, &place)
         });
     }
 
@@ -149,11 +155,20 @@ impl<'a> Joined<'a> {
 }
 
 /// Returns a tree's node as it is among those of several trees. Twin of glsl/passes/kdtree_relocate.comp.
-pub fn relocated(KdNode { split_or_first, axis_and_child }: KdNode, place: &KdPlace) -> KdNode {
+pub fn relocated(KdNode { split_or_first, axis_and_child }: KdNode, place: &StructurePlace) -> KdNode {
     match axis_and_child & KD_LEAF != 0 {
         true => KdNode { split_or_first: split_or_first + place.first_entry, axis_and_child },
-        false => KdNode { split_or_first, axis_and_child: axis_and_child + ((place.first_node / 2) << KD_PAIR_SHIFT) },
+        false => {
+            KdNode { split_or_first, axis_and_child: axis_and_child + ((place.first_element / 2) << KD_PAIR_SHIFT) }
+        }
     }
+}
+
+/// Returns a grid's cell as it is among those of several grids. Twin of glsl/passes/grid_relocate.comp.
+pub fn relocated_cell(grid: &Grid, ix: usize, place: &StructurePlace) -> GridCell {
+    let GridCell { first, count } = grid.cells()[ix];
+    let is_block = grid.n_levels() == 2 && ix < grid.lattice().n_cubes();
+    GridCell { first: first + if is_block { place.first_element } else { place.first_entry }, count }
 }
 
 /// Returns a leaf's entry of a stored triangle.
@@ -162,11 +177,11 @@ pub fn leaf_triangle(stored: &[Triangle], triangle_ix: u32) -> LeafTriangle {
     LeafTriangle { v0, triangle_ix, v1, v2, ..LeafTriangle::default() }
 }
 
-/// Returns the rows of `instance_rows`, and notes where its parts begin. `roots`: the index of each tree's root.
+/// Returns the rows of `instance_rows`, and notes where its parts begin. `places`: of the structures.
 pub fn instance_rows(
     two: &TwoLevel,
     instances: &Instances,
-    roots: &[usize],
+    places: &[GeometryPlace],
     constants: &mut AccelConstants,
 ) -> Vec<InstanceRow> {
     let firsts: Vec<u32> = instances.list.iter().map(|it| it.first_triangle).collect();
@@ -180,7 +195,7 @@ pub fn instance_rows(
     let mut rows: Vec<InstanceRow> = cast_slice(&instances.list).to_vec();
     debug_assert_eq!(rows.len(), INSTANCE_ROWS as usize * instances.list.len());
     constants.geometries_begin = rows.len() as u32;
-    rows.extend_from_slice(cast_slice(&two.geometry_constants(roots)));
+    rows.extend_from_slice(cast_slice(&two.geometry_constants(places)));
     constants.top_nodes_begin = rows.len() as u32;
     debug_assert_eq!(
         constants.top_nodes_begin - constants.geometries_begin,

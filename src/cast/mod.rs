@@ -169,8 +169,7 @@ impl GpuCaster {
         if tree.shared().is_some() || shares_structures {
             tree.set_instances(&self.context, geometry)?;
             let resources = self.resources.with_accel(&self.bindings, &tree)?;
-            // This clone and the caster's own.
-            if tree.shared().is_none() || tree.set_pose(&self.context, world, 2)? {
+            if tree.shared().is_none() || tree.set_pose(&self.context, world, &self.tree)? {
                 (self.resources, self.tree, self.point_search) = (resources, tree, None);
                 self.structures_id = geometry.accel().structures_id();
                 return Ok(());

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{GpuCaster, Hit, Ray, most_rays};
 use crate::{
     accel::Query,
-    buffers::{CastResources, DeviceTrees, ResumePass, SuspendedRays},
+    buffers::{CastResources, DeviceStructures, ResumePass, SuspendedRays},
     gpu::{Binding, BindingSet, Context, ExternalBuffer, ExternalCommands, GpuError},
     passes::{self, Masked},
 };
@@ -19,7 +19,7 @@ pub struct RecordedCast {
     suspended_rays: SuspendedRays,
     rays: Masked,
     /// Keeps the caster from building trees of deformed meshes in place.
-    _trees: Option<Arc<DeviceTrees>>,
+    _trees: Option<Arc<DeviceStructures>>,
 }
 
 impl GpuCaster {

@@ -409,12 +409,21 @@ impl Commands<'_> {
     /// # Panics
     /// The data exceeds the buffer, or is not a multiple of 4 bytes.
     pub fn update_buffer(&self, destination: &Arc<AnyBuffer>, data: &[impl Pod]) {
+        self.update_buffer_at((destination, 0), data);
+    }
+
+    /// Does what [`Commands::update_buffer`] does, from the byte `first` on.
+    ///
+    /// # Panics
+    /// The data exceeds the buffer, or `first` or the data is not a multiple of 4 bytes.
+    pub fn update_buffer_at(&self, (destination, first): (&Arc<AnyBuffer>, u64), data: &[impl Pod]) {
         let bytes: &[u8] = bytemuck::cast_slice(data);
-        assert!(bytes.len() as u64 <= destination.bytes() && bytes.len().is_multiple_of(4));
+        assert!(first + bytes.len() as u64 <= destination.bytes());
+        assert!(first.is_multiple_of(4) && bytes.len().is_multiple_of(4));
         self.keep(destination);
         // Vulkan's limit of an update.
         for (ix, part) in bytes.chunks(1 << 16).enumerate() {
-            let begin = (ix as u64) << 16;
+            let begin = first + ((ix as u64) << 16);
             // SAFETY: the commands are being recorded, no rendering is open, and the buffer holds that many bytes.
             unsafe { self.device.raw.cmd_update_buffer(self.raw, destination.raw(), begin, part) };
         }

@@ -83,7 +83,7 @@ mod tests {
         match shader {
             cast if cast.starts_with("cast_") || cast.starts_with("all_hits_") => "CastBatch",
             "closest_point.comp" => "CastBatch",
-            "kdtree_relocate.comp" => "KdPlace",
+            relocate if relocate.ends_with("_relocate.comp") => "StructurePlace",
             kdtree if kdtree.starts_with("kdtree_") => "KdStage",
             "driver.rgen" => "DriverCast",
             "atrous_filter.comp" => "AtrousIteration",

@@ -65,6 +65,7 @@ mod resolve;
 mod shade;
 mod shadow;
 mod spine;
+pub mod structures;
 mod surface_layers;
 mod tonemap;
 mod trace;

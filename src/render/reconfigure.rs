@@ -60,9 +60,9 @@ impl GpuRenderer {
 
     /// Draws another world from now on. The next sample is the first of a new picture. If the world was made of this
     /// renderer's by [`World::with_instances_changed`], only the instances are uploaded, and emitters that have
-    /// changed. If it is another moment of the same film, and the device builds the trees of kept meshes, only these
-    /// and deformed meshes are uploaded, and only the trees of those meshes are built. The picture that is displayed
-    /// stays so until another one is drawn.
+    /// changed. If it is another moment of the same film, and the device builds the structures of kept meshes, only
+    /// these and deformed meshes are uploaded, and only the structures of those meshes are built. The picture that is
+    /// displayed stays so until another one is drawn.
     ///
     /// # Errors
     /// The world exceeds the device's limits or memory, or the driver refuses a kernel. Then nothing has changed,
@@ -80,12 +80,12 @@ impl GpuRenderer {
         Ok(())
     }
 
-    /// Uploads what differs in another pose of the world, and builds the trees of deformed meshes. Returns whether that
-    /// was possible.
+    /// Uploads what differs in another pose of the world, and builds the structures of deformed meshes. Returns whether
+    /// that was possible.
     fn set_pose(&mut self, world: &World) -> Result<bool, GpuError> {
         let lights = [world, &self.world].map(|world| &world.scene().lights);
-        let has_device_trees = self.resources.accel.shared().is_some();
-        if lights[0].len() != lights[1].len() || !(has_device_trees || world.shares_geometries(&self.world)) {
+        let has_device_structures = self.resources.accel.shared().is_some();
+        if lights[0].len() != lights[1].len() || !(has_device_structures || world.shares_geometries(&self.world)) {
             return Ok(false);
         }
         let of_paths = self.in_use.integrator == Integrator::Path;
@@ -104,8 +104,7 @@ impl GpuRenderer {
         } else {
             None
         };
-        // The successor, and the present resources, which are released.
-        if has_device_trees && !resources.accel.set_pose(&self.context, world, 2)? {
+        if has_device_structures && !resources.accel.set_pose(&self.context, world, &self.resources.accel)? {
             return Ok(false);
         }
         self.reset_samples();

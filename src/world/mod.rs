@@ -218,7 +218,7 @@ impl World {
     }
 
     /// The report of the first device that has built the world's structure, if there is one; of instances, the sum over
-    /// the kd-trees that it has built for this world. Those that it had before do not count.
+    /// the structures that it has built for this world. Those that it had before do not count.
     pub fn device_build(&self) -> Option<&DeviceBuild> {
         self.0.accel.device_build()
     }

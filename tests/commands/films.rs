@@ -97,26 +97,33 @@ fn with_wave() -> Value {
     file
 }
 
-/// The device builds the tree of the wave in each frame, and the one of the square is the host's.
+/// The device builds the tree or grid of the wave in each frame, and the one of the square is the host's.
 #[test]
-fn films_are_the_same_by_the_devices_trees_of_deformed_meshes() {
+fn films_are_the_same_by_the_devices_structures_of_deformed_meshes() {
     let directory = TempDir::new().unwrap();
     let path = directory.path();
     fs::write(path.join("wave.gltf"), with_wave().to_string()).unwrap();
-    let render = |build: &str| {
+    let render = |option: &str, build: &str| {
         let file = format!("{build}#.png");
-        let more = ["--validate", "--instances", "keep", "--build", build, "--frames", "0-3", "--fps", "2"];
+        let more = ["--validate", "--instances", "keep", option, build, "--frames", "0-3", "--fps", "2"];
         let files = ["--profile", "p.json", "-o", &file];
         succeed(path, &[&["render", "wave.gltf"], &SMALL[..], &more, &files].concat());
         let frames = [0, 1, 2, 3].map(|frame| pixels(&path.join(format!("{build}{frame}.png"))));
         let profile: Value = serde_json::from_slice(&fs::read(path.join("p.json")).unwrap()).unwrap();
         (frames, profile)
     };
-    let ((expected, of_host), (found, of_device)) = (render("best"), render("gpu"));
-    assert!(found == expected);
-    assert!(found.windows(2).all(|pair| pair[0] != pair[1]), "something moves in each frame");
-    assert!(of_host["device_build"].is_null() && of_device["device_build"]["stages"].is_array(), "{of_device}");
-    assert_eq!(of_device["last_moment"]["n_deformed"], json!(1));
+    let (expected, of_host) = render("--build", "best");
+    assert!(of_host["device_build"].is_null());
+    for (option, build, last_stage) in
+        [("--build", "gpu", "kdtree_leaves"), ("--accel", "grid", "grid_leaves"), ("--accel", "grid2", "grid_leaves")]
+    {
+        let (found, of_device) = render(option, build);
+        assert!(found == expected, "{build}");
+        assert!(found.windows(2).all(|pair| pair[0] != pair[1]), "something moves in each frame");
+        let stages = of_device["device_build"]["stages"].as_array().expect("stages");
+        assert!(stages.iter().any(|stage| stage["name"] == last_stage), "{of_device}");
+        assert_eq!(of_device["last_moment"]["n_deformed"], json!(1));
+    }
 }
 
 /// The device is lost at every other submit, among them those of builds in the middle of the film.
@@ -139,7 +146,7 @@ fn a_device_that_is_lost_in_a_film_ends_it_with_a_message() {
         }
         assert_eq!(output.status.code(), Some(4), "{submit}: {text}");
         assert!(text.starts_with("error: ") && text.lines().count() == 1 && text.contains("lost"), "{submit}: {text}");
-        if text.contains("`kdtree_") {
+        if text.contains("`kdtree_") || text.contains("`structure_") {
             at_builds.push(fs::read_dir(path).unwrap().count() - 1);
         }
     }

@@ -1,5 +1,5 @@
-//! Kept meshes whose trees the device builds, and builds again when the meshes are deformed: hits and pictures are
-//! those of new worlds, whose trees the host builds.
+//! Kept meshes whose trees or grids the device builds, and builds again when the meshes are deformed: hits and pictures
+//! are those of new worlds, whose trees the host builds.
 
 use std::sync::Arc;
 
@@ -7,11 +7,12 @@ use glam::{DVec3, Vec3, vec3};
 use kdray::{
     accel::{
         AccelOptions, Query, Statistics,
+        grid::GridOptions,
         kdtree::{BuildOptions, Traversal},
     },
     cast::{CpuCaster, GpuCaster, Hit, NO_TRIANGLE, QueryPoint, Ray},
     frame::{Denoise, Integrator, Picture, Primary, RenderOptions},
-    gpu::{AnyBuffer, Context},
+    gpu::{AnyBuffer, Context, GpuError},
     render::GpuRenderer,
     scene::{Instance, Light, Mesh, Scene},
     world::{FlatScene, World},
@@ -20,15 +21,15 @@ use kdray::{
 use super::{kept, mesh_of, scene_of, transform, transforms};
 use crate::support::{assert_silent, device, meshes, random::Random};
 
-/// The mesh of [`scene`] that is deformed and whose tree the device builds, one with a tree of the host, and one like
-/// the first that is never deformed.
+/// The mesh of [`scene`] that is deformed and whose structure the device builds, one with a structure of the host, and
+/// one like the first that is never deformed.
 const LARGE: usize = 0;
 const SMALL: usize = 1;
 const RIGID: usize = 2;
 
 /// A large mesh that occurs four times, once mirrored, a small one that occurs twice, and a large one that occurs once.
 /// The corners of all have colours.
-fn scene() -> Scene {
+pub(super) fn scene() -> Scene {
     let mut scene = scene_of(&meshes::cube(19, 0.9), &transforms(2.5)[..4]);
     scene.meshes.push(mesh_of(&meshes::cube(6, 0.4)));
     scene.meshes.push(mesh_of(&meshes::torus(50, 24)));
@@ -62,13 +63,24 @@ fn deform(mesh: &mut Mesh, moment: u64) {
 
 /// Returns the world whose trees devices build.
 pub(super) fn lazy(scene: &Scene) -> World {
+    lazy_of(scene, &lazy_options()[0])
+}
+
+/// Returns the options of all structures that devices build: kd-trees first, then grids.
+pub(super) fn lazy_options() -> [AccelOptions; 3] {
+    let [grid, grid2] = [GridOptions::uniform(), GridOptions::two_level()].map(AccelOptions::Grid);
+    [AccelOptions::LazyTree(BuildOptions::default()), grid, grid2]
+}
+
+/// Returns the world whose structures devices build.
+pub(super) fn lazy_of(scene: &Scene, options: &AccelOptions) -> World {
     let flat = FlatScene::with_instances(scene).expect("a scene that fits together");
-    World::with_accel(flat, &AccelOptions::LazyTree(BuildOptions::default())).expect("a world")
+    World::with_accel(flat, options).expect("a world")
 }
 
 /// Returns the world of the next moment: the large mesh is deformed, at every other moment also the small one, and an
 /// instance moves.
-fn next_moment(scene: &mut Scene, world: &World, moment: u64) -> World {
+pub(super) fn next_moment(scene: &mut Scene, world: &World, moment: u64) -> World {
     let deformed = if moment.is_multiple_of(2) { vec![LARGE, SMALL] } else { vec![LARGE] };
     deformed.iter().for_each(|mesh_ix| deform(&mut scene.meshes[*mesh_ix], moment));
     let place = vec3(2.0, -1.8, moment as f32 * 0.3).as_dvec3();
@@ -97,9 +109,9 @@ fn closest(caster: &mut GpuCaster, rays: &[Ray]) -> Vec<Hit> {
     caster.cast(rays, Query::Closest, 1).expect("hits").hits
 }
 
-/// Checks that all queries have the same results in both.
+/// Checks that all queries of rays have the same results in both, and those of points in kd-trees.
 pub(super) fn check_queries(name: &str, expected: &mut GpuCaster, found: &mut GpuCaster) {
-    let (rays, points) = (rays(1000), points(300));
+    let rays = rays(1000);
     let hits = closest(expected, &rays);
     assert!(hits.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count() > 100, "{name}");
     assert!(closest(found, &rays) == hits, "{name}: closest hits");
@@ -110,9 +122,15 @@ pub(super) fn check_queries(name: &str, expected: &mut GpuCaster, found: &mut Gp
     assert!(counts == expected_counts, "{name}: counts");
     let [lists, expected_lists] = [&mut *found, expected].map(|it| it.all_hits(&rays, Some(4)).expect("lists"));
     assert!(lists == expected_lists, "{name}: lists");
-    let [near, expected_near] = [found, expected].map(|it| it.closest_points(&points, 1).expect("points").hits);
-    let distances = |hits: &[Hit]| hits.iter().map(|hit| hit.t).collect::<Vec<_>>();
-    assert!(distances(&near) == distances(&expected_near), "{name}: closest points");
+    let points = points(300);
+    let distances = |caster: &mut GpuCaster| {
+        let found = caster.closest_points(&points, 1)?;
+        Ok::<_, GpuError>(found.hits.iter().map(|hit| hit.t).collect::<Vec<_>>())
+    };
+    match distances(found) {
+        Ok(near) => assert!(near == distances(expected).expect("points"), "{name}: closest points"),
+        Err(error) => assert!(error.to_string().contains("found in kd-trees"), "{name}: {error}"),
+    }
 }
 
 #[test]
@@ -143,9 +161,12 @@ fn queries_through_the_devices_trees_are_those_through_the_hosts() {
 #[test]
 fn queries_in_a_film_are_those_in_new_worlds() {
     let context = device();
-    for traversal in [Traversal::Mask, Traversal::Ropes] {
+    let [trees, grid, grid2] = &lazy_options();
+    let cases =
+        [(trees, Traversal::Mask), (trees, Traversal::Ropes), (grid, Traversal::Mask), (grid2, Traversal::Mask)];
+    for (options, traversal) in cases {
         let mut scene = scene();
-        let mut world = lazy(&scene);
+        let mut world = lazy_of(&scene, options);
         let mut caster = GpuCaster::new(&context, world.geometry(), traversal).expect("a caster");
         let first = world.clone();
         let mut on_cpu = CpuCaster::new(first.geometry(), traversal);
@@ -155,7 +176,7 @@ fn queries_in_a_film_are_those_in_new_worlds() {
             caster.set_world(&world).expect("a change");
             let host = kept(&scene);
             let mut of_new = GpuCaster::new(&context, host.geometry(), traversal).expect("a caster");
-            check_queries(&format!("{traversal}, moment {moment}"), &mut of_new, &mut caster);
+            check_queries(&format!("{options:?}, {traversal}, moment {moment}"), &mut of_new, &mut caster);
             assert!(closest(&mut caster, &rays(1000)) != before, "the mesh is deformed");
             on_cpu.set_world(&world).expect("a change");
             let new = CpuCaster::new(host.geometry(), traversal);
@@ -181,11 +202,11 @@ pub(super) fn renderer(context: &Arc<Context>, world: &World, integrator: Integr
     GpuRenderer::new(context.clone(), world, &options(integrator)).expect("a renderer")
 }
 
-/// Returns the arrays of triangles and trees.
+/// Returns the arrays of triangles and structures.
 fn arrays(renderer: &GpuRenderer) -> Vec<Arc<AnyBuffer>> {
     let arrays = &renderer.resources().accel.arrays;
     let of_trees = [arrays.kd_parents.any(), arrays.leaf_triangles.any(), arrays.leaf_planes.any()];
-    [arrays.triangles.any(), arrays.kd_nodes.any(), arrays.kd_slabs.any()]
+    [arrays.triangles.any(), arrays.kd_nodes.any(), arrays.kd_slabs.any(), arrays.grid_cells.any()]
         .into_iter()
         .chain(of_trees)
         .cloned()
@@ -199,9 +220,15 @@ fn are_same(a: &[Arc<AnyBuffer>], b: &[Arc<AnyBuffer>]) -> bool {
 #[test]
 fn pictures_of_a_film_are_those_of_new_worlds_in_the_same_arrays() {
     let context = device();
-    for integrator in [Integrator::Whitted, Integrator::Path] {
+    let [trees, grid, grid2] = &lazy_options();
+    for (integrator, options, last_stage) in [
+        (Integrator::Whitted, trees, "kdtree_leaves"),
+        (Integrator::Path, trees, "kdtree_leaves"),
+        (Integrator::Whitted, grid, "grid_leaves"),
+        (Integrator::Path, grid2, "grid_leaves"),
+    ] {
         let mut scene = scene();
-        let mut world = lazy(&scene);
+        let mut world = lazy_of(&scene, options);
         let mut film = renderer(&context, &world, integrator);
         let mut before = drawn(&mut film);
         let made = arrays(&film);
@@ -220,7 +247,7 @@ fn pictures_of_a_film_are_those_of_new_worlds_in_the_same_arrays() {
             assert!(is_same, "{integrator}, moment {moment}");
             assert!(now.radiance != before.radiance, "the mesh is deformed");
             let report = world.device_build().expect("a report");
-            assert_eq!(report.stages.iter().filter(|stage| stage.name == "kdtree_leaves").count(), 1);
+            assert_eq!(report.stages.iter().filter(|stage| stage.name == last_stage).count(), 1);
             before = now;
         }
         let keeps_words = Arc::ptr_eq(words.any(), film.resources().accel.arrays.texture_words.any());
@@ -232,9 +259,14 @@ fn pictures_of_a_film_are_those_of_new_worlds_in_the_same_arrays() {
 #[test]
 fn an_update_makes_few_objects_and_a_failed_one_changes_nothing() {
     let context = device();
+    lazy_options().iter().for_each(|options| update_with_failures(&context, options));
+    assert_silent(&context);
+}
+
+fn update_with_failures(context: &Arc<Context>, options: &AccelOptions) {
     let mut scene = scene();
-    let mut world = lazy(&scene);
-    let mut film = renderer(&context, &world, Integrator::Whitted);
+    let mut world = lazy_of(&scene, options);
+    let mut film = renderer(context, &world, Integrator::Whitted);
     // The first one makes the builder.
     world = next_moment(&mut scene, &world, 1);
     film.set_world(&world).expect("a change");
@@ -253,43 +285,55 @@ fn an_update_makes_few_objects_and_a_failed_one_changes_nothing() {
         .expect("a number");
     // Staging buffers, command buffers, the instances, the constants, and a descriptor set with its pool.
     assert!(n_creations <= 20, "{n_creations} creations");
-    let expected = drawn(&mut renderer(&context, &kept(&scene), Integrator::Whitted));
+    let expected = drawn(&mut renderer(context, &kept(&scene), Integrator::Whitted));
     assert!(drawn(&mut film).radiance == expected.radiance);
-    assert_silent(&context);
 }
 
 #[test]
-fn a_tree_without_room_uploads_everything() {
+fn a_structure_without_room_uploads_everything() {
     let context = device();
+    lazy_options().iter().for_each(|options| outgrow(&context, options));
+    assert_silent(&context);
+}
+
+fn outgrow(context: &Arc<Context>, options: &AccelOptions) {
     let mut scene = scene();
     let positions = scene.meshes[LARGE].positions.clone();
     scene.meshes[LARGE].positions.fill(Vec3::ONE);
-    let world = lazy(&scene);
-    let mut film = renderer(&context, &world, Integrator::Whitted);
-    let caster = GpuCaster::new(&context, world.geometry(), Traversal::Mask).expect("a caster");
+    let world = lazy_of(&scene, options);
+    let mut film = renderer(context, &world, Integrator::Whitted);
+    let n_elements = |film: &GpuRenderer| {
+        let arrays = &film.resources().accel.arrays;
+        arrays.kd_nodes.len() + arrays.grid_cells.len()
+    };
+    let caster = GpuCaster::new(context, world.geometry(), Traversal::Mask).expect("a caster");
     let mut caster = caster.hiding(&[3, 9000]).expect("triangles of the world");
-    let nodes = film.resources().accel.arrays.kd_nodes.clone();
+    let n_before = n_elements(&film);
     // A point becomes a ball.
     scene.meshes[LARGE].positions = positions;
     let grown = world.posed(&scene, &[(LARGE, None)].into()).expect("a scene that fits together").expect("a pose");
     film.set_world(&grown).expect("a change");
     caster.set_world(&grown).expect("a change");
-    assert!(film.resources().accel.arrays.kd_nodes.len() > nodes.len(), "more room");
+    assert!(n_elements(&film) > n_before, "more room");
     let host = kept(&scene);
-    assert!(drawn(&mut film).radiance == drawn(&mut renderer(&context, &host, Integrator::Whitted)).radiance);
-    let of_new = GpuCaster::new(&context, host.geometry(), Traversal::Mask).expect("a caster");
+    assert!(drawn(&mut film).radiance == drawn(&mut renderer(context, &host, Integrator::Whitted)).radiance);
+    let of_new = GpuCaster::new(context, host.geometry(), Traversal::Mask).expect("a caster");
     let mut of_new = of_new.hiding(&[3, 9000]).expect("triangles of the world");
     check_queries("grown", &mut of_new, &mut caster);
-    assert_silent(&context);
 }
 
 #[test]
 fn renderers_that_share_arrays_show_their_own_worlds() {
     let context = device();
+    lazy_options().iter().for_each(|options| share(&context, options));
+    assert_silent(&context);
+}
+
+fn share(context: &Arc<Context>, options: &AccelOptions) {
     let mut scene = scene();
-    let world = lazy(&scene);
-    let mut film = renderer(&context, &world, Integrator::Whitted);
-    let mut other = film.sharing(&options(Integrator::Path)).expect("a renderer");
+    let world = lazy_of(&scene, options);
+    let mut film = renderer(context, &world, Integrator::Whitted);
+    let mut other = film.sharing(&self::options(Integrator::Path)).expect("a renderer");
     let expected = drawn(&mut other);
     let next = next_moment(&mut scene, &world, 1);
     film.set_world(&next).expect("a change");
@@ -297,8 +341,7 @@ fn renderers_that_share_arrays_show_their_own_worlds() {
     assert!(drawn(&mut other).radiance == expected.radiance, "the other one is at the first moment");
     other.set_world(&next).expect("a change");
     for (renderer, integrator) in [(&mut film, Integrator::Whitted), (&mut other, Integrator::Path)] {
-        let expected = drawn(&mut self::renderer(&context, &kept(&scene), integrator));
+        let expected = drawn(&mut self::renderer(context, &kept(&scene), integrator));
         assert!(drawn(renderer).radiance == expected.radiance, "{integrator}");
     }
-    assert_silent(&context);
 }

@@ -1,12 +1,13 @@
 //! Films of glTF files whose skins and morph targets deform kept meshes. Devices deform them, or the host where kernels
-//! cannot. Arrays, hits and pictures are those of new worlds, whose vertices and trees the host makes.
+//! cannot. Arrays, hits and pictures are those of new worlds, whose vertices and trees the host makes, also where the
+//! device builds grids.
 
 use std::{collections::HashMap, fs, sync::Arc};
 
 use base64::{Engine, engine::general_purpose::STANDARD};
 use glam::{DMat4, DVec3, Mat4, Quat, Vec3, Vec3Swizzles, Vec4, vec3};
 use kdray::{
-    accel::kdtree::Traversal,
+    accel::{AccelOptions, kdtree::Traversal},
     cast::GpuCaster,
     engine::{AnimatedWorld, LoadRequest, Opened},
     frame::{Integrator, RenderOptions},
@@ -20,7 +21,8 @@ use kdray::{
 use serde_json::{Value, json};
 
 use super::{
-    deformed::{check_queries, drawn, lazy, renderer},
+    deformed::{check_queries, drawn, lazy, lazy_of, lazy_options, renderer},
+    device_grids::check_grids,
     kept, mesh_of, scene_of, transform, transforms,
 };
 use crate::support::{assert_silent, compare, device, meshes, random::Random};
@@ -208,6 +210,11 @@ fn check(name: &str, expected: &mut GpuRenderer, film: &mut GpuRenderer) {
 
 /// Plays a film. `on_device`: whether devices deform the mesh.
 fn play(kind: Kind, on_device: bool) {
+    play_in(kind, &lazy_options()[0], on_device);
+}
+
+/// Plays a film of a mesh in a structure of these options.
+fn play_in(kind: Kind, options: &AccelOptions, on_device: bool) {
     let context = device();
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("film.gltf");
@@ -215,7 +222,7 @@ fn play(kind: Kind, on_device: bool) {
     let mut request = LoadRequest::pictures(PictureChoices::default());
     request.scene.at = Some(0.0);
     let scene = Opened::read(path.as_path(), &request).expect("a scene").scene;
-    let first = lazy(&scene);
+    let first = lazy_of(&scene, options);
     let mut film = renderer(&context, &first, Integrator::Whitted);
     let mut caster = GpuCaster::new(&context, first.geometry(), Traversal::Mask).expect("a caster");
     let mut animated = AnimatedWorld::new(&path, &request, scene, &first);
@@ -240,6 +247,7 @@ fn play(kind: Kind, on_device: bool) {
         check(&name, &mut expected, &mut film);
         let mut of_new = GpuCaster::new(&context, host.geometry(), Traversal::Mask).expect("a caster");
         check_queries(&name, &mut of_new, &mut caster);
+        check_grids(&name, &film, &world);
     }
     assert_silent(&context);
 }
@@ -284,6 +292,14 @@ fn morphed_meshes_are_deformed_by_the_device() {
 #[test]
 fn meshes_with_both_are_deformed_by_the_device() {
     play(BOTH, true);
+}
+
+#[test]
+fn grids_of_meshes_that_the_device_deforms_are_the_hosts() {
+    let [_, grid, grid2] = &lazy_options();
+    play_in(SKINNED, grid, true);
+    play_in(MORPHED, grid2, true);
+    play_in(Kind { has_tangents: false, ..MORPHED }, grid2, false);
 }
 
 #[test]
@@ -360,9 +376,13 @@ fn next(world: &World, scene: &Scene, changed: &ChangedMeshes) -> World {
 
 #[test]
 fn meshes_are_deformed_one_after_the_other() {
+    lazy_options().iter().for_each(deform_one_after_the_other);
+}
+
+fn deform_one_after_the_other(options: &AccelOptions) {
     let context = device();
     let mut cubes = Cubes::new();
-    let first = lazy(&cubes.scene);
+    let first = lazy_of(&cubes.scene, options);
     let mut film = renderer(&context, &first, Integrator::Whitted);
     let mut caster = GpuCaster::new(&context, first.geometry(), Traversal::Mask).expect("a caster");
     let mut world = first.clone();
@@ -379,6 +399,7 @@ fn meshes_are_deformed_one_after_the_other() {
         check(&name, &mut renderer(&context, &host, Integrator::Whitted), &mut film);
         let mut of_new = GpuCaster::new(&context, host.geometry(), Traversal::Mask).expect("a caster");
         check_queries(&name, &mut of_new, &mut caster);
+        check_grids(&name, &film, &world);
     }
     assert_silent(&context);
 }

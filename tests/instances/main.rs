@@ -8,6 +8,7 @@ mod casts;
 mod closest_points;
 mod costs;
 mod deformed;
+mod device_grids;
 mod films;
 mod grids;
 mod margins;

@@ -12,8 +12,8 @@ use kdray::{
     buffers::KdTreeRoom,
     gpu::{Buffer, BufferUse, Context, Timer},
     layout::{
-        KD_BIN_BLOCK, KD_BLOCK_SIZE, KD_HAS_SLAB, KD_LEAF, KD_PAIR_SHIFT, KD_SMALL_CELL, KD_WORD_DEPTH, KdNode,
-        KdPlace, Slab, Triangle,
+        KD_BIN_BLOCK, KD_BLOCK_SIZE, KD_HAS_SLAB, KD_LEAF, KD_PAIR_SHIFT, KD_SMALL_CELL, KD_WORD_DEPTH, KdNode, Slab,
+        StructurePlace, Triangle,
     },
     passes::kdtree::{BuiltTree, KdTreeBuilder, KdTreeBuilderOptions},
     reference::{
@@ -299,7 +299,7 @@ fn relocated_trees_have_the_indices_of_their_places() {
         let built = builder.build_first(n, None).expect("a tree");
         let expected = builder.read_back(&built).expect("its arrays");
         check_twin(&context, "soup", &triangles, (&built, &expected));
-        let place = KdPlace { first_node: 14, first_entry: 1001, first_row: 77 };
+        let place = StructurePlace { first_element: 14, first_entry: 1001, first_row: 77 };
         let tree = builder.copy_relocated(&built, &place, BufferUse::Storage).expect("a copy");
         let nodes = expected.nodes.iter().map(|&KdNode { split_or_first, axis_and_child }| {
             if axis_and_child & KD_LEAF != 0 {

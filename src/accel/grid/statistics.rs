@@ -32,6 +32,17 @@ pub struct Statistics {
 }
 
 impl Statistics {
+    /// Adds the figures of another grid, but for `n_levels` and `references_per_triangle`.
+    pub(in crate::accel) fn add(&mut self, other: &Self) {
+        self.resolution = [0, 1, 2].map(|axis| self.resolution[axis].max(other.resolution[axis]));
+        self.n_upper_cells += other.n_upper_cells;
+        self.n_cells += other.n_cells;
+        self.n_empty_cells += other.n_empty_cells;
+        self.n_references += other.n_references;
+        self.n_coarser = self.n_coarser.max(other.n_coarser);
+        self.bytes += other.bytes;
+    }
+
     /// Returns the size of a grid's cells, and of its references with their planes, as the host stores them, bytes.
     pub(crate) fn bytes_of(n_cells: usize, n_references: usize) -> u64 {
         (n_cells * size_of::<GridCell>() + n_references * (size_of::<u32>() + size_of::<Plane>())) as u64

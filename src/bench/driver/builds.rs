@@ -103,7 +103,7 @@ impl DeviceBuilds {
         let on_device = Buffer::with(context, "triangles", triangles, BufferUse::Texels)?;
         let builder = GridBuilder::new(context, &on_device, options)?;
         let timer = Timer::new(context, builder.n_stages())?;
-        Self::measure(kind, || Ok(builder.build(Some(&timer), BufferUse::Texels)?.report(triangles.len())))
+        Self::measure(kind, || Ok(builder.build(Some(&timer))?.report(triangles.len())))
     }
 
     /// Builds a structure several times. `build` builds it once.

@@ -1,27 +1,31 @@
-//! Builds a grid on a device: runs the kernels over the triangles, and copies the grid from arrays of the largest
-//! possible size to arrays of exactly the grid's size.
+//! Builds a grid on a device, in buffers that are allocated once, of the largest possible size.
 
 use std::sync::Arc;
 
 use super::GridPasses;
 use crate::{
     accel::grid::{GridOptions, Lattice},
-    buffers::GridBuffers,
-    gpu::{Buffer, BufferUse, CommandBuffer, Context, GpuError, Timer, TimerRow},
-    layout::{GRID_IS_COUNTED, GridBuild, GridCell, LeafTriangle, Plane, Triangle},
-    passes::device_build,
+    buffers::{GridBuffers, GridCapacities},
+    gpu::{Buffer, BufferUse, CommandBuffer, Commands, Context, GpuError, Timer, TimerRow},
+    layout::{GRID_IS_COUNTED, LeafTriangle, StructurePlace, Triangle},
+    passes::structures::{StructureArrays, StructureKind, Target, submit},
 };
 
-/// Kernels and memory that build the grid of an array of triangles. A build can be repeated any number of times.
+/// Kernels and memory that build the grid of an array of triangles. A build can be repeated any number of times, with
+/// other triangles in the same buffer, and also with fewer.
 pub struct GridBuilder {
     context: Arc<Context>,
     options: GridOptions,
     passes: GridPasses,
     buffers: GridBuffers,
+    /// The finished grid, at the beginning.
+    arrays: StructureArrays,
 }
 
-/// A grid in a device's memory, the same as the host's [`Grid`](crate::accel::grid::Grid), bit for bit.
-pub struct DeviceGrid {
+/// A finished build. The grid is in the builder's buffers until the next build: the same as the host's
+/// [`Grid`](crate::accel::grid::Grid), bit for bit.
+#[derive(Clone, Debug)]
+pub struct BuiltGrid {
     /// The lattice of the upper level.
     pub lattice: Lattice,
     /// The number of levels, 1 or 2.
@@ -29,12 +33,10 @@ pub struct DeviceGrid {
     /// The number of times that cells were made larger because a count exceeded its limit: doublings of the upper
     /// cells' edges and halvings of the blocks' resolutions.
     pub n_coarser: u32,
-    /// The cells of the upper level, then those of the lower one.
-    pub cells: Buffer<GridCell>,
-    /// The triangles of each cell, one cell after the other.
-    pub leaf_triangles: Buffer<LeafTriangle>,
-    /// The plane of each of `leaf_triangles`.
-    pub leaf_planes: Buffer<Plane>,
+    /// Cells of all levels.
+    pub n_cells: u32,
+    /// Entries of all cells.
+    pub n_references: u32,
     /// The number of cells with triangles, of the upper level and of the lower one.
     pub n_filled: [u32; 2],
     /// Times of the build's dispatches; empty without a timer.
@@ -53,8 +55,16 @@ impl GridBuilder {
         }
         let options = Self::options_for(context, options);
         let bindings = GridBuffers::bindings(context)?;
+        let buffers = GridBuffers::new(context, &bindings, triangles, &options)?;
+        let arrays = StructureArrays {
+            cells: buffers.cells.clone(),
+            leaf_triangles: buffers.leaf_triangles.clone(),
+            leaf_planes: buffers.leaf_planes.clone(),
+            ..StructureArrays::new(context, StructureKind::Grid, (0, 0), BufferUse::Storage)?
+        };
         Ok(Self {
-            buffers: GridBuffers::new(context, &bindings, triangles, &options)?,
+            arrays,
+            buffers,
             passes: GridPasses::new(context, &bindings, options.levels.n_levels())?,
             context: context.clone(),
             options,
@@ -85,57 +95,86 @@ impl GridBuilder {
         self.passes.n_stages(&self.buffers)
     }
 
-    /// Builds the grid and waits for the device. The grid's buffers are created for `usage`. `timer`: takes the times
-    /// of the dispatches; it must have room for [`GridBuilder::n_stages`] rows.
+    /// Builds the grid and waits for the device. `timer`: takes the times of the dispatches; it must have room for
+    /// [`GridBuilder::n_stages`] rows.
     ///
     /// # Errors
     /// Out of memory; a Vulkan call fails.
-    pub fn build(&self, timer: Option<&Timer>, usage: BufferUse) -> Result<DeviceGrid, GpuError> {
+    pub fn build(&self, timer: Option<&Timer>) -> Result<BuiltGrid, GpuError> {
+        self.build_first(self.buffers.capacities.n_triangles as usize, timer)
+    }
+
+    /// Builds the grid of the first `n_triangles` triangles, as [`GridBuilder::build`] does.
+    ///
+    /// # Errors
+    /// Out of memory; a Vulkan call fails.
+    ///
+    /// # Panics
+    /// The builder was made for fewer.
+    pub fn build_first(&self, n_triangles: usize, timer: Option<&Timer>) -> Result<BuiltGrid, GpuError> {
+        let capacity = self.buffers.capacities.n_triangles as usize;
+        assert!(n_triangles <= capacity, "{n_triangles} triangles, room for {capacity}");
+        let own = GridCapacities::new(n_triangles as u32, &self.options);
         let commands = CommandBuffer::record(&self.context, "grid_build", timer, |commands| {
             commands.reset_timer();
-            self.passes.record(commands, &self.buffers);
+            self.passes.record(commands, &self.buffers, &own);
         })?;
         self.context.wait_for(self.context.submit(vec![commands])?)?;
         let build = self.buffers.build.download()?[0];
         assert_eq!(build.counts, GRID_IS_COUNTED, "the last attempt keeps to the limit");
-        let mut grid = self.with_room(&build, usage)?;
-        self.copy_to(&grid)?;
-        grid.stages = timer.map_or(Ok(Vec::new()), Timer::rows)?;
-        Ok(grid)
-    }
-
-    /// Creates the grid of a finished build, with arrays whose contents are undefined.
-    fn with_room(&self, build: &GridBuild, usage: BufferUse) -> Result<DeviceGrid, GpuError> {
-        let lattice = Lattice {
-            min: build.box_min.to_array(),
-            max: build.box_max.to_array(),
-            cell_size: build.cell_size,
-            n_cells: [build.n_cells_x, build.n_cells_y, build.n_cells_z],
-        };
-        let n_cells = build.n_upper as usize + build.n_lower as usize;
-        let n_references = build.n_pairs as usize;
-        Ok(DeviceGrid {
-            lattice,
+        Ok(BuiltGrid {
+            lattice: Lattice {
+                min: build.box_min.to_array(),
+                max: build.box_max.to_array(),
+                cell_size: build.cell_size,
+                n_cells: [build.n_cells_x, build.n_cells_y, build.n_cells_z],
+            },
             n_levels: self.options.levels.n_levels(),
             n_coarser: build.n_coarser + build.n_halvings,
-            cells: Buffer::new(&self.context, "grid_cells", n_cells, usage)?,
-            leaf_triangles: Buffer::new(&self.context, "leaf_triangles", n_references, usage)?,
-            leaf_planes: Buffer::new(&self.context, "leaf_planes", n_references, usage)?,
+            n_cells: build.n_upper + build.n_lower,
+            n_references: build.n_pairs,
             n_filled: [build.n_filled_upper, build.n_filled_lower],
-            stages: Vec::new(),
+            stages: timer.map_or(Ok(Vec::new()), Timer::rows)?,
         })
     }
 
-    fn copy_to(&self, grid: &DeviceGrid) -> Result<(), GpuError> {
-        let copies = [
-            (self.buffers.cells.any(), grid.cells.any(), grid.cells.len() * size_of::<GridCell>()),
-            (
-                self.buffers.leaf_triangles.any(),
-                grid.leaf_triangles.any(),
-                grid.leaf_triangles.len() * size_of::<LeafTriangle>(),
-            ),
-            (self.buffers.leaf_planes.any(), grid.leaf_planes.any(), grid.leaf_planes.len() * size_of::<Plane>()),
-        ];
-        device_build::copy(&self.context, "grid_copy", &copies)
+    /// Copies the grid of the last build to buffers that are created for `usage`, so that the builder can be dropped.
+    ///
+    /// # Errors
+    /// Out of memory; a Vulkan call fails.
+    pub fn copy(&self, built: &BuiltGrid, usage: BufferUse) -> Result<StructureArrays, GpuError> {
+        self.arrays.copied(&self.context, StructureKind::Grid, built.sizes(), usage)
+    }
+
+    /// Copies the grid of the last build as [`GridBuilder::copy`] does, with the indices that it has in arrays of
+    /// several grids. In the builder's buffers, too, the grid has these indices afterwards.
+    ///
+    /// # Errors
+    /// Out of memory; a Vulkan call fails.
+    pub fn copy_relocated(
+        &self,
+        built: &BuiltGrid,
+        place: &StructurePlace,
+        usage: BufferUse,
+    ) -> Result<StructureArrays, GpuError> {
+        submit(&self.context, "grid_relocate", |commands| self.relocate(commands, built, place))?;
+        self.copy(built, usage)
+    }
+
+    /// Copies the grid of the last build into arrays of several grids, as
+    /// [`KdTreeBuilder::place`](crate::passes::kdtree::KdTreeBuilder::place) does with a tree.
+    ///
+    /// # Errors
+    /// Out of memory; a Vulkan call fails. Nothing has been copied then.
+    ///
+    /// # Panics
+    /// The arrays have no room there.
+    pub fn place(&self, built: &BuiltGrid, target: &Target) -> Result<(), GpuError> {
+        let relocate = |commands: &Commands| self.relocate(commands, built, &target.place);
+        self.arrays.place(&self.context, built.sizes(), (target, relocate))
+    }
+
+    fn relocate(&self, commands: &Commands, built: &BuiltGrid, place: &StructurePlace) {
+        self.passes.relocate(commands, &self.buffers, built.n_cells.max(built.n_references), place);
     }
 }

@@ -15,6 +15,7 @@
 //!   cells            finds each cell's pairs
 //!   blocks           (lower level) writes into each upper cell where its lower cells are
 //! leaves             writes triangles and planes in the order of the pairs
+//! relocate, if wanted   makes the indices those of arrays that hold several grids
 //! ```
 //!
 //! An item is a triangle with a lattice, into whose cells the triangle is put. At the upper level, this is the
@@ -41,13 +42,16 @@ mod report;
 
 use std::{mem::offset_of, sync::Arc};
 
-pub use self::builder::{DeviceGrid, GridBuilder};
+pub use self::builder::{BuiltGrid, GridBuilder};
 use self::level::Level;
 use super::{Kernels, ONE_GROUP, spirv, then};
 use crate::{
-    buffers::{GridBuffers, PairSets},
+    buffers::{GridBuffers, GridCapacities, PairSets},
     gpu::{Access, BindingLayout, Commands, ComputePipeline, Constants, Context, Dispatch, GpuError},
-    layout::{GRID_BLOCK_SIZE, GRID_GROUPS_X, GRID_MAX_ATTEMPTS, GRID_SCANS_CELLS, GridBuild, GridSort, constants},
+    layout::{
+        GRID_BLOCK_SIZE, GRID_GROUPS_X, GRID_MAX_ATTEMPTS, GRID_SCANS_CELLS, GridBuild, GridSort, StructurePlace,
+        constants,
+    },
 };
 
 /// All kernels of a build.
@@ -58,6 +62,7 @@ struct GridPasses {
     /// None for a uniform grid.
     lower: Option<Lower>,
     leaves: ComputePipeline,
+    relocate: ComputePipeline,
 }
 
 /// The kernels of the lower level.
@@ -81,6 +86,7 @@ impl GridPasses {
     /// The driver refuses a shader.
     fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>, n_levels: u32) -> Result<Self, GpuError> {
         let none = Constants::new();
+        let levels = Constants::new().set(constants::LOWER_LEVEL, n_levels == 2);
         let kernels = Kernels { context, bindings };
         let lower = if n_levels == 2 { Some(Lower::new(&kernels)?) } else { None };
         Ok(Self {
@@ -89,13 +95,15 @@ impl GridPasses {
             upper: Level::upper(&kernels)?,
             lower,
             leaves: kernels.of_blocks("grid_leaves", spirv!("grid_leaves.comp"), &none)?,
+            relocate: kernels.of_blocks("grid_relocate", spirv!("grid_relocate.comp"), &levels)?,
         })
     }
 
-    /// Records the build. Needs `triangles`. Leaves `build`, `cells`, `leaf_triangles` and `leaf_planes`.
-    fn record(&self, commands: &Commands, buffers: &GridBuffers) {
+    /// Records the build. Needs the first `triangles`, as many as `own` says. Leaves `build`, `cells`, `leaf_triangles`
+    /// and `leaf_planes`.
+    fn record(&self, commands: &Commands, buffers: &GridBuffers, own: &GridCapacities) {
         commands.bind(buffers.levels[0].writing_unsorted());
-        self.bounds(commands, buffers);
+        self.bounds(commands, buffers, own);
         then(commands);
         dispatch(commands, &self.lattice, ONE_GROUP);
         then(commands);
@@ -120,16 +128,20 @@ impl GridPasses {
     }
 
     /// Needs `triangles`. Leaves their bounding box in `build`, and `cells` cleared to zero.
-    fn bounds(&self, commands: &Commands, buffers: &GridBuffers) {
+    fn bounds(&self, commands: &Commands, buffers: &GridBuffers, own: &GridCapacities) {
         let reset = || {
-            commands.update_buffer(buffers.build.any(), std::slice::from_ref(buffers.initial()));
+            commands.update_buffer(buffers.build.any(), &[buffers.initial(own)]);
             commands.clear_buffer(buffers.cells.any());
             commands.barrier(Access::TransferWrite, Access::KernelUpdate); // build, cells
         };
-        let n_groups = buffers.capacities.n_triangles.div_ceil(GRID_BLOCK_SIZE);
-        let groups = [n_groups.min(GRID_GROUPS_X), n_groups.div_ceil(GRID_GROUPS_X), 1];
-        let dispatch = Dispatch::Threads(groups, [1, 1, 1]);
-        commands.dispatch_after(reset, &self.bounds, None, &GridSort::default(), dispatch);
+        commands.dispatch_after(reset, &self.bounds, None, &GridSort::default(), over_blocks(own.n_triangles));
+    }
+
+    /// Records the relocation of a grid of at most `n` cells and entries. Needs `build`. Updates `cells` and
+    /// `leaf_triangles`.
+    fn relocate(&self, commands: &Commands, buffers: &GridBuffers, n: u32, place: &StructurePlace) {
+        commands.bind(buffers.levels[0].writing_unsorted());
+        commands.dispatch(&self.relocate, None, place, over_blocks(n));
     }
 }
 
@@ -159,6 +171,12 @@ impl Cut {
         commands.dispatch(&self.spine, Some(attempt), &GridSort::default(), ONE_GROUP);
         then(commands);
     }
+}
+
+/// Returns a dispatch of a workgroup for each block of `n` entries.
+fn over_blocks(n: u32) -> Dispatch<'static> {
+    let n_groups = n.div_ceil(GRID_BLOCK_SIZE);
+    Dispatch::Threads([n_groups.min(GRID_GROUPS_X), n_groups.div_ceil(GRID_GROUPS_X), 1], [1, 1, 1])
 }
 
 /// Returns the indirect dispatch whose size is at a byte offset of `build`.

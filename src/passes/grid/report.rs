@@ -1,13 +1,18 @@
 //! Statistics and times of a grid that a device has built.
 
-use super::DeviceGrid;
+use super::BuiltGrid;
 use crate::{
     accel::{self, DeviceBuild, grid::Statistics},
     layout::AccelConstants,
     passes::device_build,
 };
 
-impl DeviceGrid {
+impl BuiltGrid {
+    /// The numbers of cells and of entries.
+    pub fn sizes(&self) -> (usize, usize) {
+        (self.n_cells as usize, self.n_references as usize)
+    }
+
     /// Returns the constants for kernels that trace rays through the grid. `origin_reach`: that of the grid's triangles
     /// (accel/kdtree/scales.rs), world units.
     pub fn constants(&self, origin_reach: f32) -> AccelConstants {
@@ -22,9 +27,9 @@ impl DeviceGrid {
         // cell.
         let (n_cells, n_filled) = match self.n_levels {
             1 => (n_upper, n_filled_upper),
-            _ => (self.cells.len() as u64 - n_filled_upper, n_filled_lower),
+            _ => (u64::from(self.n_cells) - n_filled_upper, n_filled_lower),
         };
-        let n_references = self.leaf_triangles.len() as u64;
+        let n_references = u64::from(self.n_references);
         Statistics {
             resolution: self.lattice.n_cells,
             n_levels: self.n_levels,
@@ -34,7 +39,7 @@ impl DeviceGrid {
             n_references,
             references_per_triangle: n_references as f64 / n_triangles.max(1) as f64,
             n_coarser: self.n_coarser,
-            bytes: Statistics::bytes_of(self.cells.len(), self.leaf_triangles.len()),
+            bytes: Statistics::bytes_of(self.n_cells as usize, self.n_references as usize),
         }
     }
 

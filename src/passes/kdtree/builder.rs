@@ -1,6 +1,6 @@
 //! Builds a kd-tree on a device, in buffers that are allocated once.
 
-use std::{iter, sync::Arc};
+use std::sync::Arc;
 
 use super::KdTreePasses;
 use crate::{
@@ -9,9 +9,14 @@ use crate::{
         kdtree::{BuildOptions, KdArrays, Statistics},
     },
     buffers::{KdTreeBuffers, KdTreeRoom, TreeBuffers},
-    gpu::{Access, AnyBuffer, Buffer, BufferUse, CommandBuffer, Commands, Context, GpuError, Timer, TimerRow},
-    layout::{KD_MOST_ENTRIES, KdBuild, KdNode, KdPlace, LeafTriangle, Plane, Slab, Triangle},
-    passes::{device_build, kd_slabs::SlabBuilder, then},
+    gpu::{Buffer, BufferUse, CommandBuffer, Commands, Context, GpuError, Timer, TimerRow},
+    layout::{KD_MOST_ENTRIES, KdBuild, LeafTriangle, Slab, StructurePlace, Triangle},
+    passes::{
+        device_build,
+        kd_slabs::SlabBuilder,
+        structures::{StructureArrays, StructureKind, Target, submit},
+        then,
+    },
 };
 
 /// Triangles up to which a command buffer builds all levels: an H200 takes some 6 ms.
@@ -41,6 +46,8 @@ pub struct KdTreeBuilder {
     passes: KdTreePasses,
     buffers: KdTreeBuffers,
     slabs: Option<SlabStage>,
+    /// The finished tree, at the beginning.
+    arrays: StructureArrays,
 }
 
 /// The last stage of a build of a tree with slabs.
@@ -83,112 +90,17 @@ pub struct BuiltTree {
     state: KdBuild,
 }
 
-/// Arrays that hold a tree, or several.
-#[derive(Clone)]
-pub struct DeviceTree {
-    /// The nodes.
-    pub nodes: Buffer<KdNode>,
-    /// The parent of each pair of nodes.
-    pub parents: Buffer<u32>,
-    /// The triangles of the leaves, with their indices.
-    pub leaf_triangles: Buffer<LeafTriangle>,
-    /// The plane of each of `leaf_triangles`.
-    pub leaf_planes: Buffer<Plane>,
-    /// A slab for each node; empty for a tree without slabs.
-    pub slabs: Buffer<Slab>,
-}
-
-impl DeviceTree {
-    /// Makes arrays for so many nodes and entries, of which none is defined.
-    ///
-    /// # Errors
-    /// An array exceeds the device's limits, or memory runs out.
-    pub fn new(
-        context: &Arc<Context>,
-        (n_nodes, n_entries): (usize, usize),
-        has_slabs: bool,
-        usage: BufferUse,
-    ) -> Result<Self, GpuError> {
-        Ok(Self {
-            nodes: Buffer::new(context, "kd_nodes", n_nodes, usage)?,
-            parents: Buffer::new(context, "kd_parents", n_nodes / 2, usage)?,
-            leaf_triangles: Buffer::new(context, "leaf_triangles", n_entries, usage)?,
-            leaf_planes: Buffer::new(context, "leaf_planes", n_entries, usage)?,
-            slabs: Buffer::new(context, "kd_slabs", if has_slabs { n_nodes } else { 0 }, usage)?,
-        })
-    }
-
-    /// Copies trees of so many nodes and entries, which have the indices of the target already, to their place there.
-    /// Does not wait for the device, as [`KdTreeBuilder::place`].
-    ///
-    /// # Errors
-    /// Out of memory; a Vulkan call fails. Nothing has been copied then.
-    ///
-    /// # Panics
-    /// The arrays have no room there.
-    pub fn copy_to(&self, context: &Arc<Context>, sizes: (usize, usize), target: &Target) -> Result<(), GpuError> {
-        let from = self.sizes(0, 0).map(|(buffer, _)| buffer);
-        submit(context, "kdtree_copy", |commands| target.record(commands, from, sizes))
-    }
-
-    /// Returns the arrays, each with the number of bytes of a tree of so many nodes and entries.
-    fn sizes(&self, n_nodes: usize, n_entries: usize) -> [(&Arc<AnyBuffer>, usize); 5] {
-        let n_slabs = if self.slabs.is_empty() { 0 } else { n_nodes };
-        [
-            (self.nodes.any(), n_nodes * size_of::<KdNode>()),
-            (self.parents.any(), n_nodes / 2 * size_of::<u32>()),
-            (self.leaf_triangles.any(), n_entries * size_of::<LeafTriangle>()),
-            (self.leaf_planes.any(), n_entries * size_of::<Plane>()),
-            (self.slabs.any(), n_slabs * size_of::<Slab>()),
-        ]
-    }
-}
-
-/// Submits commands between whatever else uses their buffers, without a wait.
-fn submit(context: &Arc<Context>, name: &str, record: impl FnOnce(&Commands)) -> Result<(), GpuError> {
-    let commands = CommandBuffer::record(context, name, None, |commands| {
-        commands.barrier(Access::AnyUse, Access::AnyUse); // arrays of builds and frames before
-        record(commands);
-        commands.barrier(Access::AnyUse, Access::AnyUse); // the same arrays in builds and frames that follow
-    })?;
-    context.submit(vec![commands]).map(drop)
-}
-
-/// Arrays that hold the trees of several geometries, one after the other, and the place of one of them.
-pub struct Target<'a> {
-    /// The arrays of trees.
-    pub trees: &'a DeviceTree,
-    /// Where the geometry's parts of the arrays begin.
-    pub place: KdPlace,
-    /// What is copied together with the tree.
-    pub more: &'a [BufferCopy],
-}
-
-/// A copy of the first bytes of a buffer to another one, from the byte `begin` of that one on.
-pub struct BufferCopy {
-    /// The source.
-    pub from: Arc<AnyBuffer>,
-    /// The destination, and the byte at which the copy begins.
-    pub to: (Arc<AnyBuffer>, usize),
-    /// The number of bytes.
-    pub bytes: usize,
-}
-
-impl Target<'_> {
-    /// Records the copies of the arrays of a tree of so many nodes and entries.
-    fn record(&self, commands: &Commands, from: [&Arc<AnyBuffer>; 5], (n_nodes, n_entries): (usize, usize)) {
-        let sizes = self.trees.sizes(n_nodes, n_entries);
-        let begins = self.trees.sizes(self.place.first_node as usize, self.place.first_entry as usize);
-        let arrays =
-            iter::zip(from, sizes).zip(begins).map(|((from, (to, bytes)), (_, begin))| (from, to, begin, bytes));
-        let more = self.more.iter().map(|it| (&it.from, &it.to.0, it.to.1, it.bytes));
-        for (from, to, begin, bytes) in arrays.chain(more).filter(|(.., bytes)| *bytes > 0) {
-            commands.copy_buffer_range((from, 0), (to, begin as u64), bytes as u64);
-        }
-    }
-}
-
 impl BuiltTree {
+    /// The numbers of nodes and of entries.
+    pub fn sizes(&self) -> (usize, usize) {
+        (self.n_nodes as usize, self.n_entries as usize)
+    }
+
+    /// The kind of the tree's arrays.
+    pub fn kind(&self) -> StructureKind {
+        StructureKind::KdTree { has_slabs: self.has_slabs }
+    }
+
     /// Returns what is known of the tree's sizes, and the times of its build, by kernel.
     pub fn report(&self, n_triangles: usize) -> DeviceBuild {
         let sizes = [self.n_nodes, self.n_entries].map(u64::from);
@@ -213,8 +125,18 @@ impl KdTreeBuilder {
         }
         let bindings = KdTreeBuffers::bindings(context)?;
         let buffers = KdTreeBuffers::new(context, &bindings, triangles, options.room, &options.tree)?;
+        let slabs = options.tree.slabs.then(|| SlabStage::new(context, &buffers)).transpose()?;
+        let empty = StructureArrays::new(context, StructureKind::Grid, (0, 0), BufferUse::Storage)?;
         Ok(Self {
-            slabs: options.tree.slabs.then(|| SlabStage::new(context, &buffers)).transpose()?,
+            arrays: StructureArrays {
+                nodes: buffers.nodes.clone(),
+                parents: buffers.parents.clone(),
+                leaf_triangles: buffers.leaf_triangles.clone(),
+                leaf_planes: buffers.leaf_planes.clone(),
+                slabs: slabs.as_ref().map_or(empty.slabs, |stage| stage.slabs.clone()),
+                cells: empty.cells,
+            },
+            slabs,
             buffers,
             passes: KdTreePasses::new(context, &bindings)?,
             triangles: triangles.clone(),
@@ -256,27 +178,6 @@ impl KdTreeBuilder {
     /// There are more than [`KdTreeBuilder::capacity`].
     pub fn upload(&self, triangles: &[Triangle]) -> Result<(), GpuError> {
         self.triangles.upload_at(0, triangles)
-    }
-
-    /// Overwrites the first triangles by those of another array, `len` from the index `first` on. Later builds use
-    /// them.
-    ///
-    /// # Errors
-    /// Out of memory; a Vulkan call fails.
-    pub fn take(&self, from: &Buffer<Triangle>, (first, len): (usize, usize)) -> Result<(), GpuError> {
-        let [first, len] = [first, len].map(|n| (n * size_of::<Triangle>()) as u64);
-        self.submit("kdtree_take", |commands| {
-            commands.copy_buffer_range((from.any(), first), (self.triangles.any(), 0), len);
-        })
-    }
-
-    /// Submits commands that write the first triangles. They come after all commands that were submitted before, and
-    /// before all later ones.
-    ///
-    /// # Errors
-    /// Out of memory; a Vulkan call fails.
-    pub fn fill(&self, record: impl FnOnce(&Commands)) -> Result<(), GpuError> {
-        self.submit("kdtree_fill", record)
     }
 
     /// Builds the tree and waits for the device. `timer`: takes the times of the dispatches; it must have room for
@@ -336,14 +237,8 @@ impl KdTreeBuilder {
     ///
     /// # Errors
     /// Out of memory; a Vulkan call fails.
-    pub fn copy(&self, built: &BuiltTree, usage: BufferUse) -> Result<DeviceTree, GpuError> {
-        let (n_nodes, n_entries) = (built.n_nodes as usize, built.n_entries as usize);
-        let to = DeviceTree::new(&self.context, (n_nodes, n_entries), built.has_slabs, usage)?;
-        let arrays: Vec<_> = iter::zip(self.arrays(), to.sizes(n_nodes, n_entries))
-            .map(|(from, (to, bytes))| (from, to, bytes))
-            .collect();
-        device_build::copy(&self.context, "kdtree_copy", &arrays)?;
-        Ok(to)
+    pub fn copy(&self, built: &BuiltTree, usage: BufferUse) -> Result<StructureArrays, GpuError> {
+        self.arrays.copied(&self.context, built.kind(), built.sizes(), usage)
     }
 
     /// Copies the tree of the last build as [`KdTreeBuilder::copy`] does, with the indices that it has in arrays of
@@ -351,8 +246,13 @@ impl KdTreeBuilder {
     ///
     /// # Errors
     /// Out of memory; a Vulkan call fails.
-    pub fn copy_relocated(&self, built: &BuiltTree, place: &KdPlace, usage: BufferUse) -> Result<DeviceTree, GpuError> {
-        self.submit("kdtree_relocate", |commands| self.relocate(commands, built, place))?;
+    pub fn copy_relocated(
+        &self,
+        built: &BuiltTree,
+        place: &StructurePlace,
+        usage: BufferUse,
+    ) -> Result<StructureArrays, GpuError> {
+        submit(&self.context, "kdtree_relocate", |commands| self.relocate(commands, built, place))?;
         self.copy(built, usage)
     }
 
@@ -366,31 +266,12 @@ impl KdTreeBuilder {
     /// # Panics
     /// The arrays have no room there.
     pub fn place(&self, built: &BuiltTree, target: &Target) -> Result<(), GpuError> {
-        self.submit("kdtree_place", |commands| {
-            self.relocate(commands, built, &target.place);
-            commands.barrier(Access::ComputeWrite, Access::TransferRead); // the relocated arrays
-            target.record(commands, self.arrays(), (built.n_nodes as usize, built.n_entries as usize));
-        })
+        let relocate = |commands: &Commands| self.relocate(commands, built, &target.place);
+        self.arrays.place(&self.context, built.sizes(), (target, relocate))
     }
 
-    /// The buffer of the triangles.
-    pub fn triangles(&self) -> &Buffer<Triangle> {
-        &self.triangles
-    }
-
-    /// The arrays of the tree in the order of [`DeviceTree::sizes`]. Without slabs, the last one is another one.
-    fn arrays(&self) -> [&Arc<AnyBuffer>; 5] {
-        let KdTreeBuffers { nodes, parents, leaf_triangles, leaf_planes, .. } = &self.buffers;
-        let slabs = self.slabs.as_ref().map_or(nodes.any(), |stage| stage.slabs.any());
-        [nodes.any(), parents.any(), leaf_triangles.any(), leaf_planes.any(), slabs]
-    }
-
-    fn relocate(&self, commands: &Commands, built: &BuiltTree, place: &KdPlace) {
+    fn relocate(&self, commands: &Commands, built: &BuiltTree, place: &StructurePlace) {
         self.passes.relocate(commands, &self.buffers, built.n_nodes.max(built.n_entries), place);
-    }
-
-    fn submit(&self, name: &str, record: impl FnOnce(&Commands)) -> Result<(), GpuError> {
-        submit(&self.context, name, record)
     }
 
     /// Records the command buffers of a build: one for what comes before the levels, one or more for the levels, and

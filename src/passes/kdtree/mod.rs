@@ -37,14 +37,14 @@ mod builder;
 
 use std::{mem::offset_of, sync::Arc};
 
-pub use self::builder::{BufferCopy, BuiltTree, DeviceTree, KdTreeBuilder, KdTreeBuilderOptions, Target};
+pub use self::builder::{BuiltTree, KdTreeBuilder, KdTreeBuilderOptions};
 use super::{Kernels, ONE_GROUP, spirv, then};
 use crate::{
     buffers::KdTreeBuffers,
     gpu::{Access, BindingLayout, Commands, ComputePipeline, Constants, Context, Dispatch, GpuError},
     layout::{
-        KD_BLOCK_SIZE, KD_GROUPS_X, KD_SCANS_CELLS, KD_SCANS_REFERENCES, KD_SCANS_TRIANGLES, KdBuild, KdLevel, KdPlace,
-        KdStage, constants,
+        KD_BLOCK_SIZE, KD_GROUPS_X, KD_SCANS_CELLS, KD_SCANS_REFERENCES, KD_SCANS_TRIANGLES, KdBuild, KdLevel, KdStage,
+        StructurePlace, constants,
     },
 };
 
@@ -186,7 +186,7 @@ impl KdTreePasses {
 
     /// Records the relocation of a tree of at most `n` nodes and entries. Needs `build`. Updates `nodes`, `parents` and
     /// `leaf_triangles`.
-    fn relocate(&self, commands: &Commands, buffers: &KdTreeBuffers, n: u32, place: &KdPlace) {
+    fn relocate(&self, commands: &Commands, buffers: &KdTreeBuffers, n: u32, place: &StructurePlace) {
         commands.bind(buffers.set_of(0));
         commands.dispatch(&self.relocate, None, place, over_blocks(n));
     }
