@@ -518,7 +518,7 @@ impl CastArgs {
     /// Refuses arguments that contradict each other.
     pub fn check(&self) -> Result<(), CliError> {
         self.structure.check(self.cpu)?;
-        if self.closest && self.structure.accel != AccelKind::KdTree {
+        if self.closest && self.structure.accel.pinned().unwrap_or_default() != AccelKind::KdTree {
             return CliError::refuse("--closest searches kd-trees: use --accel kdtree");
         }
         require_ending(&self.output, "npz", "a file of hits")

@@ -69,9 +69,10 @@ pub struct StructureArgs {
     /// Whether a mesh that occurs several times is stored once: auto, flatten or keep
     #[arg(long, value_name = "KIND", long_help = instances_help(), default_value_t)]
     pub instances: Instancing,
-    #[arg(long, value_name = "KIND", help = accel_help(), long_help = accel_long_help(), default_value_t)]
-    #[arg(hide_default_value = true)]
-    pub accel: AccelKind,
+    #[arg(long, value_name = "KIND", default_value = "auto", hide_default_value = true)]
+    #[arg(help = with_words(ACCEL, Some("auto"), &format!("{}, auto", AccelKind::words())))]
+    #[arg(long_help = accel_or_auto_help())]
+    pub accel: OrAuto<AccelKind>,
     #[arg(long, value_name = "ALGORITHM", default_value = "auto", hide_default_value = true)]
     #[arg(help = with_words(TRAVERSAL, Some("auto"), &format!("{}, auto", Traversal::words())))]
     #[arg(long_help = traversal_long_help())]
@@ -85,7 +86,7 @@ pub struct StructureArgs {
 impl StructureArgs {
     /// Refuses arguments for kd-trees if the structure is a grid, and a tree of devices if there is none.
     pub fn check(&self, on_cpu: bool) -> Result<(), CliError> {
-        let &Self { accel, build, .. } = self;
+        let (accel, build) = (self.accel.pinned().unwrap_or_default(), self.build);
         check_traversal(accel, self.traversal.pinned())?;
         if accel != AccelKind::KdTree && build != BuildPolicy::Auto {
             return CliError::refuse(format!("--build chooses a kd-tree: with --accel {accel}, a grid is built"));
@@ -99,7 +100,7 @@ impl StructureArgs {
     /// Returns the user's choice of structure, build and traversal.
     pub fn request(&self) -> Request {
         let &Self { instances, accel, build, traversal } = self;
-        Request { accel, build, traversal: traversal.pinned(), primary: None, instances }
+        Request { accel: accel.pinned(), build, traversal: traversal.pinned(), primary: None, instances }
     }
 }
 
@@ -139,6 +140,12 @@ pub fn accel_help() -> String {
 /// Returns the help text of `--accel` with all words explained.
 pub fn accel_long_help() -> String {
     listed(ACCEL, "kdtree", &AccelKind::descriptions())
+}
+
+/// Returns the help text of an `--accel` that may be left open.
+fn accel_or_auto_help() -> String {
+    let auto = "- auto: kdtree; grid2 if meshes deform and a frame's build and rays take less time with it";
+    listed(ACCEL, "auto", &format!("{}\n{auto}", AccelKind::descriptions()))
 }
 
 /// Returns the help text of `--primary` with all words explained.

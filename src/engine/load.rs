@@ -17,7 +17,7 @@ use glam::Vec3;
 
 use super::{
     Engine,
-    choices::{ChosenAccel, Methods, Processor, Request, Workload},
+    choices::{ChosenAccel, FrameWork, Methods, Processor, Request, Workload},
     first_view,
 };
 use crate::{
@@ -179,6 +179,14 @@ impl Opened {
         let is_metered = scene.defaults.is_metered && picture.as_ref().is_some_and(|it| it.exposure.is_none());
         let load_ms = begin.elapsed().as_secs_f64() * 1e3;
         Ok(Self { scene, options: render_options, notes, load_ms, is_metered })
+    }
+}
+
+impl Opened {
+    /// Returns what a frame of so many samples costs if the scene moves.
+    pub fn frame_work(&self, n_samples: u32) -> FrameWork {
+        let n_lights = self.scene.lights.len();
+        FrameWork::of(&self.scene, &Workload::of_pictures(&self.options, n_lights, n_samples.into()))
     }
 }
 

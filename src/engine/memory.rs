@@ -61,7 +61,7 @@ impl Builder {
     /// Names the build of a scene's structure and the number of triangles in it, for progress and errors. Of meshes
     /// that are stored once, each triangle counts once.
     pub fn describe(&self, scene: &Scene) -> String {
-        format!("building the {} of {} triangles", self.request.accel.name(), self.n_built(scene))
+        format!("building the {} of {} triangles", self.request.accel.unwrap_or_default().name(), self.n_built(scene))
     }
 
     fn n_built(&self, scene: &Scene) -> usize {

@@ -40,7 +40,7 @@ pub fn run(args: &InspectArgs) -> Result<(), CliError> {
     let lighting = Lighting::from(scene);
     let details: Vec<_> = scene.materials.iter().map(|material| MaterialDetails::new(material, scene)).collect();
     let n_triangles = scene.n_triangles();
-    let choices = Request { accel: args.accel, build: BuildPolicy::Best, ..Request::default() };
+    let choices = Request { accel: Some(args.accel), build: BuildPolicy::Best, ..Request::default() };
     let builder = Builder::new(Processor::Gpu, choices);
     let building = builder.describe(&opened.scene);
     let build = || {

@@ -8,6 +8,7 @@ use std::{
 };
 
 use kdray::{
+    accel::AccelKind,
     engine::{
         AnimatedWorld, Engine, LoadRequest, Loaded, NoiseGoal, Opened, Work,
         choices::{Choices, ChosenAccel, Methods},
@@ -246,11 +247,15 @@ impl<'a> Session<'a> {
         };
         let asked = args.picture.request();
         let moves = is_animated && args.moves();
-        let request = if moves { asked.for_motion(engine.processor()) } else { asked };
+        let frame = moves.then(|| opened.frame_work(n_samples));
+        let request = frame.map_or(asked, |frame| asked.for_motion(engine.processor(), &frame));
         if request.instances != asked.instances {
             progress.note("meshes are kept apart, since some move; --instances flatten stores them as one");
         }
-        if request.build != asked.build {
+        if request.accel != asked.accel {
+            frame.and_then(|frame| frame.note()).iter().for_each(|note| progress.note(note));
+        }
+        if request.build != asked.build && request.accel != Some(AccelKind::Grid2) {
             progress.note("the GPU builds the kd-trees, since meshes may change; with --build best, the CPU does");
         }
         let engine = engine.clone().with_request(request);

@@ -1,10 +1,11 @@
 //! Chooses what the user leaves open, in one place for all commands: which kd-tree is built, which algorithm
-//! traverses it, and how primary rays find their triangles. The kind of the acceleration structure is not chosen
-//! here: it is a kd-tree unless the user asks for a grid.
+//! traverses it, and how primary rays find their triangles. The structure is a kd-tree unless the user asks for a grid,
+//! or meshes deform and few rays are traced.
 //!
 //! ```text
 //! accel    the acceleration structure: a chosen kd-tree, or the user's grid
 //! tree     which kd-tree: by rule, from the numbers of rays and of triangles
+//! motion   the structure of what deforms: by rule, from the times of build and rays of a frame
 //! rule     traversal and primary visibility, by rule, from the device and the sizes of scene and picture
 //! trial    traversal and primary visibility, from the times of each candidate on the device
 //!   timings  the candidates, their times, the quickest
@@ -28,6 +29,7 @@ mod accel;
 mod cache;
 mod chosen;
 mod measure;
+mod motion;
 mod rule;
 mod timings;
 mod tree;
@@ -43,6 +45,7 @@ pub use self::{
     cache::{Cache, Key},
     chosen::{Choices, Chosen, Methods, Reason},
     measure::{measure_primaries, measure_traversals},
+    motion::FrameWork,
     rule::{primary_by_rule, traversal_by_rule},
     timings::{Candidates, Timings},
     tree::{BuildPolicy, TreeKind},
@@ -58,8 +61,8 @@ use crate::{
 /// What the user specifies; `None` and [`BuildPolicy::Auto`] leave a choice open.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Request {
-    /// The kind of the acceleration structure, which is never left open.
-    pub accel: AccelKind,
+    /// The kind of the acceleration structure.
+    pub accel: Option<AccelKind>,
     /// Which tree is built.
     pub build: BuildPolicy,
     /// The algorithm that traverses the kd-tree.
@@ -163,17 +166,17 @@ impl Workload {
 
 impl Request {
     /// Returns the request for a scene in which instances move or meshes change: what moves is stored apart from what
-    /// does not, and a GPU builds its trees, unless the user has chosen otherwise.
-    pub fn for_motion(self, processor: Processor) -> Self {
+    /// does not, and a GPU builds its structures, of the kind that suits a frame, unless the user has chosen otherwise.
+    pub fn for_motion(self, processor: Processor, frame: &FrameWork) -> Self {
         let instances = match self.instances {
             Instancing::Auto => Instancing::Keep,
             chosen => chosen,
         };
-        let build = match (self.build, processor) {
-            (BuildPolicy::Auto, Processor::Gpu) => BuildPolicy::Gpu,
-            (chosen, _) => chosen,
-        };
-        Self { instances, build, ..self }
+        let is_open = processor == Processor::Gpu && self.build == BuildPolicy::Auto;
+        let may_be_grid = is_open && self.traversal.is_none() && instances == Instancing::Keep;
+        let accel = self.accel.or(may_be_grid.then(|| frame.quickest()));
+        let build = if is_open { BuildPolicy::Gpu } else { self.build };
+        Self { instances, accel, build, ..self }
     }
 
     /// Returns the requested kind of acceleration structure for `n_triangles` triangles. For a kd-tree, it is the
@@ -191,7 +194,7 @@ impl Request {
             TreeKind::Fast if is_open_to_gpu => TreeKind::Gpu,
             kind => kind,
         };
-        match self.accel {
+        match self.accel.unwrap_or_default() {
             AccelKind::KdTree => ChosenAccel::KdTree(Chosen::pinned_or(self.build.pinned(), by_rule)),
             AccelKind::Grid => ChosenAccel::Grid,
             AccelKind::Grid2 => ChosenAccel::Grid2,
@@ -266,12 +269,30 @@ mod tests {
 
     #[test]
     fn only_gpus_build_the_trees_of_what_moves() {
-        let build = |request: Request, processor| request.for_motion(processor).build;
+        let frame = FrameWork::fixed(1_000_000, 1000);
+        let build = |request: Request, processor| request.for_motion(processor, &frame).build;
         assert_eq!(build(Request::default(), Processor::Gpu), BuildPolicy::Gpu);
         assert_eq!(build(Request::default(), Processor::SoftwareDriver), BuildPolicy::Auto);
         assert_eq!(build(Request::default(), Processor::Cpu), BuildPolicy::Auto);
         let best = Request { build: BuildPolicy::Best, ..Request::default() };
         assert_eq!(build(best, Processor::Gpu), BuildPolicy::Best);
+    }
+
+    #[test]
+    fn only_gpus_take_grids_for_what_deforms_and_only_if_nothing_is_pinned() {
+        let frame = FrameWork::fixed(1_000_000, 1000);
+        let accel = |request: Request, processor| request.for_motion(processor, &frame).accel;
+        assert_eq!(accel(Request::default(), Processor::Gpu), Some(AccelKind::Grid2));
+        assert_eq!(accel(Request::default(), Processor::SoftwareDriver), None);
+        for pinned in [
+            Request { build: BuildPolicy::Gpu, ..Request::default() },
+            Request { traversal: Some(Traversal::Mask), ..Request::default() },
+            Request { instances: Instancing::Flatten, ..Request::default() },
+        ] {
+            assert_eq!(accel(pinned, Processor::Gpu), None);
+        }
+        let kd_tree = Request { accel: Some(AccelKind::KdTree), ..Request::default() };
+        assert_eq!(accel(kd_tree, Processor::Gpu), Some(AccelKind::KdTree));
     }
 
     #[test]

@@ -32,6 +32,8 @@ pub struct Mesh {
     /// Empty, or one entry per face: unit tangents at its three corners, along increasing u, in object space. w is 1 or
     /// -1: the bitangent, along decreasing v, is w times the cross product of normal and tangent.
     pub tangents: Vec<[Vec4; 3]>,
+    /// Whether a skin or morph targets of its file place its points, so that they may be elsewhere at another moment.
+    pub deforms: bool,
 }
 
 impl Mesh {
@@ -44,7 +46,7 @@ impl Mesh {
     /// Checks that the arrays belong together, and that the indices of positions are in range. The error follows a
     /// subject: `has ...`.
     pub(crate) fn check(&self) -> Checked<()> {
-        let Self { positions, faces, normals, slots, uvs, colours, tangents, name: _ } = self;
+        let Self { positions, faces, normals, slots, uvs, colours, tangents, name: _, deforms: _ } = self;
         if (normals.len(), slots.len()) != (faces.len(), faces.len()) {
             return Err(format!("has {} faces, {} normals, {} slots", faces.len(), normals.len(), slots.len()));
         }
@@ -80,6 +82,7 @@ impl Mesh {
         }
         let first = self.positions.len() as u32;
         let n_faces = (self.faces.len(), other.faces.len());
+        self.deforms |= other.deforms;
         self.positions.extend(other.positions);
         self.faces.extend(other.faces.iter().map(|face| face.map(|ix| first + ix)));
         self.normals.extend(other.normals);

@@ -196,6 +196,7 @@ impl LoadedPose {
         let mut own = self.read.rest.mesh.clone();
         self.posed.deform(&mut own);
         own.name.clone_from(&mesh.name);
+        own.deforms = mesh.deforms;
         own == *mesh
     }
 }
