@@ -1561,7 +1561,8 @@ struct KdStage {
 
 // Push constants of the kernels that relocate a structure: where its arrays begin among those of all structures.
 //
-// - `first_element`: of a kd-tree's nodes; even. `first_entry`: of its leaves. `first_row`: of its triangles.
+// - `first_element`: of a kd-tree's nodes, which is even, or of a grid's cells. `first_entry`: of leaves or cells.
+//   `first_row`: of triangles.
 struct StructurePlace {
     uint first_element;
     uint first_entry;

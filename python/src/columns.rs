@@ -74,7 +74,7 @@ impl Face {
     }
 }
 
-/// The faces of all triangles of a world, made when so many hits have been looked up that it pays: the scene's own
+/// The faces of all triangles of a world, made when so many rays have been cast that it pays: the scene's own
 /// arrays take several cache lines for each hit. Triangles of instances have a face for each instance.
 #[derive(Default)]
 pub struct FaceTable {

@@ -27,10 +27,14 @@ use super::{
     watched::watched,
 };
 
-/// Rays that are cast between two looks at Ctrl-C, by a GPU or by others: some tenths of a second.
+/// Rays that are cast between two looks at Ctrl-C, by a GPU or by others: some tenths of a second, or a second of rays
+/// that take long.
 const RAYS_AT_ONCE: [usize; 2] = [1 << 25, 1 << 18];
 /// The same number of queries that take longer.
 const QUERIES_AT_ONCE: [usize; 2] = [1 << 20, 1 << 16];
+
+/// Rays for which a structure is built that is asked for before there are any.
+const RAYS_TO_BUILD_FOR: usize = 1 << 23;
 
 /// A scene. Arrays are C-contiguous and of the stated types: `kdray/scene.py` sees to it.
 #[pyclass(frozen, module = "kdray._kdray")]
@@ -294,7 +298,7 @@ impl Core {
             None => Ok(()),
         };
         self.with(py, |state| {
-            let n = RAYS_AT_ONCE[0];
+            let n = RAYS_TO_BUILD_FOR;
             watched(&pool, |progress| state.prepare(n, progress), tell)?;
             pool.install(|| state.caster(n, u8::MAX).map(|_| ()))?;
             tell(1.0)

@@ -338,7 +338,7 @@ impl State {
 
 impl Ready {
     fn without_casters(self) -> Self {
-        Self { on_device: None, on_cpu: None, ..self }
+        Self { on_device: None, on_cpu: None, table: FaceTable::default(), ..self }
     }
 
     /// Returns the index of the mesh that a geometry has in this world, if it has not changed since.

@@ -65,7 +65,7 @@ impl Region {
 /// What a region holds.
 #[derive(Clone)]
 struct Shown {
-    /// None after a failure.
+    /// Gone before the first upload.
     structure: Weak<BottomLevel>,
     n_elements: usize,
     /// The lattice of a grid that the device has built.

@@ -89,7 +89,7 @@ pub struct GpuCaster {
     context: Arc<Context>,
     /// The triangles and their acceleration structure, which may also be a grid.
     tree: AccelBuffers,
-    /// What tells the trees of geometries from others; none without instances.
+    /// What tells the structures of geometries from others; none without instances.
     structures_id: Option<StructuresId>,
     /// What tells the geometries from others, however they are deformed.
     geometries_id: Option<GeometriesId>,
@@ -154,8 +154,8 @@ impl GpuCaster {
     }
 
     /// Casts rays into a world whose instances have changed ([`World::with_instances_changed`]), or into another moment
-    /// of the same film. Only the instances are uploaded. Where meshes are deformed and the device builds their trees,
-    /// it builds these again.
+    /// of the same film. Only the instances are uploaded. Where meshes are deformed and the device builds their
+    /// structures, it builds these again.
     ///
     /// # Errors
     /// The world was not made of this caster's, or memory runs out. Then nothing has changed, unless several meshes are

@@ -18,7 +18,7 @@ pub struct RecordedCast {
     set: BindingSet,
     suspended_rays: SuspendedRays,
     rays: Masked,
-    /// Keeps the caster from building trees of deformed meshes in place.
+    /// Keeps the caster from building structures of deformed meshes in place.
     _trees: Option<Arc<DeviceStructures>>,
 }
 

@@ -12,7 +12,7 @@ use std::{
 use bytemuck::Zeroable;
 use rayon::prelude::*;
 
-use super::{CpuCaster, GpuCaster, Hit, Ray};
+use super::{CpuCaster, GpuCaster, Hit, Ray, most_rays};
 use crate::{
     accel::Query,
     buffers::{AccelBuffers, CastResources, ResumePass},
@@ -58,24 +58,28 @@ impl GpuCaster {
         let n_threads = rayon::current_num_threads();
         let most = rays_per_submission(n_rays, n_threads, self.rays_per_batch);
         let n_lanes = n_rays.div_ceil(most).min(n_threads).min(MOST_LANES);
-        // A thread that shared its work with others could be made to run the whole of another lane meanwhile.
-        let chunks_per_task = if n_lanes == 1 { 1 } else { usize::MAX };
+        // A thread that shares its work while no other one is idle could be made to run the whole of another lane.
+        let chunks_per_task = if 2 * n_lanes <= n_threads.max(2) { 1 } else { usize::MAX };
         let mut lanes = self.lanes(n_lanes, most)?;
         let (next, caster) = (AtomicUsize::new(0), &*self);
         let run = |lane: &mut Lane| loop {
             let first = next.fetch_add(most, Ordering::Relaxed);
             if first >= n_rays {
-                return Ok(());
+                return Ok::<_, GpuError>(());
             }
             let n = most.min(n_rays - first);
             let rays = lane.exchange.inputs()[..n].par_chunks_mut(RAYS_PER_CHUNK).enumerate();
             rays.with_min_len(chunks_per_task).for_each(|(ix, rays)| make(first + ix * RAYS_PER_CHUNK, rays));
-            let hits = caster.cast_in_lane(lane, &kernel, n)?.par_chunks(RAYS_PER_CHUNK).enumerate();
+            let hits = caster.cast_in_lane(lane, &kernel, n);
+            // After an error, the other lanes need not go on.
+            let hits = hits.inspect_err(|_| next.store(n_rays, Ordering::Relaxed))?;
+            let hits = hits.par_chunks(RAYS_PER_CHUNK).enumerate();
             hits.with_min_len(chunks_per_task).for_each(|(ix, hits)| take(first + ix * RAYS_PER_CHUNK, hits));
         };
-        let result = lanes[..n_lanes].par_iter_mut().with_max_len(1).try_for_each(run);
+        lanes[..n_lanes].par_iter_mut().with_max_len(1).try_for_each(run)?;
+        // The device may still read the memory of lanes that have failed to wait for it, so they are not used again.
         self.lanes = lanes;
-        result
+        Ok(())
     }
 
     /// Casts the first `n` rays of a lane's memory, and returns their hits.
@@ -94,7 +98,8 @@ impl GpuCaster {
         let mut lanes = mem::take(&mut self.lanes);
         lanes.retain(|lane| lane.exchange.room() >= len);
         while lanes.len() < n {
-            let exchange = Exchange::new(&self.context, ["stream_rays", "stream_hits"], len.next_power_of_two())?;
+            let room = len.next_power_of_two().min(most_rays(self.context.limits()));
+            let exchange = Exchange::new(&self.context, ["stream_rays", "stream_hits"], room)?;
             lanes.push(Lane { exchange, bound: None });
         }
         for lane in lanes[..n].iter_mut().filter(|lane| lane.bound.is_none()) {

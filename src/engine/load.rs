@@ -17,7 +17,7 @@ use glam::Vec3;
 
 use super::{
     Engine,
-    choices::{ChosenAccel, FrameWork, Methods, Processor, Request, Workload},
+    choices::{ChosenAccel, Methods, Processor, Request, Workload},
     first_view,
 };
 use crate::{
@@ -180,13 +180,12 @@ impl Opened {
         let load_ms = begin.elapsed().as_secs_f64() * 1e3;
         Ok(Self { scene, options: render_options, notes, load_ms, is_metered })
     }
-}
 
-impl Opened {
-    /// Returns what a frame of so many samples costs if the scene moves.
-    pub fn frame_work(&self, n_samples: u32) -> FrameWork {
+    /// Returns the request for frames of so many samples, if the scene moves: see [`Request::for_motion`].
+    pub fn for_motion(&self, asked: Request, processor: Processor, n_samples: u32) -> (Request, Option<String>) {
         let n_lights = self.scene.lights.len();
-        FrameWork::of(&self.scene, &Workload::of_pictures(&self.options, n_lights, n_samples.into()))
+        let frame = Workload::of_pictures(&self.options, n_lights, n_samples.into());
+        asked.for_motion(processor, &self.scene, &frame)
     }
 }
 

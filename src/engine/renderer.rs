@@ -66,9 +66,9 @@ impl Renderer {
 
     /// Draws another world from now on. If the world was made of this renderer's by
     /// [`World::with_instances_changed`], only the instances are uploaded, and emitters that have changed. If it is
-    /// another moment of the same film, and devices build the trees of kept meshes, deformed meshes are uploaded in
-    /// addition, and devices build their trees. The camera of the next picture is the one that [`Renderer::draw`] is
-    /// given.
+    /// another moment of the same film, and devices build the structures of kept meshes, deformed meshes are uploaded
+    /// in addition, and devices build their structures. The camera of the next picture is the one that
+    /// [`Renderer::draw`] is given.
     ///
     /// # Errors
     /// The world exceeds the limits or the memory of all devices. Then nothing has changed, unless several meshes are

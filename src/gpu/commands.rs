@@ -92,7 +92,9 @@ impl CommandBuffer {
     ) -> Result<Self, GpuError> {
         let mut body = Some(body);
         Self::record_once(context, name, timer, &mut |commands| {
-            body.take().into_iter().for_each(|body| body(commands));
+            if let Some(body) = body.take() {
+                body(commands);
+            }
         })
     }
 

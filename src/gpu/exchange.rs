@@ -34,7 +34,8 @@ impl<I: Pod, O: Pod> Exchange<I, O> {
         self.len
     }
 
-    /// Returns the storage buffers that kernels read inputs from and write outputs to.
+    /// Returns the storage buffers that kernels read inputs from and write outputs to. Only the commands of a run, and
+    /// those that its `finish` waits for, may use them.
     pub(crate) fn bindings(&self) -> [Binding<'_>; 2] {
         [Binding::Buffer(self.inputs.buffer()), Binding::Buffer(self.outputs.buffer())]
     }

@@ -54,12 +54,11 @@ impl LoadedScene {
             && !opened.scene.animations.is_empty()
             && settings.request.scene.animation != AnimationChoice::None;
         let first = is_animated.then(|| opened.scene.clone());
-        let (asked, frame) = (settings.builder.request, is_animated.then(|| opened.frame_work(1)));
-        let request = frame.map_or(asked, |frame| asked.for_motion(settings.builder.processor, &frame));
+        let asked = settings.builder.request;
+        let of_motion = is_animated.then(|| opened.for_motion(asked, settings.builder.processor, 1));
+        let (request, note) = of_motion.unwrap_or((asked, None));
         let mut built = Builder { request, ..settings.builder.clone() }.build(opened, &settings.request.work)?;
-        if request.accel != asked.accel {
-            built.notes.extend(frame.and_then(|frame| frame.note()));
-        }
+        built.notes.extend(note);
         let (path, statistics) = (path.map(Path::to_owned), built.world.statistics());
         // When the file is read again, nobody waits for it, and the window keeps its exposure.
         let mut load_settings = settings.clone();

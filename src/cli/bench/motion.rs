@@ -36,11 +36,8 @@ pub fn run(args: &MotionArgs) -> Result<(), CliError> {
     let options = ContextOptions::new(args.device.clone(), false);
     let device = if args.cpu { None } else { Some(open_device(&options, &progress)?) };
     let engine = device.clone().map_or_else(Engine::on_cpu, Engine::on_device);
-    let (asked, frame) = (args.picture.request(), opened.frame_work(1));
-    let request_of_motion = asked.for_motion(engine.processor(), &frame);
-    if request_of_motion.accel != asked.accel {
-        frame.note().iter().for_each(|note| progress.note(note));
-    }
+    let (request_of_motion, note) = opened.for_motion(args.picture.request(), engine.processor(), 1);
+    note.iter().for_each(|note| progress.note(note));
     let engine = engine.with_request(request_of_motion);
     let (n_triangles, scene) = (opened.scene.n_triangles(), opened.scene.clone());
     let building = format!("building the structure of {n_triangles} triangles");

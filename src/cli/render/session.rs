@@ -247,15 +247,13 @@ impl<'a> Session<'a> {
         };
         let asked = args.picture.request();
         let moves = is_animated && args.moves();
-        let frame = moves.then(|| opened.frame_work(n_samples));
-        let request = frame.map_or(asked, |frame| asked.for_motion(engine.processor(), &frame));
+        let of_motion = moves.then(|| opened.for_motion(asked, engine.processor(), n_samples));
+        let (request, note) = of_motion.unwrap_or((asked, None));
         if request.instances != asked.instances {
             progress.note("meshes are kept apart, since some move; --instances flatten stores them as one");
         }
-        if request.accel != asked.accel {
-            frame.and_then(|frame| frame.note()).iter().for_each(|note| progress.note(note));
-        }
-        if request.build != asked.build && request.accel != Some(AccelKind::Grid2) {
+        note.iter().for_each(|note| progress.note(note));
+        if request.build != asked.build && request.accel.unwrap_or_default() == AccelKind::KdTree {
             progress.note("the GPU builds the kd-trees, since meshes may change; with --build best, the CPU does");
         }
         let engine = engine.clone().with_request(request);

@@ -3,7 +3,7 @@
 //! or meshes deform and few rays are traced.
 //!
 //! ```text
-//! accel    the acceleration structure: a chosen kd-tree, or the user's grid
+//! accel    the acceleration structure: a kd-tree or a grid
 //! tree     which kd-tree: by rule, from the numbers of rays and of triangles
 //! motion   the structure of what deforms: by rule, from the times of build and rays of a frame
 //! rule     traversal and primary visibility, by rule, from the device and the sizes of scene and picture
@@ -45,7 +45,6 @@ pub use self::{
     cache::{Cache, Key},
     chosen::{Choices, Chosen, Methods, Reason},
     measure::{measure_primaries, measure_traversals},
-    motion::FrameWork,
     rule::{primary_by_rule, traversal_by_rule},
     timings::{Candidates, Timings},
     tree::{BuildPolicy, TreeKind},
@@ -54,7 +53,7 @@ use crate::{
     accel::{AccelKind, kdtree::Traversal},
     frame::{Integrator, Primary, RenderOptions},
     gpu::{Context, DeviceInfo, GpuError},
-    scene::{Camera, Projection},
+    scene::{Camera, Projection, Scene},
     world::{World, instances::Instancing},
 };
 
@@ -167,16 +166,20 @@ impl Workload {
 impl Request {
     /// Returns the request for a scene in which instances move or meshes change: what moves is stored apart from what
     /// does not, and a GPU builds its structures, of the kind that suits a frame, unless the user has chosen otherwise.
-    pub fn for_motion(self, processor: Processor, frame: &FrameWork) -> Self {
+    /// Also returns a note on the kind, if there was a choice. `workload`: that of one frame.
+    pub fn for_motion(self, processor: Processor, scene: &Scene, workload: &Workload) -> (Self, Option<String>) {
         let instances = match self.instances {
             Instancing::Auto => Instancing::Keep,
             chosen => chosen,
         };
         let is_open = processor == Processor::Gpu && self.build == BuildPolicy::Auto;
-        let may_be_grid = is_open && self.traversal.is_none() && instances == Instancing::Keep;
-        let accel = self.accel.or(may_be_grid.then(|| frame.quickest()));
         let build = if is_open { BuildPolicy::Gpu } else { self.build };
-        Self { instances, accel, build, ..self }
+        let next = Self { instances, build, ..self };
+        let may_be_grid = self.accel.is_none() && self.traversal.is_none() && instances == Instancing::Keep;
+        match (is_open && may_be_grid).then(|| motion::quickest(scene, workload)).flatten() {
+            Some((accel, note)) => (Self { accel: Some(accel), ..next }, Some(note)),
+            None => (next, None),
+        }
     }
 
     /// Returns the requested kind of acceleration structure for `n_triangles` triangles. For a kd-tree, it is the
@@ -248,8 +251,12 @@ impl Request {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
+    use glam::Vec3;
+
     use super::*;
-    use crate::frame::Crop;
+    use crate::{frame::Crop, scene::Mesh};
 
     #[test]
     fn a_part_is_the_same_work_as_its_whole_picture() {
@@ -268,31 +275,30 @@ mod tests {
     }
 
     #[test]
-    fn only_gpus_build_the_trees_of_what_moves() {
-        let frame = FrameWork::fixed(1_000_000, 1000);
-        let build = |request: Request, processor| request.for_motion(processor, &frame).build;
-        assert_eq!(build(Request::default(), Processor::Gpu), BuildPolicy::Gpu);
-        assert_eq!(build(Request::default(), Processor::SoftwareDriver), BuildPolicy::Auto);
-        assert_eq!(build(Request::default(), Processor::Cpu), BuildPolicy::Auto);
-        let best = Request { build: BuildPolicy::Best, ..Request::default() };
-        assert_eq!(build(best, Processor::Gpu), BuildPolicy::Best);
-    }
-
-    #[test]
-    fn only_gpus_take_grids_for_what_deforms_and_only_if_nothing_is_pinned() {
-        let frame = FrameWork::fixed(1_000_000, 1000);
-        let accel = |request: Request, processor| request.for_motion(processor, &frame).accel;
-        assert_eq!(accel(Request::default(), Processor::Gpu), Some(AccelKind::Grid2));
-        assert_eq!(accel(Request::default(), Processor::SoftwareDriver), None);
-        for pinned in [
-            Request { build: BuildPolicy::Gpu, ..Request::default() },
-            Request { traversal: Some(Traversal::Mask), ..Request::default() },
-            Request { instances: Instancing::Flatten, ..Request::default() },
+    fn only_gpus_build_what_moves_and_only_if_nothing_is_pinned() {
+        let faces = (0..3000).map(|ix| [ix, ix + 1, ix + 2]).collect();
+        let positions = (0..3002).map(|ix| Vec3::new((ix % 50) as f32, (ix / 50) as f32, (ix % 3) as f32)).collect();
+        let mesh = Mesh { deforms: true, ..Mesh::of_triangles(positions, faces) };
+        let scene = Scene { meshes: vec![mesh], ..Scene::empty(Path::new("scene")) };
+        let few = Workload::of_pictures(&RenderOptions { width: 64, height: 64, ..Default::default() }, 1, 1);
+        let taken = |request: Request, processor| {
+            let (request, note) = request.for_motion(processor, &scene, &few);
+            (request.build, request.accel, note.is_some())
+        };
+        let grid2 = (BuildPolicy::Gpu, Some(AccelKind::Grid2), true);
+        assert_eq!(taken(Request::default(), Processor::Gpu), grid2);
+        for processor in [Processor::SoftwareDriver, Processor::Cpu] {
+            assert_eq!(taken(Request::default(), processor), (BuildPolicy::Auto, None, false));
+        }
+        for (pinned, build) in [
+            (Request { build: BuildPolicy::Best, ..Request::default() }, BuildPolicy::Best),
+            (Request { traversal: Some(Traversal::Mask), ..Request::default() }, BuildPolicy::Gpu),
+            (Request { instances: Instancing::Flatten, ..Request::default() }, BuildPolicy::Gpu),
         ] {
-            assert_eq!(accel(pinned, Processor::Gpu), None);
+            assert_eq!(taken(pinned, Processor::Gpu), (build, None, false));
         }
         let kd_tree = Request { accel: Some(AccelKind::KdTree), ..Request::default() };
-        assert_eq!(accel(kd_tree, Processor::Gpu), Some(AccelKind::KdTree));
+        assert_eq!(taken(kd_tree, Processor::Gpu), (BuildPolicy::Gpu, kd_tree.accel, false));
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! The structure of a scene whose meshes deform. It is built again for each frame, so its build counts as its rays do.
 
-use std::collections::HashMap;
-
 use glam::Vec3;
+use hashbrown::HashMap;
+use rayon::prelude::*;
 
 use super::Workload;
 use crate::{
@@ -10,18 +10,18 @@ use crate::{
     scene::{Mesh, Scene},
 };
 
-/// What a frame of a moving scene costs.
+/// What a frame of a moving scene builds and traces.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FrameWork {
-    /// Number of triangles that deform from frame to frame.
-    n_deformed: usize,
-    /// Number of rays of a frame; none if paths are traced, which are long.
-    n_rays: Option<u64>,
-    /// Whether triangles are so evenly spread in each mesh that a grid suits it.
-    is_even: bool,
+struct FrameWork {
+    /// Number of meshes that devices build structures for and that may deform from frame to frame. They are built one
+    /// after the other.
+    n_meshes: usize,
+    /// Number of their triangles.
+    n_triangles: usize,
+    n_rays: u64,
 }
 
-/// Milliseconds of a frame: of a build as such, and of a million triangles and rays of it. Measured on an H200
+/// Milliseconds of a frame: of each build as such, and of a million triangles and rays. Measured on an H200
 /// (docs/performance.md): builds are those of "Scenes that change"; rays are between the diffuse ones there, which take
 /// 0.3 and 1.9 ms, and those of frames of a glass knot ("Films"), 0.6 and 1.4 ms.
 struct Cost {
@@ -38,49 +38,40 @@ const GRID2: Cost = Cost { build: 0.72, triangles: 0.87, rays: 1.7 };
 /// times the cube root of their number. Of an even surface it is 1.7.
 const MOST_SHARING: f64 = 8.0;
 
-impl FrameWork {
-    /// `workload`: that of one frame.
-    pub fn of(scene: &Scene, workload: &Workload) -> Self {
-        let n_deformed = scene.meshes.iter().filter(|mesh| mesh.deforms).map(|mesh| mesh.faces.len()).sum();
-        let n_rays = (!workload.traces_paths).then_some(workload.n_rays);
-        Self { n_deformed, n_rays, is_even: n_deformed > 0 && scene.meshes.iter().all(is_even) }
+/// Returns the kind of structure with which build and rays of a frame take the least time, and a note that says why;
+/// none where nothing deforms, or where another kind would be of no use: paths are long, and costs of rays are those of
+/// the usual structure. `workload`: that of one frame.
+pub(super) fn quickest(scene: &Scene, workload: &Workload) -> Option<(AccelKind, String)> {
+    let deformed = scene.meshes.iter().filter(|mesh| mesh.deforms && mesh.faces.len() >= LEAST_DEVICE_TRIANGLES);
+    let n_meshes = deformed.clone().count();
+    if n_meshes == 0 || workload.traces_paths || workload.shows_costs {
+        return None;
     }
-
-    #[cfg(test)]
-    pub(super) fn fixed(n_deformed: usize, n_rays: u64) -> Self {
-        Self { n_deformed, n_rays: Some(n_rays), is_even: true }
-    }
-
-    /// Returns the estimated time of a frame's build and rays, ms; none where the structure does not suit.
-    fn ms(&self, kind: AccelKind) -> Option<f64> {
-        let Cost { build, triangles, rays } = match kind {
-            AccelKind::KdTree => KD_TREE,
-            AccelKind::Grid2 if self.is_even => GRID2,
-            _ => return None,
-        };
-        Some(build + 1e-6 * (triangles * self.n_deformed as f64 + rays * self.n_rays? as f64))
-    }
-
-    /// Returns the kind of structure that takes the least time.
-    pub(super) fn quickest(&self) -> AccelKind {
-        match [AccelKind::KdTree, AccelKind::Grid2].map(|kind| self.ms(kind)) {
-            [Some(kd_tree), Some(grid2)] if grid2 < kd_tree => AccelKind::Grid2,
-            _ => AccelKind::KdTree,
+    let n_triangles = deformed.map(|mesh| mesh.faces.len()).sum();
+    let frame = FrameWork { n_meshes, n_triangles, n_rays: workload.n_rays };
+    let taken = match frame.quickest() {
+        AccelKind::Grid2 if !scene.meshes.par_iter().all(is_even) => {
+            let why = "some mesh's triangles are too unevenly spread for grid2, which would be quicker to build";
+            return Some((AccelKind::KdTree, format!("--accel kdtree is taken: {why}")));
         }
+        taken => taken,
+    };
+    let [kd_tree, grid2] = [KD_TREE, GRID2].map(|cost| frame.ms(&cost));
+    let note = format!(
+        "--accel {taken} is taken, since {n_triangles} triangles may deform: build and rays of a frame take some \
+         {kd_tree:.1} ms with kdtree and {grid2:.1} ms with grid2 on an H200"
+    );
+    Some((taken, note))
+}
+
+impl FrameWork {
+    /// Returns the estimated time of build and rays, ms.
+    fn ms(&self, &Cost { build, triangles, rays }: &Cost) -> f64 {
+        build * self.n_meshes as f64 + 1e-6 * (triangles * self.n_triangles as f64 + rays * self.n_rays as f64)
     }
 
-    /// Returns a sentence about the choice between both structures; none if there was none.
-    pub fn note(&self) -> Option<String> {
-        let (kd_tree, grid2) = (self.ms(AccelKind::KdTree)?, self.ms(AccelKind::Grid2)?);
-        let (taken, other) = match self.quickest() {
-            AccelKind::KdTree => ("kdtree", "grid2"),
-            _ => ("grid2", "kdtree"),
-        };
-        Some(format!(
-            "--accel {taken} is taken, since {} triangles deform: build and rays of a frame take some {kd_tree:.1} ms \
-             with kdtree and {grid2:.1} ms with grid2 on an H200; --accel {other} overrules that",
-            self.n_deformed
-        ))
+    fn quickest(&self) -> AccelKind {
+        if self.ms(&GRID2) < self.ms(&KD_TREE) { AccelKind::Grid2 } else { AccelKind::KdTree }
     }
 }
 
@@ -90,7 +81,9 @@ fn is_even(mesh: &Mesh) -> bool {
     if n < LEAST_DEVICE_TRIANGLES {
         return true;
     }
-    let places = || mesh.faces.iter().map(|face| face.map(|ix| mesh.positions[ix as usize]).into_iter().sum::<Vec3>());
+    // World::with_accel refuses indices of points that are missing.
+    let point = |ix: u32| mesh.positions.get(ix as usize).copied().unwrap_or_default();
+    let places = || mesh.faces.iter().map(|face| face.map(point).into_iter().sum::<Vec3>());
     let (min, max) = places().fold((Vec3::MAX, Vec3::MIN), |(min, max), at| (min.min(at), max.max(at)));
     let size = (max - min).max(Vec3::splat((max - min).max_element() * 1e-3));
     let n_cells = GridOptions::two_level().levels.upper_density() * n as f32;
@@ -103,40 +96,47 @@ fn is_even(mesh: &Mesh) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use std::path::Path;
 
-    fn chosen(n_deformed: usize, n_rays: u64) -> AccelKind {
-        FrameWork::fixed(n_deformed, n_rays).quickest()
+    use super::*;
+    use crate::frame::RenderOptions;
+
+    fn chosen(n_meshes: usize, n_triangles: usize, n_rays: u64) -> AccelKind {
+        FrameWork { n_meshes, n_triangles, n_rays }.quickest()
     }
 
     #[test]
     fn few_rays_go_through_grids_and_many_through_kd_trees() {
-        for (n_deformed, n_rays) in [(203_000, 3_700_000), (810_000, 8_500_000), (3_240_000, 27_800_000)] {
-            assert_eq!(chosen(n_deformed, n_rays * 9 / 10), AccelKind::Grid2, "{n_deformed}");
-            assert_eq!(chosen(n_deformed, n_rays * 11 / 10), AccelKind::KdTree, "{n_deformed}");
+        for (n_triangles, n_rays) in [(203_000, 3_700_000), (810_000, 8_500_000), (3_240_000, 27_800_000)] {
+            assert_eq!(chosen(1, n_triangles, n_rays * 9 / 10), AccelKind::Grid2, "{n_triangles}");
+            assert_eq!(chosen(1, n_triangles, n_rays * 11 / 10), AccelKind::KdTree, "{n_triangles}");
         }
-        let few = FrameWork::fixed(203_000, 1000);
-        assert!(few.note().unwrap().starts_with("--accel grid2 is taken, since 203000 triangles deform"));
-        for unsuited in [FrameWork { is_even: false, ..few }, FrameWork { n_rays: None, ..few }] {
-            assert_eq!((unsuited.quickest(), unsuited.note()), (AccelKind::KdTree, None));
-        }
+        // Each mesh is a build.
+        assert_eq!(chosen(20, 203_000, 30_000_000), AccelKind::Grid2);
     }
 
     #[test]
-    fn a_body_in_a_stadium_is_uneven() {
-        let at = |u: usize, v: usize, scale: f32| {
-            let (u, v) = (u as f32 / 100.0, v as f32 / 100.0);
-            Vec3::new(u, v, (u * 7.0).sin()) * scale
+    fn what_does_not_suit_grids_has_kd_trees() {
+        let few = Workload::of_pictures(&RenderOptions { width: 64, height: 64, ..Default::default() }, 1, 1);
+        let deforming = |mesh| {
+            let meshes = vec![Mesh { deforms: true, ..mesh }];
+            Scene { meshes, ..Scene::empty(Path::new("scene")) }
         };
-        let sheet = |scale| {
-            let places = (0..10_000).map(move |ix| at(ix % 100, ix / 100, scale));
-            let positions: Vec<_> = places.collect();
-            let faces = (0..9_900_u32).map(|ix| [ix, ix + 1, ix + 100]).collect();
-            Mesh::of_triangles(positions, faces)
-        };
-        assert!(is_even(&sheet(1.0)));
-        let mut both = sheet(1.0);
-        both.append(sheet(1e-3));
-        assert!(!is_even(&both));
+        let (kind, note) = quickest(&deforming(sheet(1.0)), &few).unwrap();
+        assert_eq!(kind, AccelKind::Grid2);
+        assert!(note.starts_with("--accel grid2 is taken, since 9900 triangles may deform: build and rays"), "{note}");
+        let mut uneven = sheet(1.0);
+        uneven.append(sheet(1e-3));
+        assert_eq!(quickest(&deforming(uneven), &few).unwrap().0, AccelKind::KdTree);
+        let (paths, costs) = (Workload { traces_paths: true, ..few }, Workload { shows_costs: true, ..few });
+        assert_eq!([paths, costs].map(|workload| quickest(&deforming(sheet(1.0)), &workload)), [None, None]);
+        let rigid = Scene { meshes: vec![sheet(1.0)], ..Scene::empty(Path::new("scene")) };
+        assert_eq!(quickest(&rigid, &few), None);
+    }
+
+    fn sheet(scale: f32) -> Mesh {
+        let at = |u: f32, v: f32| Vec3::new(u, v, (u * 7.0).sin()) * scale;
+        let positions = (0..10_000).map(|ix| at((ix % 100) as f32 / 100.0, (ix / 100) as f32 / 100.0)).collect();
+        Mesh::of_triangles(positions, (0..9_900).map(|ix| [ix, ix + 1, ix + 100]).collect())
     }
 }
