@@ -85,9 +85,9 @@ impl StructureArrays {
         Ok(to)
     }
 
-    /// Copies a structure at the beginning of these arrays, which has the indices of the target already, to its place
-    /// there. Does not wait for the device: the copies come after all commands that were submitted before, and before
-    /// all later ones.
+    /// Copies a structure at the beginning of these arrays to its place in the target. Its indices are already those of
+    /// that place. Does not wait for the device: the copies come after all commands that were submitted before, and
+    /// before all later ones.
     ///
     /// # Errors
     /// Out of memory; a Vulkan call fails. Nothing has been copied then.
@@ -98,7 +98,8 @@ impl StructureArrays {
         submit(context, "structure_copy", |commands| target.record(commands, self, sizes))
     }
 
-    /// Does what [`StructureArrays::copy_to`] does, after kernels that give the structure the indices of its place.
+    /// Copies a structure as [`StructureArrays::copy_to`] does, after kernels have given it the indices of its place.
+    /// `relocate` records these kernels.
     ///
     /// # Errors
     /// Fails as [`StructureArrays::copy_to`].
@@ -118,23 +119,35 @@ impl StructureArrays {
         })
     }
 
-    /// Returns the arrays, each with the number of bytes of a structure of so many elements and entries.
-    fn sizes(&self, (n_elements, n_entries): (usize, usize)) -> [(&Arc<AnyBuffer>, usize); 6] {
-        fn sized<T: Pod>(buffer: &Buffer<T>, n: usize) -> (&Arc<AnyBuffer>, usize) {
-            (buffer.any(), if buffer.is_empty() { 0 } else { n * size_of::<T>() })
+    fn buffers(&self) -> [&Arc<AnyBuffer>; 6] {
+        [
+            self.nodes.any(),
+            self.parents.any(),
+            self.slabs.any(),
+            self.cells.any(),
+            self.leaf_triangles.any(),
+            self.leaf_planes.any(),
+        ]
+    }
+
+    /// Returns how many bytes so many elements and entries take in each of the buffers.
+    fn bytes_of(&self, (n_elements, n_entries): (usize, usize)) -> [usize; 6] {
+        fn bytes<T: Pod>(buffer: &Buffer<T>, n: usize) -> usize {
+            if buffer.is_empty() { 0 } else { n * size_of::<T>() }
         }
         [
-            sized(&self.nodes, n_elements),
-            sized(&self.parents, n_elements / 2),
-            sized(&self.slabs, n_elements),
-            sized(&self.cells, n_elements),
-            sized(&self.leaf_triangles, n_entries),
-            sized(&self.leaf_planes, n_entries),
+            bytes(&self.nodes, n_elements),
+            bytes(&self.parents, n_elements / 2),
+            bytes(&self.slabs, n_elements),
+            bytes(&self.cells, n_elements),
+            bytes(&self.leaf_triangles, n_entries),
+            bytes(&self.leaf_planes, n_entries),
         ]
     }
 }
 
-/// Submits commands between whatever else uses their buffers, without a wait.
+/// Submits commands and does not wait for them. They run after all commands that were submitted before, and before all
+/// later ones.
 ///
 /// # Errors
 /// Out of memory; a Vulkan call fails.
@@ -165,7 +178,7 @@ pub struct BufferCopy {
     pub to: (Arc<AnyBuffer>, usize),
 }
 
-/// The source of a copy.
+/// What a copy takes its bytes from.
 pub enum Source {
     /// The first bytes of a buffer.
     Buffer(Arc<AnyBuffer>, usize),
@@ -187,12 +200,13 @@ impl BufferCopy {
 impl Target<'_> {
     /// Records the copies of the arrays of a structure of so many elements and entries.
     fn record(&self, commands: &Commands, from: &StructureArrays, sizes: (usize, usize)) {
-        let begins = self.arrays.sizes((self.place.first_element as usize, self.place.first_entry as usize));
-        let to = iter::zip(self.arrays.sizes(sizes), begins);
-        let arrays =
-            iter::zip(from.sizes(sizes), to).map(|((from, _), ((to, bytes), (_, begin)))| (from, to, begin, bytes));
-        for (from, to, begin, bytes) in arrays.filter(|(.., bytes)| *bytes > 0) {
-            commands.copy_buffer_range((from, 0), (to, begin as u64), bytes as u64);
+        let begins = self.arrays.bytes_of((self.place.first_element as usize, self.place.first_entry as usize));
+        let n_bytes = self.arrays.bytes_of(sizes);
+        let buffers = iter::zip(from.buffers(), self.arrays.buffers());
+        for ((from, to), (begin, n_bytes)) in buffers.zip(iter::zip(begins, n_bytes)) {
+            if n_bytes > 0 {
+                commands.copy_buffer_range((from, 0), (to, begin as u64), n_bytes as u64);
+            }
         }
         self.more.iter().for_each(|copy| copy.record(commands));
     }

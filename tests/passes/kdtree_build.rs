@@ -294,8 +294,9 @@ fn relocated_trees_have_the_indices_of_their_places() {
         let triangles = meshes::soup(n, 4);
         // There is room for more triangles than the tree has.
         let all = meshes::soup(n + 500, 9);
-        let builder = builder(&context, &all, &bare());
-        builder.upload(&triangles).expect("an upload");
+        let buffer = Buffer::with(&context, "triangles", &all, BufferUse::Storage).expect("triangles");
+        let builder = KdTreeBuilder::new(&context, &buffer, &bare()).expect("a builder");
+        buffer.upload(&triangles).expect("an upload");
         let built = builder.build_first(n, None).expect("a tree");
         let expected = builder.read_back(&built).expect("its arrays");
         check_twin(&context, "soup", &triangles, (&built, &expected));

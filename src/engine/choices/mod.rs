@@ -166,7 +166,8 @@ impl Workload {
 impl Request {
     /// Returns the request for a scene in which instances move or meshes change: what moves is stored apart from what
     /// does not, and a GPU builds its structures, of the kind that suits a frame, unless the user has chosen otherwise.
-    /// Also returns a note on the kind, if there was a choice. `workload`: that of one frame.
+    /// Also returns a note that says why a kind was chosen, unless it was pinned or nothing deforms. `workload`: that
+    /// of one frame.
     pub fn for_motion(self, processor: Processor, scene: &Scene, workload: &Workload) -> (Self, Option<String>) {
         let instances = match self.instances {
             Instancing::Auto => Instancing::Keep,

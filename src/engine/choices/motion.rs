@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::Workload;
 use crate::{
     accel::{AccelKind, bottom_level::LEAST_DEVICE_TRIANGLES, grid::GridOptions},
-    scene::{Mesh, Scene},
+    scene::{Mesh, Scene, mesh},
 };
 
 /// What a frame of a moving scene builds and traces.
@@ -21,14 +21,16 @@ struct FrameWork {
     n_rays: u64,
 }
 
-/// Milliseconds of a frame: of each build as such, and of a million triangles and rays. Measured on an H200 (the table
-/// "Scenes that change" in docs/performance.md, diffuse rays).
+/// What a structure costs in a frame, in milliseconds. The figures fit measurements on an H200: diffuse rays in the
+/// table "Scenes that change" of docs/performance.md.
 struct Cost {
+    /// The time of each build, however few triangles it has.
     build: f64,
+    /// The time that a build takes in addition for a million triangles.
     triangles: f64,
-    /// Through a million triangles.
+    /// The time of a million rays through a million triangles.
     rays: f64,
-    /// The power of the number of triangles by which the time of rays grows.
+    /// The time of rays grows with this power of the number of triangles.
     growth: f64,
 }
 
@@ -40,9 +42,9 @@ const GRID2: Cost = Cost { build: 0.72, triangles: 0.87, rays: 1.55, growth: 1.0
 /// times the cube root of their number. Of an even surface it is 1.7.
 const MOST_SHARING: f64 = 8.0;
 
-/// Returns the kind of structure with which build and rays of a frame take the least time, and a note that says why;
-/// none where nothing deforms, or where another kind would be of no use: paths are long, and costs of rays are those of
-/// the usual structure. `workload`: that of one frame.
+/// Returns the kind of structure with which build and rays of a frame take the least time, and a note that says why.
+/// There is none if nothing deforms, if paths are traced, whose rays are too many for a grid, or if costs of rays are
+/// shown, which depend on the structure. `workload`: that of one frame.
 pub(super) fn quickest(scene: &Scene, workload: &Workload) -> Option<(AccelKind, String)> {
     let deformed = scene.meshes.iter().filter(|mesh| mesh.deforms && mesh.faces.len() >= LEAST_DEVICE_TRIANGLES);
     let n_meshes = deformed.clone().count();
@@ -84,15 +86,17 @@ fn is_even(mesh: &Mesh) -> bool {
     if n < LEAST_DEVICE_TRIANGLES {
         return true;
     }
-    // World::with_accel refuses indices of points that are missing.
+    // A face may name a point that does not exist. World::with_accel refuses such meshes later.
     let point = |ix: u32| mesh.positions.get(ix as usize).copied().unwrap_or_default();
-    let places = || mesh.faces.iter().map(|face| face.map(point).into_iter().sum::<Vec3>());
-    let (min, max) = places().fold((Vec3::MAX, Vec3::MIN), |(min, max), at| (min.min(at), max.max(at)));
+    let place = |face: &[u32; 3]| face.map(point).into_iter().sum::<Vec3>();
+    let (min, max) = mesh::bounds_of(mesh.faces.par_iter().map(place));
     let size = (max - min).max(Vec3::splat((max - min).max_element() * 1e-3));
     let n_cells = GridOptions::two_level().levels.upper_density() * n as f32;
     let cell = (size / size.max_element()).element_product().cbrt() * size.max_element() / n_cells.cbrt();
     let mut counts = HashMap::<_, u32>::new();
-    places().for_each(|at| *counts.entry(((at - min) / cell).as_uvec3()).or_default() += 1);
+    for at in mesh.faces.iter().map(place) {
+        *counts.entry(((at - min) / cell).as_uvec3()).or_default() += 1;
+    }
     let sum: f64 = counts.values().map(|count| f64::from(*count).powi(2)).sum();
     sum / n as f64 <= MOST_SHARING * (n as f64).cbrt()
 }

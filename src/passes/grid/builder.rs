@@ -18,7 +18,7 @@ pub struct GridBuilder {
     options: GridOptions,
     passes: GridPasses,
     buffers: GridBuffers,
-    /// The finished grid, at the beginning.
+    /// The finished grid is at the beginning of these arrays.
     arrays: StructureArrays,
 }
 
@@ -60,7 +60,9 @@ impl GridBuilder {
             cells: buffers.cells.clone(),
             leaf_triangles: buffers.leaf_triangles.clone(),
             leaf_planes: buffers.leaf_planes.clone(),
-            ..StructureArrays::new(context, StructureKind::Grid, (0, 0), BufferUse::Storage)?
+            nodes: Buffer::new(context, "kd_nodes", 0, BufferUse::Storage)?,
+            parents: Buffer::new(context, "kd_parents", 0, BufferUse::Storage)?,
+            slabs: Buffer::new(context, "kd_slabs", 0, BufferUse::Storage)?,
         };
         Ok(Self {
             arrays,

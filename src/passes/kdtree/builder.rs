@@ -19,9 +19,9 @@ use crate::{
     },
 };
 
-/// Triangles up to which a command buffer builds all levels: an H200 takes some 6 ms.
+/// The most triangles of which one command buffer builds all levels. An H200 takes some 6 ms for them.
 const WHOLE_BUILD: u32 = 1 << 18;
-/// Levels that a command buffer builds of more triangles.
+/// The number of levels that a command buffer builds if there are more triangles.
 const LEVELS_PER_SUBMIT: u32 = 8;
 
 /// Options of a [`KdTreeBuilder`].
@@ -41,12 +41,11 @@ pub struct KdTreeBuilderOptions {
 /// with other triangles in the same buffer, and also with fewer.
 pub struct KdTreeBuilder {
     context: Arc<Context>,
-    triangles: Buffer<Triangle>,
     options: KdTreeBuilderOptions,
     passes: KdTreePasses,
     buffers: KdTreeBuffers,
     slabs: Option<SlabStage>,
-    /// The finished tree, at the beginning.
+    /// The finished tree is at the beginning of these arrays.
     arrays: StructureArrays,
 }
 
@@ -126,20 +125,21 @@ impl KdTreeBuilder {
         let bindings = KdTreeBuffers::bindings(context)?;
         let buffers = KdTreeBuffers::new(context, &bindings, triangles, options.room, &options.tree)?;
         let slabs = options.tree.slabs.then(|| SlabStage::new(context, &buffers)).transpose()?;
-        let empty = StructureArrays::new(context, StructureKind::Grid, (0, 0), BufferUse::Storage)?;
         Ok(Self {
             arrays: StructureArrays {
                 nodes: buffers.nodes.clone(),
                 parents: buffers.parents.clone(),
                 leaf_triangles: buffers.leaf_triangles.clone(),
                 leaf_planes: buffers.leaf_planes.clone(),
-                slabs: slabs.as_ref().map_or(empty.slabs, |stage| stage.slabs.clone()),
-                cells: empty.cells,
+                slabs: match &slabs {
+                    Some(stage) => stage.slabs.clone(),
+                    None => Buffer::new(context, "kd_build_slabs", 0, BufferUse::Storage)?,
+                },
+                cells: Buffer::new(context, "grid_cells", 0, BufferUse::Storage)?,
             },
             slabs,
             buffers,
             passes: KdTreePasses::new(context, &bindings)?,
-            triangles: triangles.clone(),
             context: context.clone(),
             options: options.clone(),
         })
@@ -165,19 +165,8 @@ impl KdTreeBuilder {
     }
 
     /// The number of triangles for which there is room.
-    pub fn capacity(&self) -> usize {
-        self.triangles.len()
-    }
-
-    /// Overwrites the first triangles, and waits for the device.
-    ///
-    /// # Errors
-    /// Out of memory; a Vulkan call fails.
-    ///
-    /// # Panics
-    /// There are more than [`KdTreeBuilder::capacity`].
-    pub fn upload(&self, triangles: &[Triangle]) -> Result<(), GpuError> {
-        self.triangles.upload_at(0, triangles)
+    fn capacity(&self) -> usize {
+        self.buffers.initial().n_triangles as usize
     }
 
     /// Builds the tree and waits for the device. `timer`: takes the times of the dispatches; it must have room for
