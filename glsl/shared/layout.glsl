@@ -1561,8 +1561,8 @@ struct KdStage {
 
 // Push constants of the kernels that relocate a structure: where its arrays begin among those of all structures.
 //
-// - `first_element`: of a kd-tree's nodes, which is even, or of a grid's cells. `first_entry`: of leaves or cells.
-//   `first_row`: of triangles.
+// - `first_element`: the index of a kd-tree's first node, which is even, or of a grid's first cell.
+// - `first_entry`: the index of the first entry of its leaves or cells. `first_row`: that of its first triangle.
 struct StructurePlace {
     uint first_element;
     uint first_entry;

@@ -83,7 +83,7 @@ pub struct FaceTable {
 }
 
 impl FaceTable {
-    /// Prepares for so many more hits. `placed`: the world of this table.
+    /// Makes the table if, with `n_hits` more rays, it pays. `placed`: the world of this table.
     pub fn expect(&self, placed: Placed, n_hits: usize) {
         let n_looked_up = self.n_looked_up.fetch_add(n_hits, Ordering::Relaxed).saturating_add(n_hits);
         let n_triangles = placed.world.scene().n_triangles();
@@ -144,7 +144,7 @@ impl<'a> Columns<'a> {
         self.geometry_ids.is_some() || self.primitive_ids.is_some() || self.uvs.is_some() || self.normals.is_some()
     }
 
-    /// Does the same on this thread alone.
+    /// Writes hits as [`Columns::write`] does, on this thread alone.
     pub fn write_rows(mut self, placed: Placed, hits: &[Hit]) {
         if let Some(column) = self.t.take() {
             column.iter_mut().zip(hits).for_each(|(t, hit)| *t = hit.t);

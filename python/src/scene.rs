@@ -33,7 +33,7 @@ const RAYS_AT_ONCE: [usize; 2] = [1 << 25, 1 << 18];
 /// The same number of queries that take longer.
 const QUERIES_AT_ONCE: [usize; 2] = [1 << 20, 1 << 16];
 
-/// Rays for which a structure is built that is asked for before there are any.
+/// The number of rays for which `build` chooses the structure, since it does not know how many will follow.
 const RAYS_TO_BUILD_FOR: usize = 1 << 23;
 
 /// A scene. Arrays are C-contiguous and of the stated types: `kdray/scene.py` sees to it.

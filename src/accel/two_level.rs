@@ -303,7 +303,7 @@ impl TwoLevel {
         begins(self.structures.iter().map(|it| it.cells().len()))
     }
 
-    /// Returns where each of the host's structures begins where all are stored one after the other.
+    /// Returns the place of each of the host's structures, if they are stored one after the other.
     ///
     /// # Panics
     /// The host has not built all.

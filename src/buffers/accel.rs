@@ -444,8 +444,9 @@ impl AccelBuffers {
     }
 
     /// Builds the structures of geometries that are deformed in another pose of the world, and uploads their triangles
-    /// and what textures need at their corners, into the arrays that are there. `before`: the buffers that these ones
-    /// succeed, which alone may see the change. Returns whether it was possible; if not, everything has to be uploaded.
+    /// and what textures need at their corners, into the arrays that are there. `before`: the buffers of the world
+    /// before, the only other ones that may see the change. Returns whether it was possible; if not, everything has to
+    /// be uploaded.
     ///
     /// # Errors
     /// Memory runs out, or a call fails. Some of the geometries may have changed then.

@@ -24,7 +24,7 @@ pub struct Geometries<'a> {
     pub instances: &'a Instances,
     /// All of them. Their triangles are made where they are first asked for.
     pub geometry: Geometry<'a>,
-    /// What the device makes the triangles of some of them of, when they change.
+    /// The poses of those geometries whose triangles the device computes.
     pub poses: &'a Poses,
 }
 
@@ -54,8 +54,9 @@ impl<'a> Geometries<'a> {
 /// The scene's arrays, and what textures need at the corners of all stored triangles.
 pub struct Arrays<'a> {
     pub arrays: &'a SceneArrays,
-    /// The `instance_rows` that those of `arrays` succeed, and where the geometries' rows begin in both.
+    /// The `instance_rows` of the world before.
     pub rows_before: &'a Buffer<InstanceRow>,
+    /// Where the rows of geometries begin, in these `instance_rows` as in those before.
     pub geometries_begin: usize,
     /// Tangents and colours; none if the scene has none.
     pub corners: Option<&'a Shared<Vec<[CornerSurface; 3]>>>,

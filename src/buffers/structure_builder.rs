@@ -29,13 +29,13 @@ use crate::{
 /// Builds structures of geometries, one after the other.
 pub(super) struct StructureBuilder {
     context: Arc<Context>,
-    /// The triangles of the structure that is built, at the beginning.
+    /// The triangles of the structure that is built are at the beginning.
     triangles: Buffer<Triangle>,
     kernels: Kernels,
     timer: Timer,
     /// What belongs to the corners of triangles, on its way to the arrays.
     pub corners: Buffer<u32>,
-    /// The kernels that deform meshes, after the first one.
+    /// The kernels that deform meshes. They are made for the first mesh.
     deform: Option<Deform>,
     /// The meshes that have been deformed, by the indices of their geometries.
     deformed: HashMap<usize, Deformed>,
@@ -119,7 +119,7 @@ impl StructureBuilder {
         &self.triangles
     }
 
-    /// Puts the triangles of a geometry into the builder that are stored on the device.
+    /// Copies the triangles of a geometry, which are stored on the device, into the builder.
     pub fn take_stored(&self, stored: &Buffer<Triangle>, range: StoredRange) -> Result<(), GpuError> {
         let [first, len] = [range.first_row, range.n_triangles].map(|n| u64::from(n) * size_of::<Triangle>() as u64);
         submit(&self.context, "take_triangles", |commands| {

@@ -31,10 +31,10 @@ const MOST_LANES: usize = 32;
 /// Number of rays that the CPU casts at a time.
 const RAYS_PER_CPU_CAST: usize = 1 << 19;
 
-/// What a thread casts its rays with. It waits for the device before it uses the memory again.
+/// The memory through which a thread casts its rays. The thread waits for the device before it writes there again.
 pub(super) struct Lane {
     exchange: Exchange<Ray, Hit>,
-    /// The structure and the set over it and the lane's memory, until the world changes.
+    /// The structure, and the descriptor set over it and the lane's memory; none after the world has changed.
     bound: Option<(AccelBuffers, BindingSet)>,
 }
 
@@ -77,7 +77,7 @@ impl GpuCaster {
             hits.with_min_len(chunks_per_task).for_each(|(ix, hits)| take(first + ix * RAYS_PER_CHUNK, hits));
         };
         lanes[..n_lanes].par_iter_mut().with_max_len(1).try_for_each(run)?;
-        // The device may still read the memory of lanes that have failed to wait for it, so they are not used again.
+        // A lane whose wait has failed is not used again, since the device may still read its memory.
         self.lanes = lanes;
         Ok(())
     }
@@ -116,7 +116,8 @@ impl GpuCaster {
     }
 }
 
-/// Returns the number of rays of a submission: as many for each thread, within bounds, in whole chunks.
+/// Returns the number of rays of a submission. If the bounds allow it, each thread submits once. Where there are more
+/// rays than in a chunk, it is a multiple of a chunk.
 fn rays_per_submission(n_rays: usize, n_threads: usize, rays_per_batch: usize) -> usize {
     let [least, most] = RAYS_PER_SUBMISSION;
     let n = (n_rays / n_threads).clamp(least, most).min(rays_per_batch);

@@ -406,7 +406,7 @@ pub(super) struct Staging {
 
 // SAFETY: the memory belongs to no thread, and a shared reference leads to no access.
 unsafe impl Send for Staging {}
-// SAFETY: as above.
+// SAFETY: for the same reason.
 unsafe impl Sync for Staging {}
 
 impl Staging {
