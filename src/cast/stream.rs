@@ -24,9 +24,12 @@ use crate::{
 /// rays, and 128 KiB of hits.
 pub const RAYS_PER_CHUNK: usize = 1 << 13;
 /// Bounds of the number of rays that the device casts at a time, if there are so many. Fewer do not fill a large
-/// device. More would leave threads without work at the stream's end.
-const RAYS_PER_SUBMISSION: [usize; 2] = [1 << 16, 1 << 17];
-/// The most lanes. Each has 4 MiB of rays and 2 MiB of hits.
+/// device (docs/experiments.md).
+const RAYS_PER_SUBMISSION: [usize; 2] = [1 << 16, 1 << 18];
+/// The least number of submissions of a stream whose rays the bounds allow to be divided so: while the device casts the
+/// rays of one, the host makes those of another.
+const LEAST_SUBMISSIONS: usize = 4;
+/// The most lanes. Each has at most 8 MiB of rays and 4 MiB of hits.
 const MOST_LANES: usize = 32;
 /// Number of rays that the CPU casts at a time.
 const RAYS_PER_CPU_CAST: usize = 1 << 19;
@@ -56,7 +59,7 @@ impl GpuCaster {
     ) -> Result<(), GpuError> {
         let kernel = self.prepare_kernel(query)?;
         let n_threads = rayon::current_num_threads();
-        let most = rays_per_submission(n_rays, n_threads, self.rays_per_batch);
+        let most = rays_per_submission(n_rays, self.rays_per_batch);
         let n_lanes = n_rays.div_ceil(most).min(n_threads).min(MOST_LANES);
         // A thread that shares its work while no other one is idle could be made to run the whole of another lane.
         let chunks_per_task = if 2 * n_lanes <= n_threads.max(2) { 1 } else { usize::MAX };
@@ -116,11 +119,10 @@ impl GpuCaster {
     }
 }
 
-/// Returns the number of rays of a submission. If the bounds allow it, each thread submits once. Where there are more
-/// rays than in a chunk, it is a multiple of a chunk.
-fn rays_per_submission(n_rays: usize, n_threads: usize, rays_per_batch: usize) -> usize {
+/// Returns the number of rays of a submission. Where there are more rays than in a chunk, it is a multiple of a chunk.
+fn rays_per_submission(n_rays: usize, rays_per_batch: usize) -> usize {
     let [least, most] = RAYS_PER_SUBMISSION;
-    let n = (n_rays / n_threads).clamp(least, most).min(rays_per_batch);
+    let n = (n_rays / LEAST_SUBMISSIONS).clamp(least, most).min(rays_per_batch);
     if n > RAYS_PER_CHUNK { n / RAYS_PER_CHUNK * RAYS_PER_CHUNK } else { n }
 }
 
