@@ -26,6 +26,9 @@ pub const RAYS_PER_CHUNK: usize = 1 << 13;
 /// Bounds of the number of rays that the device casts at a time, if there are so many. Fewer do not fill a large
 /// device (docs/experiments.md).
 const RAYS_PER_SUBMISSION: [usize; 2] = [1 << 16, 1 << 18];
+/// A stream of more rays than the first number is cast by submissions of the second one: with larger ones, the hits of
+/// all threads leave the cache before they are taken.
+const LONG_STREAM: [usize; 2] = [1 << 21, 1 << 17];
 /// The least number of submissions of a stream whose rays the bounds allow to be divided so: while the device casts the
 /// rays of one, the host makes those of another.
 const LEAST_SUBMISSIONS: usize = 4;
@@ -122,7 +125,9 @@ impl GpuCaster {
 /// Returns the number of rays of a submission. Where there are more rays than in a chunk, it is a multiple of a chunk.
 fn rays_per_submission(n_rays: usize, rays_per_batch: usize) -> usize {
     let [least, most] = RAYS_PER_SUBMISSION;
-    let n = (n_rays / LEAST_SUBMISSIONS).clamp(least, most).min(rays_per_batch);
+    let [long, of_long] = LONG_STREAM;
+    let n = if n_rays > long { of_long } else { (n_rays / LEAST_SUBMISSIONS).clamp(least, most) };
+    let n = n.min(rays_per_batch);
     if n > RAYS_PER_CHUNK { n / RAYS_PER_CHUNK * RAYS_PER_CHUNK } else { n }
 }
 
