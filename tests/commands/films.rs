@@ -295,8 +295,7 @@ fn one_file_has_all_frames() {
     film(&["-o", "f#.png"]);
     let frames = [0, 1, 2, 3].map(|ix| pixels(&path.join(format!("f{ix}.png"))));
 
-    let output = film(&["-o", "film.png"]);
-    assert!(output.stdout.ends_with(b"wrote 4 pictures to film.png\n"));
+    film(&["-o", "film.png"]);
     let mut reader = png::Decoder::new(open("film.png")).read_info().unwrap();
     assert_eq!(reader.info().animation_control.map(|it| (it.num_frames, it.num_plays)), Some((4, 0)));
     let mut buffer = vec![0; reader.output_buffer_size().unwrap()];
