@@ -26,12 +26,12 @@ pub const RAYS_PER_CHUNK: usize = 1 << 13;
 /// Bounds of the number of rays that the device casts at a time, if there are so many. Fewer do not fill a large
 /// device (docs/experiments.md).
 const RAYS_PER_SUBMISSION: [usize; 2] = [1 << 16, 1 << 18];
-/// A stream of more rays than the first number is cast by submissions of the second one: with larger ones, the hits of
-/// all threads leave the cache before they are taken.
+/// Number of rays above which a stream is long, and the size of a long stream's submissions, in rays. With larger
+/// ones, casts that take all columns are slower (docs/experiments.md).
 const LONG_STREAM: [usize; 2] = [1 << 21, 1 << 17];
-/// The least number of submissions of a stream whose rays the bounds allow to be divided so: while the device casts the
-/// rays of one, the host makes those of another.
-const LEAST_SUBMISSIONS: usize = 4;
+/// A stream is divided into this number of submissions, if their size stays within the bounds. While the device casts
+/// the rays of one, the host makes those of the next.
+const SUBMISSIONS_PER_STREAM: usize = 4;
 /// The most lanes. Each has at most 8 MiB of rays and 4 MiB of hits.
 const MOST_LANES: usize = 32;
 /// Number of rays that the CPU casts at a time.
@@ -126,7 +126,7 @@ impl GpuCaster {
 fn rays_per_submission(n_rays: usize, rays_per_batch: usize) -> usize {
     let [least, most] = RAYS_PER_SUBMISSION;
     let [long, of_long] = LONG_STREAM;
-    let n = if n_rays > long { of_long } else { (n_rays / LEAST_SUBMISSIONS).clamp(least, most) };
+    let n = if n_rays > long { of_long } else { (n_rays / SUBMISSIONS_PER_STREAM).clamp(least, most) };
     let n = n.min(rays_per_batch);
     if n > RAYS_PER_CHUNK { n / RAYS_PER_CHUNK * RAYS_PER_CHUNK } else { n }
 }
