@@ -5,7 +5,7 @@ mod support;
 use std::{
     ops::RangeInclusive,
     sync::{
-        Arc,
+        Arc, Mutex,
         atomic::{AtomicUsize, Ordering},
     },
 };
@@ -19,7 +19,7 @@ use kdray::{
         kdtree::{BuildOptions, Traversal},
         wide_bvh::WideBvh,
     },
-    cast::{CpuCaster, GpuCaster, Hit, NO_TRIANGLE, QueryPoint, RAYS_PER_CHUNK, Ray, cast_on_cpu},
+    cast::{CpuCaster, GpuCaster, Hit, NO_TRIANGLE, QueryPoint, RAYS_PER_CHUNK, Ray, StreamRay, cast_on_cpu},
     cpu::wide_traverser::WideTraverser,
     gpu::{Context, DeviceOverrides},
     layout::{KD_MAX_DEPTH, KD_WORD_DEPTH, PathRay},
@@ -93,6 +93,11 @@ fn some_rays(world: &MeshWithTree, n: usize, scale_log2: RangeInclusive<f32>) ->
         scaled(&ray, t_min, scale)
     };
     (0..n).map(some_ray).collect()
+}
+
+fn bare(ray: &Ray) -> [f32; 6] {
+    let ([x, y, z], [dx, dy, dz]) = (ray.origin.to_array(), ray.direction.to_array());
+    [x, y, z, dx, dy, dz]
 }
 
 /// Finds the hit without the tree, and with the direction as it is.
@@ -254,17 +259,32 @@ fn streams_find_the_hits_of_casts() {
         let world = MeshWithTree::new(meshes::torus(40, 20));
         let rays = some_rays(&world, 1000, 0.0..=0.0);
         let mut caster = device.caster(&world, Traversal::Mask).with_batches_of(130);
+        let on_cpu = CpuCaster::new(world.geometry(), Traversal::OF_CPU);
         for (query, n) in [(Query::Closest, 1000), (Query::Any, 999), (Query::Closest, 3), (Query::Closest, 0)] {
             let expected = caster.cast(&rays[..n], query, 1).expect("a cast").hits;
-            assert_eq!(streamed(&mut caster, &rays[..n], query), expected, "{query:?} {n}");
+            assert_eq!(streamed::<_, Hit>(&mut caster, &rays[..n], query), expected, "{query:?} {n}");
+            let ts: Vec<f32> = expected.iter().map(|hit| hit.t).collect();
+            assert_eq!(streamed::<_, f32>(&mut caster, &rays[..n], query), ts, "{query:?} {n}");
+            let bare: Vec<_> = rays[..n].iter().map(|ray| bare(ray)).collect();
+            let whole: Vec<_> = bare.iter().map(StreamRay::to_ray).collect();
+            let expected = caster.cast(&whole, query, 1).expect("a cast").hits;
+            assert_eq!(streamed::<_, Hit>(&mut caster, &bare, query), expected, "{query:?} {n}");
+            let ts: Vec<f32> = expected.iter().map(|hit| hit.t).collect();
+            assert_eq!(streamed::<_, f32>(&mut caster, &bare, query), ts, "{query:?} {n}");
+            let of_cpu = Mutex::new(vec![0.0; n]);
+            let make = |first: usize, rays: &mut [[f32; 6]]| rays.copy_from_slice(&bare[first..][..rays.len()]);
+            let take = |first: usize, ts: &[f32]| of_cpu.lock().unwrap()[first..][..ts.len()].copy_from_slice(ts);
+            on_cpu.cast_stream(n, query, make, take);
+            let expected: Vec<f32> = on_cpu.cast(&whole, query).iter().map(|hit| hit.t).collect();
+            assert_eq!(of_cpu.into_inner().unwrap(), expected, "{query:?} {n}");
         }
-        let found = streamed(&mut caster, &rays, Query::Closest);
+        let found: Vec<Hit> = streamed(&mut caster, &rays, Query::Closest);
         assert!(found.iter().filter(|hit| **hit != MISS).count() > 100);
         let hidden: Vec<u32> = found.iter().map(|hit| hit.triangle_ix).filter(|ix| *ix != NO_TRIANGLE).collect();
         let mut caster = caster.hiding(&hidden).expect("a caster");
         let expected = caster.cast(&rays, Query::Closest, 1).expect("a cast").hits;
         assert_ne!(expected, found);
-        assert_eq!(streamed(&mut caster, &rays, Query::Closest), expected);
+        assert_eq!(streamed::<_, Hit>(&mut caster, &rays, Query::Closest), expected);
     }
 }
 

@@ -223,10 +223,10 @@
 
 // Mark of a ray whose traversal has stopped before its end. It replaces the triangle of the ray's hit, or the light's
 // visibility. The bits below it are the slot that holds the ray's state, or `NO_SLOT`. The mark never equals
-// `NO_TRIANGLE`.
-#define SUSPENDED 0x80000000u
+// `NO_TRIANGLE`, and its bits are those of a NaN, so that it can replace the ray's t, too.
+#define SUSPENDED 0xffc00000u
 // Slot of a suspended ray that found all slots taken.
-#define NO_SLOT 0x7ffffffeu
+#define NO_SLOT 0x3ffffeu
 // Rows of four words that a slot takes in `suspended_rays`. One row of counts precedes the slots.
 #define SUSPENDED_RAY_ROWS 4u
 // `resume_pass` of a dispatch that takes all rays, from their beginning.
@@ -1246,11 +1246,15 @@ struct RasterPush {
 // - `lanes_log2`: each ray has `2^lanes_log2` lanes, of which the first works.
 // - `resume_pass`: `PASS_BEGIN` and its like.
 // - `mask`: the cast's mask, shifted as that in `Instance.flags`.
+// - `bare_rays`: whether rays are origins and directions alone, 24 bytes. Then their t is from 0 to infinity.
+// - `bare_hits`: whether hits are t alone, 4 bytes. That of a miss is infinite.
 struct CastBatch {
     uint n_rays;
     uint lanes_log2;
     uint resume_pass;
     uint mask;
+    uint bare_rays;
+    uint bare_hits;
 };
 
 // How far a ray is on its way from hit to hit, 28 bytes (all_hits.comp).

@@ -144,6 +144,18 @@ impl<'a> Columns<'a> {
         self.geometry_ids.is_some() || self.primitive_ids.is_some() || self.uvs.is_some() || self.normals.is_some()
     }
 
+    /// Whether the columns hold t and nothing else.
+    pub fn are_bare(&self) -> bool {
+        !self.have_faces() && self.points.is_none()
+    }
+
+    /// Writes columns that are bare.
+    pub fn write_bare(self, ts: &[f32]) {
+        if let Some(column) = self.t {
+            column.copy_from_slice(ts);
+        }
+    }
+
     /// Writes hits as [`Columns::write`] does, on this thread alone.
     pub fn write_rows(mut self, placed: Placed, hits: &[Hit]) {
         if let Some(column) = self.t.take() {

@@ -10,7 +10,7 @@ use bytemuck::{Zeroable, cast_slice};
 use glam::{DMat4, DVec3, DVec4, Vec3};
 use kdray::{
     accel::Query,
-    cast::{Hit, NO_TRIANGLE, QueryPoint, RAYS_PER_CHUNK, Ray},
+    cast::{Hit, QueryPoint, RAYS_PER_CHUNK, Ray, StreamHit},
     engine::Caster,
 };
 use numpy::{
@@ -89,6 +89,36 @@ impl<'a> Rows<'a> {
 
     fn len(&self) -> usize {
         self.rows.len() / self.width
+    }
+
+    /// Returns the rays if they are origins and directions alone, whose t are from 0 to infinity.
+    fn bare(&self) -> Option<&'a [[f32; 6]]> {
+        let is_bare = self.width == 6 && self.t_min == [0.0] && self.t_max == [f32::INFINITY];
+        is_bare.then(|| self.rows.as_chunks().0)
+    }
+
+    /// Casts a range of the rays, and hands chunks of their hits to `take`.
+    fn cast<H: StreamHit>(
+        &self,
+        caster: &mut Caster,
+        range: ops::Range<usize>,
+        query: Query,
+        take: impl Fn(usize, &[H]) + Sync,
+    ) -> PyResult<()> {
+        let n = range.len();
+        match self.bare() {
+            Some(rows) => {
+                let make = |begin: usize, rays: &mut [[f32; 6]]| {
+                    rays.copy_from_slice(&rows[range.start + begin..][..rays.len()]);
+                };
+                caster.cast_stream(n, query, make, take)
+            }
+            None => {
+                let make = |begin: usize, rays: &mut [Ray]| self.write(range.start + begin, rays);
+                caster.cast_stream(n, query, make, take)
+            }
+        }
+        .map_err(failed)
     }
 
     /// Writes the rays from `first` on, in order.
@@ -345,12 +375,14 @@ impl Core {
             }
             let chunks = columns.split_off_chunks(range.len(), RAYS_PER_CHUNK);
             let chunks: Vec<_> = chunks.into_iter().map(|chunk| Mutex::new(Some(chunk))).collect();
-            let take = |begin: usize, hits: &[Hit]| {
-                let chunk = locked(&chunks[begin / RAYS_PER_CHUNK]).take().expect("each chunk is taken once");
-                chunk.write_rows(placed, hits);
-            };
-            let make = |begin: usize, rays: &mut [Ray]| rows.write(range.start + begin, rays);
-            caster.cast_stream(range.len(), Query::Closest, make, take).map_err(failed)
+            let chunk_at =
+                |begin: usize| locked(&chunks[begin / RAYS_PER_CHUNK]).take().expect("each chunk is taken once");
+            if columns.are_bare() {
+                let take = |begin: usize, ts: &[f32]| chunk_at(begin).write_bare(ts);
+                return rows.cast(caster, range, Query::Closest, take);
+            }
+            let take = |begin: usize, hits: &[Hit]| chunk_at(begin).write_rows(placed, hits);
+            rows.cast(caster, range, Query::Closest, take)
         })
     }
 
@@ -368,12 +400,11 @@ impl Core {
         let output = output.as_slice_mut()?;
         self.in_chunks(py, (rows.len(), RAYS_AT_ONCE), (mask, n_threads), |range, (caster, _)| {
             let chunks: Vec<_> = output[range.clone()].chunks_mut(RAYS_PER_CHUNK).map(Mutex::new).collect();
-            let take = |begin: usize, hits: &[Hit]| {
+            let take = |begin: usize, ts: &[f32]| {
                 let mut chunk = locked(&chunks[begin / RAYS_PER_CHUNK]);
-                chunk.iter_mut().zip(hits).for_each(|(out, hit)| *out = hit.triangle_ix != NO_TRIANGLE);
+                chunk.iter_mut().zip(ts).for_each(|(out, t)| *out = *t < f32::INFINITY);
             };
-            let make = |begin: usize, rays: &mut [Ray]| rows.write(range.start + begin, rays);
-            caster.cast_stream(range.len(), Query::Any, make, take).map_err(failed)
+            rows.cast(caster, range, Query::Any, take)
         })
     }
 

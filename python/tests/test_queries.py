@@ -90,6 +90,21 @@ def test_large_casts_are_those_of_small_ones(random):
         assert all((hits[key][part] == small[key]).all() for key in small)
 
 
+def test_columns_alone_are_those_of_all(device, random):
+    """t alone, origins and directions alone, and both have ways of their own."""
+    scene, rays = fresh(device, [soup(random, 100)]), random_rays(random, 3000)
+    ends = np.tile(np.array([0, np.inf], np.float32), (len(rays), 1))
+    for given in [{"t_min": 0.0}, {"t_min": -5.0}, {"t_max": 0.4}, {"t_min": random.random(len(rays)) * 0.2}]:
+        hits = scene.cast_rays(rays, **given)
+        t = scene.cast_rays(rays, **given, out={"t_hit": np.empty(len(rays), np.float32)})["t_hit"]
+        assert np.array_equal(t, hits["t_hit"]) and 0.05 < np.mean(t < np.inf) < 0.95
+        given = {name.replace("t_min", "tnear").replace("t_max", "tfar"): value for name, value in given.items()}
+        assert np.array_equal(scene.test_occlusions(rays, **given), t < np.inf)
+    assert (scene.cast_rays(rays, t_min=-5.0)["t_hit"] < 0).any()
+    whole, bare = (scene.cast_rays(given) for given in (np.concatenate([rays, ends], axis=1), rays))
+    assert all(np.array_equal(whole[name], bare[name]) for name in bare)
+
+
 def test_rays_that_can_only_miss(device):
     scene = fresh(device, [ball()])
     rays = np.array([[np.nan, 0, 0, 0, 0, 1], [0, 0, 0, 0, 0, 0], [0, 0, np.inf, 0, 0, 1], [0, 0, 0, 0, 0, 1]])

@@ -35,7 +35,10 @@ use rayon::prelude::*;
 
 pub(crate) use self::rounds::time_in_turn;
 pub use self::{
-    all_hits::AllHits, closest_point::count_invalid_points, recorded::RecordedCast, stream::RAYS_PER_CHUNK,
+    all_hits::AllHits,
+    closest_point::count_invalid_points,
+    recorded::RecordedCast,
+    stream::{RAYS_PER_CHUNK, StreamHit, StreamRay},
 };
 #[doc(hidden)]
 pub use self::{kernel::Kernel, rounds::Contender};

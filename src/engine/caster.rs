@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Instant};
 
 use crate::{
     accel::{Query, kdtree::Traversal},
-    cast::{self, AllHits, CastResult, CpuCaster, Hit, QueryPoint, Ray},
+    cast::{self, AllHits, CastResult, CpuCaster, Hit, QueryPoint, Ray, StreamHit, StreamRay},
     frame::BadOptions,
     gpu::{Context, GpuError},
     world::{Geometry, World},
@@ -90,12 +90,12 @@ impl<'a> Caster<'a> {
     ///
     /// # Errors
     /// Memory runs out, or a call fails. Then some chunks may have been taken.
-    pub fn cast_stream(
+    pub fn cast_stream<R: StreamRay, H: StreamHit>(
         &mut self,
         n_rays: usize,
         query: Query,
-        make: impl Fn(usize, &mut [Ray]) + Sync,
-        take: impl Fn(usize, &[Hit]) + Sync,
+        make: impl Fn(usize, &mut [R]) + Sync,
+        take: impl Fn(usize, &[H]) + Sync,
     ) -> Result<(), GpuError> {
         match &mut self.0 {
             Backend::Device(caster) => caster.cast_stream(n_rays, query, make, take),

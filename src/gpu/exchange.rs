@@ -1,37 +1,35 @@
 //! Memory through which the host gives a kernel its inputs and gets the outputs back, run after run.
 
-use std::{marker::PhantomData, slice, sync::Arc};
+use std::{slice, sync::Arc};
 
 use bytemuck::Pod;
 use gpu_allocator::MemoryLocation;
 
 use super::{Access, Binding, Commands, Context, GpuError, buffer::Staging};
 
-/// Mapped memory of `len` inputs of a kernel, and of as many outputs. A run ends before the host sees the memory again.
-pub struct Exchange<I, O> {
+/// Mapped memory of inputs of a kernel, and of its outputs. A run ends before the host sees the memory again.
+pub struct Exchange {
     inputs: Staging,
     outputs: Staging,
-    elements: PhantomData<(I, O)>,
-    len: usize,
     context: Arc<Context>,
 }
 
-impl<I: Pod, O: Pod> Exchange<I, O> {
-    /// Creates memory with undefined contents. `names`: of the inputs and of the outputs.
+impl Exchange {
+    /// Creates memory with undefined contents. `names` and `bytes`: of the inputs and of the outputs.
     ///
     /// # Errors
     /// A buffer exceeds the device's limits, or memory is exhausted.
-    pub fn new(context: &Arc<Context>, names: [&str; 2], len: usize) -> Result<Self, GpuError> {
+    pub fn new(context: &Arc<Context>, names: [&str; 2], bytes: [usize; 2]) -> Result<Self, GpuError> {
         // The host only writes inputs, in order, so their memory may be write-combined. On devices whose whole memory
         // is mapped, it is the device's own. The host reads outputs, so their memory has to be cached.
-        let inputs = mapped::<I>(context, names[0], len, MemoryLocation::CpuToGpu)?;
-        let outputs = mapped::<O>(context, names[1], len, MemoryLocation::GpuToCpu)?;
-        Ok(Self { inputs, outputs, elements: PhantomData, len, context: Arc::clone(context) })
+        let inputs = mapped(context, names[0], bytes[0], MemoryLocation::CpuToGpu)?;
+        let outputs = mapped(context, names[1], bytes[1], MemoryLocation::GpuToCpu)?;
+        Ok(Self { inputs, outputs, context: Arc::clone(context) })
     }
 
-    /// Returns the number of inputs for which there is room.
-    pub fn room(&self) -> usize {
-        self.len
+    /// Returns the bytes of the memory of inputs, and of that of outputs.
+    pub fn bytes(&self) -> [usize; 2] {
+        [&self.inputs, &self.outputs].map(|staging| staging.buffer().bytes() as usize)
     }
 
     /// Returns the storage buffers that kernels read inputs from and write outputs to. Only the commands of a run, and
@@ -40,30 +38,34 @@ impl<I: Pod, O: Pod> Exchange<I, O> {
         [Binding::Buffer(self.inputs.buffer()), Binding::Buffer(self.outputs.buffer())]
     }
 
-    /// Returns the memory of inputs. To read it is slow, and so is any order of writing but the elements' own.
-    pub fn inputs(&mut self) -> &mut [I] {
-        // SAFETY: the memory holds `len` elements, which any bytes are, and stays mapped as long as its owner. The host
+    /// Returns the memory of the first `n` inputs. To read it is slow, and so is any order of writing but the elements'
+    /// own.
+    ///
+    /// # Panics
+    /// There is room for fewer.
+    pub fn inputs<I: Pod>(&mut self, n: usize) -> &mut [I] {
+        let at = first::<I>(&self.inputs, n);
+        // SAFETY: the memory holds `n` elements, which any bytes are, and stays mapped as long as its owner. The host
         // accesses it through this borrow alone. A device that still reads it, because a wait has failed, at most
         // computes outputs that nobody gets.
-        unsafe { slice::from_raw_parts_mut(self.inputs.mapped().cast().as_ptr(), self.len) }
+        unsafe { slice::from_raw_parts_mut(at, n) }
     }
 
-    /// Runs what `record` records on the first `n` inputs, and returns their outputs. `finish` is called after the
-    /// device has ended the commands. It says whether it has run more commands that write outputs, and has waited for
-    /// them.
+    /// Runs what `record` records, and returns the first `n` outputs. `finish` is called after the device has ended the
+    /// commands. It says whether it has run more commands that write outputs, and has waited for them.
     ///
     /// # Errors
     /// `finish` fails, memory is exhausted, or a call fails.
     ///
     /// # Panics
     /// There is room for fewer.
-    pub fn run(
+    pub fn run<O: Pod>(
         &mut self,
         n: usize,
         record: impl FnOnce(&Commands),
         finish: impl FnOnce() -> Result<bool, GpuError>,
     ) -> Result<&[O], GpuError> {
-        assert!(n <= self.len, "`{}` has room for {} elements, not {n}", self.inputs.buffer().name(), self.len);
+        let outputs = first::<O>(&self.outputs, n);
         // The host's writes before a submission need no barrier.
         self.context.run("exchange", |commands| {
             record(commands);
@@ -73,21 +75,25 @@ impl<I: Pod, O: Pod> Exchange<I, O> {
             // The outputs.
             self.context.run("exchange", |commands| commands.barrier(Access::ComputeWrite, Access::HostRead))?;
         }
-        // SAFETY: the memory holds `len` elements, which any bytes are, and stays mapped as long as its owner. The
-        // device has ended this run and all before, even if their waits have failed: a wait includes all that was
-        // submitted before. The next run borrows this value mutably.
-        Ok(unsafe { slice::from_raw_parts(self.outputs.mapped().cast().as_ptr(), n) })
+        // SAFETY: the memory holds `n` elements, which any bytes are, and stays mapped as long as its owner. The device
+        // has ended this run and all before, even if their waits have failed: a wait includes all that was submitted
+        // before. The next run borrows this value mutably.
+        Ok(unsafe { slice::from_raw_parts(outputs, n) })
     }
 }
 
-/// Makes storage for `len` elements in mapped memory.
-fn mapped<T: Pod>(
-    context: &Arc<Context>,
-    name: &str,
-    len: usize,
-    location: MemoryLocation,
-) -> Result<Staging, GpuError> {
-    let bytes = (len.max(1) * size_of::<T>()) as u64;
+/// Returns the address of `n` elements, which the memory has room for.
+fn first<T: Pod>(memory: &Staging, n: usize) -> *mut T {
+    const { assert!(align_of::<T>() <= 16, "mapped memory begins at a multiple of 16") };
+    let (name, bytes) = (memory.buffer().name(), memory.buffer().bytes());
+    let has_room = n.checked_mul(size_of::<T>()).is_some_and(|needed| needed as u64 <= bytes);
+    assert!(has_room, "`{name}` has {bytes} bytes, which are no {n} elements");
+    memory.mapped().cast().as_ptr()
+}
+
+/// Makes storage of `bytes` in mapped memory.
+fn mapped(context: &Arc<Context>, name: &str, bytes: usize, location: MemoryLocation) -> Result<Staging, GpuError> {
+    let bytes = bytes as u64;
     let limit = context.limits().storage_range;
     if bytes > limit {
         return Err(GpuError::TooLarge { object: name.to_owned(), bytes, limit });
@@ -103,23 +109,23 @@ mod tests {
     #[test]
     fn outputs_are_those_of_the_last_commands() {
         let context = Context::new(&ContextOptions::new(None, true)).expect("a device with validation");
-        let mut exchange = Exchange::<u32, u32>::new(&context, ["in", "out"], 100).expect("buffers");
+        let mut exchange = Exchange::new(&context, ["in", "out"], [400, 400]).expect("buffers");
         let [inputs, outputs] = [&exchange.inputs, &exchange.outputs].map(|it| it.buffer().clone());
         let fence = |commands: &Commands| commands.barrier(Access::TransferWrite, Access::AnyUse);
         for n in [100, 3, 0, 50] {
             let expected: Vec<u32> = (0..n as u32).map(|ix| ix ^ n as u32).collect();
-            exchange.inputs()[..n].copy_from_slice(&expected);
+            exchange.inputs(n).copy_from_slice(&expected);
             let copy = |commands: &Commands| {
                 fence(commands);
                 commands.copy_buffer(&inputs, &outputs, 400);
                 fence(commands);
             };
-            assert_eq!(exchange.run(n, copy, || Ok(false)).expect("a run"), expected);
+            assert_eq!(exchange.run::<u32>(n, copy, || Ok(false)).expect("a run"), expected);
             let fill = |commands: &Commands| {
                 commands.fill_buffer(&outputs, 7);
                 fence(commands);
             };
-            let found = exchange.run(n, copy, || context.run("more", fill).map(|()| true)).expect("a run");
+            let found = exchange.run::<u32>(n, copy, || context.run("more", fill).map(|()| true)).expect("a run");
             assert_eq!(found, vec![7; n]);
         }
         assert_eq!(context.validation_messages(), Vec::<String>::new());

@@ -115,7 +115,7 @@ mod tests {
     type Members = Vec<(&'static str, usize)>;
 
     /// Returns the members of a block's only member, which is a struct or an array of structs, and the array's stride
-    /// in bytes. Returns no members for an array of vectors: the kernel assembles its structs from these vectors.
+    /// in bytes. Returns no members for an array of vectors or words, of which the kernel assembles its structs.
     fn members_of(block: &Type) -> (Option<Members>, Option<usize>) {
         let Type::Struct(block) = block else { panic!("{block:?} is no block") };
         let (element, stride) = match &block.members[0].ty {
@@ -125,8 +125,8 @@ mod tests {
         let member = |m: &StructMember| (rust_type(&m.ty), m.offset.expect("an offset"));
         match element {
             Type::Struct(element) => (Some(element.members.iter().map(member).collect()), stride),
-            Type::Vector(_) => (None, stride),
-            other => panic!("{other:?} is neither struct nor vector"),
+            Type::Vector(_) | Type::Scalar(_) => (None, stride),
+            other => panic!("{other:?} is neither struct, vector nor word"),
         }
     }
 

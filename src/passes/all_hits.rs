@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use super::{
-    cast::{Masked, record_batch},
+    cast::{Bare, Masked, record_batch},
     kernel, search_constants, searching,
 };
 use crate::{
@@ -43,6 +43,6 @@ impl AllHits {
     /// `pass`: which rays are traced, all or those that were suspended.
     pub fn record(&self, commands: &Commands, set: &BindingSet, rays: Masked, pass: ResumePass) {
         commands.bind(set);
-        record_batch(commands, &self.kernel, (rays, self.n_lanes), pass);
+        record_batch(commands, &self.kernel, (rays, self.n_lanes), Bare::default(), pass);
     }
 }

@@ -48,8 +48,13 @@ impl Cast {
     /// Needs the first elements of `cast_rays`. Leaves the first elements of `cast_hits`; a ray that was suspended
     /// leaves a mark in place of its hit. `pass`: which rays are traced, all or those that were suspended.
     pub fn record(&self, commands: &Commands, set: &BindingSet, rays: Masked, pass: ResumePass) {
+        self.record_bare(commands, set, rays, Bare::default(), pass);
+    }
+
+    /// Does what [`Cast::record`] does with rays or hits that may be bare.
+    pub fn record_bare(&self, commands: &Commands, set: &BindingSet, rays: Masked, bare: Bare, pass: ResumePass) {
         commands.bind(set);
-        record_batch(commands, &self.kernel, (rays, self.n_lanes), pass);
+        record_batch(commands, &self.kernel, (rays, self.n_lanes), bare, pass);
     }
 }
 
@@ -62,15 +67,27 @@ pub struct Masked {
     pub mask: u8,
 }
 
+/// What of the rays and hits of a cast is stored.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Bare {
+    /// Only origins and directions: six floats a ray. Then t is from 0 to infinity.
+    pub rays: bool,
+    /// Only t: one float a hit, infinite for a miss.
+    pub hits: bool,
+}
+
 /// Records a kernel of a [`CastBatch`] of these rays or points, on a device with so many lanes.
 pub(super) fn record_batch(
     commands: &Commands,
     kernel: &ComputePipeline,
     (Masked { n: n_rays, mask }, n_lanes): (Masked, u32),
+    bare: Bare,
     pass: ResumePass,
 ) {
     let lanes_log2 = lanes_log2(n_rays, n_lanes);
     let dispatch = Dispatch::Threads([n_rays << lanes_log2, 1, 1], [RAY_GROUP_SIZE, 1, 1]);
     let mask = u32::from(mask) << INSTANCE_MASK_SHIFT;
-    commands.dispatch(kernel, None, &CastBatch { n_rays, lanes_log2, resume_pass: pass.constant(), mask }, dispatch);
+    let [bare_rays, bare_hits] = [bare.rays, bare.hits].map(u32::from);
+    let batch = CastBatch { n_rays, lanes_log2, resume_pass: pass.constant(), mask, bare_rays, bare_hits };
+    commands.dispatch(kernel, None, &batch, dispatch);
 }

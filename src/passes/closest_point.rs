@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use super::{
-    cast::{Masked, record_batch},
+    cast::{Bare, Masked, record_batch},
     kernel, spirv,
 };
 use crate::{
@@ -35,6 +35,6 @@ impl ClosestPoint {
     /// suspended.
     pub fn record(&self, commands: &Commands, set: &BindingSet, points: Masked, pass: ResumePass) {
         commands.bind(set);
-        record_batch(commands, &self.kernel, (points, self.n_lanes), pass);
+        record_batch(commands, &self.kernel, (points, self.n_lanes), Bare::default(), pass);
     }
 }

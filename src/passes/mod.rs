@@ -76,7 +76,7 @@ pub use self::{
     all_hits::AllHits,
     atrous_filter::AtrousFilter,
     auxiliary::Auxiliary,
-    cast::{Cast, Masked},
+    cast::{Bare, Cast, Masked},
     closest_point::ClosestPoint,
     compact::Compact,
     demodulate::Demodulate,

@@ -97,7 +97,7 @@ fn hits_after_each_update_are_those_in_a_new_world() {
             let mut of_new = GpuCaster::new(&context, new.geometry(), traversal).expect("a caster");
             let expected = of_new.cast(&rays, Query::Closest, 1).expect("hits").hits;
             assert_eq!(on_device.cast(&rays, Query::Closest, 1).expect("hits").hits, expected, "{traversal}");
-            assert_eq!(streamed(&mut on_device, &rays, Query::Closest), expected, "{traversal}");
+            assert_eq!(streamed::<_, Hit>(&mut on_device, &rays, Query::Closest), expected, "{traversal}");
             assert!(expected != before && expected.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count() > 100);
             let expected_on_cpu = cast_on_cpu(new.geometry(), traversal, &rays, Query::Closest);
             assert_eq!(on_cpu.cast(&rays, Query::Closest), expected_on_cpu, "{traversal} on the CPU");

@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, sync::Mutex};
 use glam::{DVec3, Vec3};
 use kdray::{
     accel::{Query, kdtree::Node},
-    cast::{GpuCaster, Hit, Ray},
+    cast::{GpuCaster, Ray, StreamHit, StreamRay},
     layout::{NO_TRIANGLE, PathRay, Triangle},
 };
 
@@ -130,10 +130,10 @@ pub fn met_in_double_precision(triangles: &[Triangle], ray: &Ray) -> Option<Vec<
 }
 
 /// Returns the hits of a stream of rays, whose parts come in any order.
-pub fn streamed(caster: &mut GpuCaster, rays: &[Ray], query: Query) -> Vec<Hit> {
+pub fn streamed<R: StreamRay, H: StreamHit>(caster: &mut GpuCaster, rays: &[R], query: Query) -> Vec<H> {
     let parts = Mutex::new(BTreeMap::new());
-    let make = |first: usize, part: &mut [Ray]| part.copy_from_slice(&rays[first..][..part.len()]);
-    let take = |first: usize, hits: &[Hit]| assert!(parts.lock().unwrap().insert(first, hits.to_vec()).is_none());
+    let make = |first: usize, part: &mut [R]| part.copy_from_slice(&rays[first..][..part.len()]);
+    let take = |first: usize, hits: &[H]| assert!(parts.lock().unwrap().insert(first, hits.to_vec()).is_none());
     caster.cast_stream(rays.len(), query, make, take).expect("a stream");
     parts.into_inner().unwrap().into_values().flatten().collect()
 }
