@@ -324,7 +324,8 @@ impl Report {
         if let [first, .., last] = &self.pictures[..] {
             let (n_pictures, n_extra) = (self.pictures.len(), self.extra_files.len());
             let beside = if n_extra > 0 { format!(", and {n_extra} files beside them") } else { String::new() };
-            return format!("wrote {n_pictures} pictures, {} to {}{beside}\n", first.display(), last.display());
+            let first = if first == last { String::new() } else { format!(", {}", first.display()) };
+            return format!("wrote {n_pictures} pictures{first} to {}{beside}\n", last.display());
         }
         let paths = self.extra_files.iter().chain(&self.pictures);
         paths.map(|path| format!("wrote {}\n", path.display())).collect()

@@ -296,6 +296,8 @@ fn one_file_has_all_frames() {
     let frames = [0, 1, 2, 3].map(|ix| pixels(&path.join(format!("f{ix}.png"))));
 
     film(&["-o", "film.png"]);
+    let told = ["render", "moving.gltf", "--cpu", "--frames", "0-1", "--size", "8x6", "-o", "told.png"];
+    assert!(succeed(path, &told).stdout.ends_with(b"wrote 2 pictures to told.png\n"));
     let mut reader = png::Decoder::new(open("film.png")).read_info().unwrap();
     assert_eq!(reader.info().animation_control.map(|it| (it.num_frames, it.num_plays)), Some((4, 0)));
     let mut buffer = vec![0; reader.output_buffer_size().unwrap()];

@@ -32,7 +32,8 @@ pub struct Mesh {
     /// Empty, or one entry per face: unit tangents at its three corners, along increasing u, in object space. w is 1 or
     /// -1: the bitangent, along decreasing v, is w times the cross product of normal and tangent.
     pub tangents: Vec<[Vec4; 3]>,
-    /// Whether a skin or morph targets of its file place its points, so that they may be elsewhere at another moment.
+    /// Whether a skin or morph targets of an animated file place its points, so that they may be elsewhere at another
+    /// moment.
     pub deforms: bool,
 }
 

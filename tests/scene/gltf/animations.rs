@@ -130,6 +130,7 @@ fn weights_have_a_number_for_each_target() {
     animate(&mut model, (0, "weights"), "LINEAR", &[0.0, 1.0, 2.0], ("SCALAR", F32, &weights));
     assert_near(corners_at(&model, 0.5)[0], Vec3::new(1.0, 5.0, 0.0), "between the first two");
     assert_near(corners_at(&model, 1.25)[0], Vec3::new(2.0, 20.0, 0.0), "between the last two");
+    assert!(model.scene().meshes[0].deforms);
 }
 
 /// A chain of two joints, of which the second turns, and a mirrored parent of the mesh, which has no effect on it.
@@ -150,6 +151,7 @@ fn skins_follow_their_joints() {
     let values: Vec<f32> = turn.iter().flat_map(|key| key.to_array()).collect();
     animate(&mut model, (1, "rotation"), "LINEAR", &[0.0, 1.0], ("VEC4", F32, &values));
     animate(&mut model, (0, "translation"), "STEP", &[0.0], ("VEC3", F32, &[70.0_f32, 0.0, 0.0]));
+    assert!(model.scene().meshes[0].deforms);
     let corners = corners_at(&model, 1.0);
     assert_near(corners[0], Vec3::new(0.0, 5.0, 10.0), "the joint");
     assert_near(corners[1], Vec3::new(0.0, 6.0, 10.0), "x has become y");

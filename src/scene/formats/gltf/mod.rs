@@ -351,7 +351,8 @@ impl<'a> Loader<'a> {
             }
         };
         mesh.name = document.root.meshes[mesh_ix].name.clone().unwrap_or_default();
-        mesh.deforms = skin.is_some() || primitives.iter().any(has_targets);
+        let may_move = !document.root.animations.is_empty();
+        mesh.deforms = may_move && (skin.is_some() || primitives.iter().any(has_targets));
         self.meshes.push(mesh);
         Ok(Some(Known { mesh_ix: self.meshes.len() - 1, materials, is_skinned, origin }))
     }
