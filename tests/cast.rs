@@ -265,7 +265,7 @@ fn streams_find_the_hits_of_casts() {
             assert_eq!(streamed::<_, Hit>(&mut caster, &rays[..n], query), expected, "{query:?} {n}");
             let ts: Vec<f32> = expected.iter().map(|hit| hit.t).collect();
             assert_eq!(streamed::<_, f32>(&mut caster, &rays[..n], query), ts, "{query:?} {n}");
-            let bare: Vec<_> = rays[..n].iter().map(|ray| bare(ray)).collect();
+            let bare: Vec<_> = rays[..n].iter().map(bare).collect();
             let whole: Vec<_> = bare.iter().map(StreamRay::to_ray).collect();
             let expected = caster.cast(&whole, query, 1).expect("a cast").hits;
             assert_eq!(streamed::<_, Hit>(&mut caster, &bare, query), expected, "{query:?} {n}");

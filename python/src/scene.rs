@@ -94,7 +94,7 @@ impl<'a> Rows<'a> {
     /// Returns the rays if they are origins and directions alone, whose t are from 0 to infinity.
     fn bare(&self) -> Option<&'a [[f32; 6]]> {
         let is_bare = self.width == 6 && self.t_min == [0.0] && self.t_max == [f32::INFINITY];
-        is_bare.then(|| self.rows.as_chunks().0)
+        is_bare.then_some(self.rows.as_chunks().0)
     }
 
     /// Casts a range of the rays, and hands chunks of their hits to `take`.
