@@ -278,6 +278,14 @@ fn streams_find_the_hits_of_casts() {
             let expected: Vec<f32> = on_cpu.cast(&whole, query).iter().map(|hit| hit.t).collect();
             assert_eq!(of_cpu.into_inner().unwrap(), expected, "{query:?} {n}");
         }
+        // Lanes grow with what is moved, and keep their room.
+        let mut growing = device.caster(&world, Traversal::Mask);
+        let bare: Vec<_> = rays.iter().map(bare).collect();
+        let first: Vec<f32> = streamed(&mut growing, &bare[..100], Query::Closest);
+        let hits: Vec<Hit> = streamed(&mut growing, &rays, Query::Closest);
+        assert_eq!(hits, caster.cast(&rays, Query::Closest, 1).expect("a cast").hits);
+        let again: Vec<f32> = streamed(&mut growing, &bare, Query::Closest);
+        assert_eq!(again[..100], first);
         let found: Vec<Hit> = streamed(&mut caster, &rays, Query::Closest);
         assert!(found.iter().filter(|hit| **hit != MISS).count() > 100);
         let hidden: Vec<u32> = found.iter().map(|hit| hit.triangle_ix).filter(|ix| *ix != NO_TRIANGLE).collect();
@@ -297,7 +305,9 @@ fn streams_come_in_chunks() {
     let mut caster = device.caster(&world, Traversal::Mask).with_batches_of(2 * RAYS_PER_CHUNK + 999);
     let on_cpu = CpuCaster::new(world.geometry(), Traversal::OF_CPU);
     let expected = caster.cast(&rays, Query::Closest, 1).expect("a cast").hits;
-    for (n_threads, n) in [(1, rays.len()), (3, rays.len()), (3, RAYS_PER_CHUNK), (1, RAYS_PER_CHUNK + 1), (3, 7)] {
+    for (n_threads, n) in
+        [(1, rays.len()), (3, rays.len()), (3, RAYS_PER_CHUNK), (1, RAYS_PER_CHUNK + 1), (3, 7), (2, rays.len())]
+    {
         let pool = ThreadPoolBuilder::new().num_threads(n_threads).build().expect("threads");
         for is_on_cpu in [false, true] {
             let n_made = AtomicUsize::new(0);

@@ -223,10 +223,10 @@
 
 // Mark of a ray whose traversal has stopped before its end. It replaces the triangle of the ray's hit, or the light's
 // visibility. The bits below it are the slot that holds the ray's state, or `NO_SLOT`. The mark never equals
-// `NO_TRIANGLE`, and its bits are those of a NaN, so that it can replace the ray's t, too.
-#define SUSPENDED 0xffc00000u
+// `NO_TRIANGLE`, and its bits are those of a NaN that no operation makes, so that it can replace the ray's t, too.
+#define SUSPENDED 0xffe00000u
 // Slot of a suspended ray that found all slots taken.
-#define NO_SLOT 0x3ffffeu
+#define NO_SLOT 0x1ffffeu
 // Rows of four words that a slot takes in `suspended_rays`. One row of counts precedes the slots.
 #define SUSPENDED_RAY_ROWS 4u
 // `resume_pass` of a dispatch that takes all rays, from their beginning.

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use crate::{
     gpu::{Access, Binding, Buffer, BufferUse, Commands, Context, GpuError},
-    layout::{BIND_SUSPENDED_RAYS, KD_MAX_DEPTH, PASS_BEGIN, PASS_RESTART, PASS_RESUME, SUSPENDED_RAY_ROWS},
+    layout::{BIND_SUSPENDED_RAYS, KD_MAX_DEPTH, NO_SLOT, PASS_BEGIN, PASS_RESTART, PASS_RESUME, SUSPENDED_RAY_ROWS},
 };
 
 /// The most rays whose state is stored at a time: 3 MiB. Further rays begin again when there is room.
@@ -65,7 +65,7 @@ impl SuspendedRays {
             context.loop_limit()?.map_or(0, |limit| iteration_budget(limit, context.info().subgroup_size));
         let most_rows = context.limits().storage_range as usize / size_of::<Counts>();
         let most_slots = (most_rows - 1) / SUSPENDED_RAY_ROWS as usize;
-        let n_slots = context.overrides().n_suspension_slots.unwrap_or(N_SLOTS).min(most_slots);
+        let n_slots = context.overrides().n_suspension_slots.unwrap_or(N_SLOTS).min(most_slots).min(NO_SLOT as usize);
         let n_slots = if iteration_budget == 0 { 0 } else { n_slots };
         let n_rows = 1 + SUSPENDED_RAY_ROWS as usize * n_slots;
         Ok(Self { rows: Buffer::new(context, "suspended_rays", n_rows, BufferUse::Storage)?, iteration_budget })

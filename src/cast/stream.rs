@@ -26,8 +26,8 @@ use crate::{
 /// rays, and 128 KiB of hits.
 pub const RAYS_PER_CHUNK: usize = 1 << 13;
 /// Bounds of the number of rays that the device casts at a time, if there are so many. Fewer do not fill a large
-/// device, and hits of more leave the caches before they are taken (docs/experiments.md). Of bare hits there are twice
-/// as many.
+/// device, and hits of more leave the caches before they are taken (docs/experiments.md). If rays and hits are
+/// bare, there are twice as many.
 const RAYS_PER_SUBMISSION: [usize; 2] = [1 << 16, 1 << 18];
 /// A stream is divided into this number of submissions, if their size stays within the bounds. While the device casts
 /// the rays of one, the host makes those of the next.
@@ -111,7 +111,7 @@ impl GpuCaster {
     /// fewer; smaller ones if batches are limited to fewer ([`GpuCaster::with_batches_of`]). Both are called by several
     /// threads of the current rayon pool, in any order, and once for each chunk. What `make` gets may be
     /// write-combined memory: it should write the rays in order and not read them. The types of rays and hits say what
-    /// is moved: rays as `[f32; 6]` and hits as `f32`, where these are enough, take three and one quarter of the bytes.
+    /// is moved: rays as `[f32; 6]` take three quarters of the bytes, and hits as `f32` one quarter.
     ///
     /// # Errors
     /// Memory runs out, or a call fails. Then some chunks may have been taken.
@@ -124,7 +124,7 @@ impl GpuCaster {
     ) -> Result<(), GpuError> {
         let kernel = self.prepare_kernel(query)?;
         let n_threads = rayon::current_num_threads();
-        let most = rays_per_submission(n_rays, self.rays_per_batch, H::IS_BARE);
+        let most = rays_per_submission(n_rays, self.rays_per_batch, R::IS_BARE && H::IS_BARE);
         let n_lanes = n_rays.div_ceil(most).min(n_threads).min(MOST_LANES);
         let submissions = submissions(n_rays, most, n_lanes);
         // A thread that shares its work while no other one is idle could be made to run the whole of another lane.
@@ -196,9 +196,9 @@ impl GpuCaster {
 }
 
 /// Returns the greatest number of rays of a submission. Where it is more than a chunk, it is a multiple of a chunk.
-fn rays_per_submission(n_rays: usize, rays_per_batch: usize, hits_are_bare: bool) -> usize {
+fn rays_per_submission(n_rays: usize, rays_per_batch: usize, are_bare: bool) -> usize {
     let [least, most] = RAYS_PER_SUBMISSION;
-    let most = if hits_are_bare { 2 * most } else { most };
+    let most = if are_bare { 2 * most } else { most };
     let n = (n_rays / SUBMISSIONS_PER_STREAM).clamp(least, most).min(rays_per_batch);
     if n > RAYS_PER_CHUNK { n / RAYS_PER_CHUNK * RAYS_PER_CHUNK } else { n }
 }
@@ -210,7 +210,7 @@ fn submissions(n_rays: usize, most: usize, n_lanes: usize) -> Vec<Range<usize>> 
     let mut submissions = Vec::new();
     let mut begin = 0;
     while begin < n_rays {
-        let share = (most * (submissions.len() + 1) / n_lanes).next_multiple_of(RAYS_PER_CHUNK);
+        let share = (most * (submissions.len() + 1)).div_ceil(n_lanes).next_multiple_of(RAYS_PER_CHUNK);
         let n = if grow { share.min(most) } else { most };
         let end = n_rays.min(begin + n);
         submissions.push(begin..end);
@@ -258,6 +258,7 @@ mod tests {
             (0, 1 << 16, 0),
             (7, 7, 1),
             (1000, 130, 3),
+            (1000, 1, 16),
             (1 << 20, 1 << 18, 4),
             (16_000_000, 1 << 19, 16),
             (16_000_000, 1 << 19, 5),

@@ -87,13 +87,13 @@ fn first<T: Pod>(memory: &Staging, n: usize) -> *mut T {
     const { assert!(align_of::<T>() <= 16, "mapped memory begins at a multiple of 16") };
     let (name, bytes) = (memory.buffer().name(), memory.buffer().bytes());
     let has_room = n.checked_mul(size_of::<T>()).is_some_and(|needed| needed as u64 <= bytes);
-    assert!(has_room, "`{name}` has {bytes} bytes, which are no {n} elements");
+    assert!(has_room, "`{name}` has {bytes} bytes, too few for {n} elements");
     memory.mapped().cast().as_ptr()
 }
 
 /// Makes storage of `bytes` in mapped memory.
 fn mapped(context: &Arc<Context>, name: &str, bytes: usize, location: MemoryLocation) -> Result<Staging, GpuError> {
-    let bytes = bytes as u64;
+    let bytes = bytes.max(1) as u64;
     let limit = context.limits().storage_range;
     if bytes > limit {
         return Err(GpuError::TooLarge { object: name.to_owned(), bytes, limit });

@@ -24,7 +24,7 @@ mod scene_file;
 
 #[doc(hidden)]
 pub use self::model::deformation;
-pub(crate) use self::model::texture::half_bits;
+pub(crate) use self::model::{scene::MOST_TRIANGLES, texture::half_bits};
 #[cfg(feature = "files")]
 pub(crate) use self::{files::pack, poser::Poser};
 #[cfg(feature = "files")]

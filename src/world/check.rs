@@ -12,8 +12,14 @@ use crate::{
         AREA_SPHERE, LIGHT_SPOT, MaterialMaps, N_MAPS, NO_TEXTURE, SRGB_TABLE_SIZE, SUSPENDED, TEXTURE_HALVES,
         TEXTURE_UV_SET, Texture, Triangle,
     },
-    scene::mesh::{MAX_COORDINATE, box_corners},
+    scene::{
+        MOST_TRIANGLES,
+        mesh::{MAX_COORDINATE, box_corners},
+    },
 };
+
+// Indices of triangles are no marks of suspended rays.
+const _: () = assert!(MOST_TRIANGLES <= SUSPENDED as u64);
 
 /// Checks that all parts of a scene fit together, in one pass over each array.
 ///
@@ -114,8 +120,8 @@ fn check_instances(instances: &Instances, scene: &FlatScene) -> Result<(), Misma
         }
         first_triangle += instance.n_triangles as usize;
     }
-    if first_triangle == 0 || first_triangle > SUSPENDED as usize {
-        return Err(scene_error(format!("instances: they have {first_triangle} triangles, not 1 to {SUSPENDED}")));
+    if first_triangle == 0 || first_triangle as u64 > MOST_TRIANGLES {
+        return Err(scene_error(format!("instances: they have {first_triangle} triangles, not 1 to {MOST_TRIANGLES}")));
     }
     Ok(())
 }

@@ -16,11 +16,11 @@ use crate::{
     },
     layout::{
         FLAT_NORMAL, INSTANCE_FOR_CAMERA, INSTANCE_FOR_OTHERS, INSTANCE_FOR_SHADOWS, INSTANCE_MIRRORED, Instance,
-        NO_TRIANGLE, SUSPENDED, Triangle,
+        NO_TRIANGLE, Triangle,
         normal::{decode_octahedral, encode_octahedral},
     },
     scene::{
-        Mesh, RayKinds, Scene, Transform,
+        MOST_TRIANGLES, Mesh, RayKinds, Scene, Transform,
         mesh::{MAX_COORDINATE, box_corners},
     },
 };
@@ -281,10 +281,9 @@ impl Instances {
             });
             first_triangle += n_triangles as u64;
         }
-        // Indices that mark suspended rays are not those of triangles.
-        if first_triangle > u64::from(SUSPENDED) || first_row > u64::from(NO_TRIANGLE) {
+        if first_triangle > MOST_TRIANGLES || first_row > u64::from(NO_TRIANGLE) {
             return Err(Mismatch::Scene(format!(
-                "the instances have {first_triangle} triangles, of which there may be {SUSPENDED}"
+                "the instances have {first_triangle} triangles, of which there may be {MOST_TRIANGLES}"
             )));
         }
         Ok((made, kept))

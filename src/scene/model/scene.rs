@@ -15,8 +15,8 @@ use super::{
 
 /// Name of the material of meshes and faces that name none.
 pub(crate) const DEFAULT_MATERIAL: &str = "(default)";
-/// The most triangles of all instances of a file's scene: kernels have so many indices.
-const MOST_TRIANGLES: u64 = 1 << 31;
+/// The most triangles of all instances of a scene: kernels have so many indices.
+pub(crate) const MOST_TRIANGLES: u64 = 1 << 31;
 /// Name of the material of the ground below a mesh.
 pub(crate) const GROUND: &str = "(ground)";
 
