@@ -278,7 +278,7 @@ fn streams_find_the_hits_of_casts() {
             let expected: Vec<f32> = on_cpu.cast(&whole, query).iter().map(|hit| hit.t).collect();
             assert_eq!(of_cpu.into_inner().unwrap(), expected, "{query:?} {n}");
         }
-        // Lanes grow with what is moved, and keep their room.
+        // A lane that has too little memory for a stream is replaced by a larger one, which serves later streams.
         let mut growing = device.caster(&world, Traversal::Mask);
         let bare: Vec<_> = rays.iter().map(bare).collect();
         let first: Vec<f32> = streamed(&mut growing, &bare[..100], Query::Closest);

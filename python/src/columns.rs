@@ -144,12 +144,12 @@ impl<'a> Columns<'a> {
         self.geometry_ids.is_some() || self.primitive_ids.is_some() || self.uvs.is_some() || self.normals.is_some()
     }
 
-    /// Whether the columns hold t and nothing else.
+    /// Whether there are no columns but that of t.
     pub fn are_bare(&self) -> bool {
         !self.have_faces() && self.points.is_none()
     }
 
-    /// Writes columns that are bare.
+    /// Writes the column of t, which is the only one.
     pub fn write_bare(self, ts: &[f32]) {
         if let Some(column) = self.t {
             column.copy_from_slice(ts);

@@ -27,7 +27,7 @@ use crate::{
 pub const RAYS_PER_CHUNK: usize = 1 << 13;
 /// Bounds of the number of rays that the device casts at a time, if there are so many. Fewer do not fill a large
 /// device, and hits of more leave the caches before they are taken (docs/experiments.md). If rays and hits are
-/// bare, there are twice as many.
+/// bare, submissions have up to twice as many.
 const RAYS_PER_SUBMISSION: [usize; 2] = [1 << 16, 1 << 18];
 /// A stream is divided into this number of submissions, if their size stays within the bounds. While the device casts
 /// the rays of one, the host makes those of the next.
