@@ -15,7 +15,7 @@ layout(std430, set = 0, binding = BIND_KD_SLAB_EXTENTS) buffer ExtentsBlock { Kd
 void add_piece(uint node_ix, vec3 normal, vec3 shift, float reach) {
     float low = uintBitsToFloat(0x7f800000u), high = -low;
     for (uint i = 0u; i < n_corners; ++i) {
-        float height = dot(normal, corners[i] + shift);
+        float height = dot(normal, corner(i) + shift);
         low = min(low, height);
         high = max(high, height);
     }

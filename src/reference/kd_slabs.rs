@@ -199,7 +199,7 @@ fn clipped(piece: Vec<Vec3>, axis: usize, side: f32, position: f32) -> Option<Ve
     }
     let mut kept = Vec::new();
     let before = piece.last().into_iter().chain(&piece);
-    for (a, b) in before.zip(&piece) {
+    for (i, (a, b)) in before.zip(&piece).enumerate() {
         let (height_a, height_b) = (height(a), height(b));
         if (height_a > 0.0 && height_b < 0.0) || (height_a < 0.0 && height_b > 0.0) {
             kept.push(snapped(a + height_a / (height_a - height_b) * (b - a)));
@@ -207,8 +207,12 @@ fn clipped(piece: Vec<Vec3>, axis: usize, side: f32, position: f32) -> Option<Ve
         if height_b <= 0.0 {
             kept.push(*b);
         }
+        // The kernel replaces the corners that it has read.
+        if kept.len() > MAX_CORNERS.min(i + 2) {
+            return None;
+        }
     }
-    (kept.len() <= MAX_CORNERS).then_some(kept)
+    Some(kept)
 }
 
 fn area_of(piece: &[Vec3]) -> Vec3 {

@@ -26,9 +26,19 @@ const float SLACK = 0.000030517578;
 // far less than a slab's reach, which is at least 2^-33.
 const float LEAST_COORDINATE = 8.6736174e-19;
 
-// The corners of the piece, in their order round it.
-vec3 corners[MAX_CORNERS];
+// The corners of each invocation's piece, in their order round it. They are in shared memory since invocations of a
+// subgroup access different ones at the same time; components of different invocations are side by side.
+shared float corners[MAX_CORNERS][3][SCAN_GROUP_SIZE];
 uint n_corners;
+
+vec3 corner(uint i) {
+    uint own = gl_LocalInvocationIndex;
+    return vec3(corners[i][0][own], corners[i][1][own], corners[i][2][own]);
+}
+
+void set_corner(uint i, vec3 v) {
+    for (uint axis = 0u; axis < 3u; ++axis) corners[i][axis][gl_LocalInvocationIndex] = v[axis];
+}
 
 vec3 snapped(vec3 v) {
     return mix(v, vec3(0.0), lessThan(abs(v), vec3(LEAST_COORDINATE)));
@@ -42,36 +52,37 @@ float along(vec3 v, uint axis) {
 // corners: more than MAX_CORNERS come only from a piece that rounding has bent.
 bool clip(uint axis, float side, float position) {
     bool is_cut = false;
-    for (uint i = 0u; i < n_corners; ++i) is_cut = is_cut || side * (along(corners[i], axis) - position) > 0.0;
+    for (uint i = 0u; i < n_corners; ++i) {
+        is_cut = is_cut || side * (corners[i][axis][gl_LocalInvocationIndex] - position) > 0.0;
+    }
     if (!is_cut) return true;
-    vec3 kept[MAX_CORNERS];
+    // The piece replaces the corners that have been read. A convex polygon has one corner more than these at most.
     uint n_kept = 0u;
-    vec3 a = corners[n_corners - 1u];
+    vec3 a = corner(n_corners - 1u), b = corner(0u);
     float height_a = side * (along(a, axis) - position);
     for (uint i = 0u; i < n_corners; ++i) {
-        vec3 b = corners[i];
+        vec3 next = corner(min(i + 1u, MAX_CORNERS - 1u));
         float height_b = side * (along(b, axis) - position);
-        if ((height_a > 0.0 && height_b < 0.0) || (height_a < 0.0 && height_b > 0.0)) {
-            if (n_kept == MAX_CORNERS) return false;
+        bool crosses = (height_a > 0.0 && height_b < 0.0) || (height_a < 0.0 && height_b > 0.0);
+        uint n_new = (crosses ? 1u : 0u) + (height_b > 0.0 ? 0u : 1u);
+        if (n_kept + n_new > min(i + 2u, MAX_CORNERS)) return false;
+        if (crosses) {
             float t = height_a / (height_a - height_b);
-            kept[n_kept++] = snapped(a + t * (b - a));
+            set_corner(n_kept++, snapped(a + t * (b - a)));
         }
-        if (!(height_b > 0.0)) {
-            if (n_kept == MAX_CORNERS) return false;
-            kept[n_kept++] = b;
-        }
+        if (!(height_b > 0.0)) set_corner(n_kept++, b);
         a = b;
         height_a = height_b;
+        b = next;
     }
-    corners = kept;
     n_corners = n_kept;
     return true;
 }
 
 void begin_with(vec3 v0, vec3 v1, vec3 v2) {
-    corners[0] = v0;
-    corners[1] = v1;
-    corners[2] = v2;
+    set_corner(0u, v0);
+    set_corner(1u, v1);
+    set_corner(2u, v2);
     n_corners = 3u;
 }
 
@@ -107,7 +118,7 @@ float find_piece(LeafTriangle triangle, uint triangle_scale, KdSlabPatch leaf) {
 // The area vector of the piece, whose length is twice the area.
 vec3 area_of_piece() {
     vec3 area = vec3(0.0);
-    for (uint i = 2u; i < n_corners; ++i) area += cross(corners[i - 1u] - corners[0], corners[i] - corners[0]);
+    for (uint i = 2u; i < n_corners; ++i) area += cross(corner(i - 1u) - corner(0u), corner(i) - corner(0u));
     return area;
 }
 
