@@ -2,14 +2,17 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 // Kd-tree, bounds: one workgroup per block of triangles finds the bounds of the finite ones and counts them. Atomics
-// combine the blocks' bounds; a minimum, a maximum and a sum of integers are the same in every order.
-// Reads triangles and n_triangles of build; updates least, greatest and n_finite of build; writes scan_blocks.
+// combine the blocks' bounds; a minimum, a maximum and a sum of integers are the same in every order. The last
+// workgroup finds how many finite triangles come before each block.
+// Reads triangles and n_triangles of build; updates least, greatest, n_finite and n_summed_blocks of build; writes
+// scan_blocks.
 #include "kdtree_build/kd_build.glsl"
-#include "scan.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_KD_TRIANGLES) readonly buffer TrianglesBlock { Triangle triangles[]; };
-layout(std430, set = 0, binding = BIND_KD_SCAN_BLOCKS) writeonly buffer ScanBlocksBlock { uvec4 scan_blocks[]; };
+layout(std430, set = 0, binding = BIND_KD_SCAN_BLOCKS) coherent buffer ScanBlocksBlock { uvec4 scan_blocks[]; };
+
+#include "kdtree_build/kd_spine.glsl"
 
 uvec3 ordered(vec3 v) {
     return uvec3(ordered(v.x), ordered(v.y), ordered(v.z));
@@ -18,7 +21,7 @@ uvec3 ordered(vec3 v) {
 void main() {
     uvec3 least = uvec3(0xffffffffu), greatest = uvec3(0u);
     uint n_finite = 0u;
-    uint block = index_of_group();
+    uint block = index_of_group(), n_blocks = blocks_of(build.n_triangles);
     for (uint row = 0u; row < KD_ROWS; ++row) {
         uint triangle_ix = block * KD_BLOCK_SIZE + row * SCAN_GROUP_SIZE + gl_LocalInvocationIndex;
         if (triangle_ix >= build.n_triangles) break;
@@ -32,9 +35,19 @@ void main() {
     workgroup_exclusive_add(n_finite, total);
     least = subgroupMin(least);
     greatest = subgroupMax(greatest);
-    if (gl_LocalInvocationIndex == 0u && block < blocks_of(build.n_triangles)) {
+    bool is_first = gl_LocalInvocationIndex == 0u;
+    if (is_first) is_last_group = false;
+    if (is_first && block < n_blocks) {
         scan_blocks[block] = uvec4(total, 0u, 0u, 0u);
+        memoryBarrierBuffer();
+        is_last_group = atomicAdd(build.n_summed_blocks, 1u) == n_blocks - 1u;
         atomicAdd(build.n_finite, total);
+    }
+    barrier();
+    if (is_last_group) {
+        uvec2 part = own_part(n_blocks);
+        uvec3 of_all, before = sum_before_part(0u, part, of_all);
+        write_prefix_sums(0u, part, before);
     }
     if (!subgroupElect() || total == 0u) return;
     atomicMin(build.least_x, least.x);

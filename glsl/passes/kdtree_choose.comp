@@ -3,8 +3,9 @@
 #extension GL_KHR_shader_subgroup_arithmetic : require
 // Kd-tree, choose: finds the cheapest split (src/accel/kdtree/sah.rs) of each cell that is not small. Each bin has
 // three planes: through its least begin, its greatest end, and its edge. Those are counted as if all references that
-// begin or end in the bin did so on the costlier side, so that no weight is too low. One workgroup per KD_SMALL_CELL
-// references: a cell with more references takes the first workgroup whose first reference is the cell's.
+// begin or end in the bin did so on the costlier side, so that no weight is too low. One workgroup per KD_CHOOSE_BLOCK
+// references takes one cell after the other. It finds them by every KD_SMALL_CELL-th reference: of a cell with more
+// references, the first such one counts.
 // Reads build, levels, references_from; reads and clears large_bins; updates cells_from.
 #include "kdtree_build/kd_bins.glsl"
 #include "kdtree_build/kd_splits.glsl"
@@ -13,7 +14,18 @@
 layout(local_size_x = SCAN_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_KD_BINS) buffer BinsBlock { uint large_bins[]; };
 
+// The references by which a workgroup finds cells.
+const uint N_PROBES = KD_CHOOSE_BLOCK / KD_SMALL_CELL;
+
+// The areas of the cell on each axis.
+shared Areas areas[3];
+// Begins and ends in the bins of each subgroup's invocations, on each axis.
+shared uvec2 in_subgroups[3][SCAN_GROUP_SIZE / 4u];
+// The best split of each subgroup.
+shared uvec3 best_of_subgroups[SCAN_GROUP_SIZE / 4u];
+
 void fill_bins(KdCell cell) {
+    if (scan_rank() < 3u) areas[scan_rank()] = areas_of(cell, scan_rank());
     if (cell.n_references > KD_BIN_BLOCK) {
         uint first_word = cell.first / KD_BIN_BLOCK * KD_BIN_WORDS;
         for (uint i = gl_LocalInvocationIndex; i < KD_BIN_WORDS; i += SCAN_GROUP_SIZE) {
@@ -23,17 +35,11 @@ void fill_bins(KdCell cell) {
     } else {
         clear_bins();
         barrier();
-        Areas areas[3] = Areas[3](areas_of(cell, 0u), areas_of(cell, 1u), areas_of(cell, 2u));
         for (uint i = gl_LocalInvocationIndex; i < cell.n_references; i += SCAN_GROUP_SIZE) {
             count_in_bins(areas, references_from[cell.first + i].box_min, references_from[cell.first + i].box_max);
         }
     }
     barrier();
-}
-
-// Replaces the best split by that at a position if the latter is better. A plane must be inside the cell.
-void consider_at(inout uvec3 best, Areas areas, uint axis, float position, uvec2 n) {
-    if (is_inside(areas, position)) consider(best, areas, axis, position, n);
 }
 
 // Considers the planes of a bin. before: references that begin before the bin, and that end there.
@@ -42,44 +48,68 @@ void consider_bin(inout uvec3 best, Areas areas, uint axis, uint bin, uvec2 befo
     uvec2 after = before + uvec2(begins, ends);
     if (begins > 0u) {
         float position = from_ordered(~bins[word_of(axis, BIN_LEAST, bin)]);
-        consider_at(best, areas, axis, position, uvec2(before.x, n - before.y));
+        consider(best, areas, axis, position, uvec2(before.x, n - before.y));
     }
     if (ends > 0u) {
         float position = from_ordered(bins[word_of(axis, BIN_GREATEST, bin)]);
-        consider_at(best, areas, axis, position, uvec2(after.x, n - after.y));
+        consider(best, areas, axis, position, uvec2(after.x, n - after.y));
     }
     precise float edge = 4.0 * (0.25 * areas.least + areas.quarter * (float(bin + 1u) / float(KD_BINS)));
-    consider_at(best, areas, axis, edge, uvec2(after.x, n - after.y));
+    consider(best, areas, axis, edge, uvec2(after.x, n - after.y));
 }
 
-uvec3 best_of_bins(KdCell cell) {
-    fill_bins(cell);
-    uvec3 best = NO_SPLIT;
-    for (uint axis = 0u; axis < 3u; ++axis) {
-        Areas areas = areas_of(cell, axis);
-        uint bin = 2u * scan_rank();
-        uvec2 first = uvec2(bins[word_of(axis, BIN_BEGINS, bin)], bins[word_of(axis, BIN_ENDS, bin)]);
-        uvec2 second = uvec2(bins[word_of(axis, BIN_BEGINS, bin + 1u)], bins[word_of(axis, BIN_ENDS, bin + 1u)]);
-        uvec2 total;
-        uvec2 before;
-        before.x = workgroup_exclusive_add(first.x + second.x, total.x);
-        before.y = workgroup_exclusive_add(first.y + second.y, total.y);
-        if (areas.slope < 0.0) continue;
-        consider_bin(best, areas, axis, bin, before, cell.n_references);
-        consider_bin(best, areas, axis, bin + 1u, before + first, cell.n_references);
+// The best of all invocations' splits. Needs uniform control flow.
+uvec3 best_of(uvec3 mine) {
+    uvec3 best;
+    best.x = subgroupMin(mine.x);
+    best.y = subgroupMin(mine.x == best.x ? mine.y : 0xffffffffu);
+    best.z = subgroupMin(mine.xy == best.xy ? mine.z : 0xffffffffu);
+    if (subgroupElect()) best_of_subgroups[gl_SubgroupID] = best;
+    barrier();
+    for (uint i = 0u; i < gl_NumSubgroups; ++i) {
+        if (is_before(best_of_subgroups[i], best)) best = best_of_subgroups[i];
     }
     return best;
 }
 
-void main() {
-    uint first = index_of_group() * KD_SMALL_CELL;
-    bool is_reference = first < levels[stage.level_ix].n_references;
-    uint cell_ix = references_from[is_reference ? first : 0u].cell_ix;
-    KdCell cell = cells_from[cell_ix];
-    bool is_own = is_reference && cell.n_references > KD_SMALL_CELL && first - cell.first < KD_SMALL_CELL;
-    // The condition is the same for all invocations of the workgroup.
-    if (!is_own) return;
+uvec3 best_of_bins(KdCell cell) {
+    fill_bins(cell);
+    uint bin = scan_rank();
+    uvec2 before[3];
+    for (uint axis = 0u; axis < 3u; ++axis) {
+        uvec2 mine = uvec2(bins[word_of(axis, BIN_BEGINS, bin)], bins[word_of(axis, BIN_ENDS, bin)]);
+        before[axis] = subgroupExclusiveAdd(mine);
+        if (gl_SubgroupInvocationID == gl_SubgroupSize - 1u) in_subgroups[axis][gl_SubgroupID] = before[axis] + mine;
+    }
+    barrier();
     uvec3 best = NO_SPLIT;
-    if (may_split(cell.n_references)) best = best_of(best_of_bins(cell), 0u, gl_NumSubgroups);
-    if (gl_LocalInvocationIndex == 0u) write_split(cell_ix, cell.n_references, best);
+    for (uint axis = 0u; axis < 3u; ++axis) {
+        Areas of_axis = areas[axis];
+        if (of_axis.slope < 0.0) continue;
+        for (uint i = 0u; i < gl_SubgroupID; ++i) before[axis] += in_subgroups[axis][i];
+        consider_bin(best, of_axis, axis, bin, before[axis], cell.n_references);
+    }
+    return best_of(best);
+}
+
+void main() {
+    uint begin = index_of_group() * KD_CHOOSE_BLOCK, end = levels[stage.level_ix].n_references;
+    uint cells[N_PROBES];
+    bool is_own[N_PROBES];
+    for (uint i = 0u; i < N_PROBES; ++i) {
+        uint reference_ix = begin + i * KD_SMALL_CELL;
+        cells[i] = references_from[reference_ix < end ? reference_ix : 0u].cell_ix;
+    }
+    for (uint i = 0u; i < N_PROBES; ++i) {
+        uint reference_ix = begin + i * KD_SMALL_CELL;
+        bool is_first = reference_ix - cells_from[cells[i]].first < KD_SMALL_CELL;
+        is_own[i] = reference_ix < end && is_first && cells_from[cells[i]].n_references > KD_SMALL_CELL;
+    }
+    for (uint i = 0u; i < N_PROBES; ++i) {
+        // The condition is the same for all invocations of the workgroup.
+        if (!is_own[i]) continue;
+        KdCell cell = cells_from[cells[i]];
+        uvec3 best = may_split(cell.n_references) ? best_of_bins(cell) : NO_SPLIT;
+        if (gl_LocalInvocationIndex == 0u) write_split(cells[i], cell.n_references, best);
+    }
 }

@@ -1,70 +1,91 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#extension GL_KHR_shader_subgroup_arithmetic : require
 // Kd-tree, choose small: finds the cheapest split of each small cell (src/accel/kdtree/sah.rs). Every plane through a
-// side of a reference's bounds is tried. One workgroup per KD_TEAMS cells. A team takes one cell at a time:
-// KD_TEAM_SIZE invocations, or a subgroup if that is larger.
+// side of a reference's bounds is tried. One workgroup per group of references, for the small cells that begin there.
+// An invocation tries the planes of one reference, and of a second one if the last cell reaches beyond the group.
 // Reads build, levels, references_from; updates cells_from.
 #include "kdtree_build/kd_splits.glsl"
-#include "scan.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;
 
-// Of the cell of each team: the bounds of the references, and the areas on each axis.
-shared vec3 least[KD_TEAMS][KD_SMALL_CELL];
-shared vec3 greatest[KD_TEAMS][KD_SMALL_CELL];
-shared Areas areas[KD_TEAMS][3];
+// References that a workgroup may have to do with.
+const uint N_ROWS = 2u;
+const uint NO_CELL = 0xffffffffu;
 
-struct Team {
-    uint ix;
-    uint size;
-    uint rank; // of the invocation
-};
+// The begin and the end on each axis of the references of the cells.
+shared vec2 sides[N_ROWS * SCAN_GROUP_SIZE][3];
+// The best split of each cell, at the place of its first reference: weight, axis and position, as integers that sort
+// like them.
+shared uint best_weights[SCAN_GROUP_SIZE];
+shared uint best_axes[SCAN_GROUP_SIZE];
+shared uint best_positions[SCAN_GROUP_SIZE];
 
-void load(Team team, KdCell cell) {
-    if (team.rank < 3u) areas[team.ix][team.rank] = areas_of(cell, team.rank);
-    for (uint i = team.rank; i < cell.n_references; i += team.size) {
-        least[team.ix][i] = references_from[cell.first + i].box_min;
-        greatest[team.ix][i] = references_from[cell.first + i].box_max;
-    }
+// The index of a reference's cell, NO_CELL if the cell is not one of the workgroup's.
+uint own_cell(uint begin, uint reference_ix) {
+    if (reference_ix >= levels[stage.level_ix].n_references) return NO_CELL;
+    uint cell_ix = references_from[reference_ix].cell_ix;
+    uint first = cells_from[cell_ix].first;
+    bool begins_here = first >= begin && first < begin + SCAN_GROUP_SIZE;
+    return begins_here && cells_from[cell_ix].n_references <= KD_SMALL_CELL ? cell_ix : NO_CELL;
 }
 
-// The best of the invocation's planes in a cell of n references.
-uvec3 best_of_planes(Team team, uint n) {
-    uvec3 best = NO_SPLIT;
-    for (uint i = team.rank; i < 6u * n; i += team.size) {
-        uint axis = i / (2u * n), side = i - axis * 2u * n;
-        float position = side < n ? least[team.ix][side][axis] : greatest[team.ix][side - n][axis];
-        Areas of_axis = areas[team.ix][axis];
-        if (of_axis.slope < 0.0 || !is_inside(of_axis, position)) continue;
-        uvec2 counts = uvec2(0u);
-        for (uint k = 0u; k < n; ++k) {
-            counts.x += least[team.ix][k][axis] < position ? 1u : 0u;
-            counts.y += greatest[team.ix][k][axis] > position ? 1u : 0u;
+// The best of the planes through a reference's sides. first: the place of the cell's first reference.
+uvec3 best_of_planes(KdCell cell, uint first, uint place) {
+    uvec2 at_begin[3] = uvec2[3](uvec2(0u), uvec2(0u), uvec2(0u)), at_end[3] = at_begin;
+    for (uint k = first; k < first + cell.n_references; ++k) {
+        for (uint axis = 0u; axis < 3u; ++axis) {
+            vec2 planes = sides[place][axis], other = sides[k][axis];
+            at_begin[axis] += uvec2(other.x < planes.x ? 1u : 0u, other.y > planes.x ? 1u : 0u);
+            at_end[axis] += uvec2(other.x < planes.y ? 1u : 0u, other.y > planes.y ? 1u : 0u);
         }
-        consider(best, of_axis, axis, position, counts);
+    }
+    uvec3 best = NO_SPLIT;
+    for (uint axis = 0u; axis < 3u; ++axis) {
+        Areas areas = areas_of(cell, axis);
+        vec2 planes = sides[place][axis];
+        if (areas.slope < 0.0) continue;
+        consider(best, areas, axis, planes.x, at_begin[axis]);
+        consider(best, areas, axis, planes.y, at_end[axis]);
     }
     return best;
 }
 
 void main() {
-    Team team;
-    team.size = max(KD_TEAM_SIZE, gl_SubgroupSize);
-    team.ix = scan_rank() / team.size;
-    team.rank = scan_rank() % team.size;
-    uint n_subgroups = team.size / gl_SubgroupSize;
-    // All teams go through the loop equally often, since their number divides KD_TEAMS.
-    for (uint i = team.ix; i < KD_TEAMS; i += SCAN_GROUP_SIZE / team.size) {
-        uint cell_ix = index_of_group() * KD_TEAMS + i;
-        bool is_cell = cell_ix < levels[stage.level_ix].n_cells;
-        KdCell cell = cells_from[is_cell ? cell_ix : 0u];
-        bool is_small = is_cell && cell.n_references <= KD_SMALL_CELL;
-        bool is_tried = is_small && may_split(cell.n_references);
-        if (is_tried) load(team, cell);
-        barrier();
-        uvec3 best = NO_SPLIT;
-        if (is_tried) best = best_of_planes(team, cell.n_references);
-        best = best_of(best, team.ix * n_subgroups, n_subgroups);
-        if (team.rank == 0u && is_small) write_split(cell_ix, cell.n_references, best);
+    uint rank = gl_LocalInvocationIndex, begin = index_of_group() * SCAN_GROUP_SIZE;
+    best_weights[rank] = NO_SPLIT.x;
+    best_axes[rank] = NO_SPLIT.y;
+    best_positions[rank] = NO_SPLIT.z;
+    uint cells[N_ROWS];
+    for (uint row = 0u; row < N_ROWS; ++row) {
+        uint place = row * SCAN_GROUP_SIZE + rank;
+        cells[row] = own_cell(begin, begin + place);
+        if (cells[row] == NO_CELL) continue;
+        vec3 low = references_from[begin + place].box_min, high = references_from[begin + place].box_max;
+        for (uint axis = 0u; axis < 3u; ++axis) sides[place][axis] = vec2(low[axis], high[axis]);
     }
+    barrier();
+    uvec3 best[N_ROWS];
+    uint firsts[N_ROWS];
+    for (uint row = 0u; row < N_ROWS; ++row) {
+        best[row] = NO_SPLIT;
+        firsts[row] = 0u;
+        if (cells[row] == NO_CELL) continue;
+        KdCell cell = cells_from[cells[row]];
+        firsts[row] = cell.first - begin;
+        if (may_split(cell.n_references)) best[row] = best_of_planes(cell, firsts[row], row * SCAN_GROUP_SIZE + rank);
+        atomicMin(best_weights[firsts[row]], best[row].x);
+    }
+    barrier();
+    for (uint row = 0u; row < N_ROWS; ++row) {
+        if (best[row].x == best_weights[firsts[row]]) atomicMin(best_axes[firsts[row]], best[row].y);
+    }
+    barrier();
+    for (uint row = 0u; row < N_ROWS; ++row) {
+        bool is_best = best[row].x == best_weights[firsts[row]] && best[row].y == best_axes[firsts[row]];
+        if (is_best) atomicMin(best_positions[firsts[row]], best[row].z);
+    }
+    barrier();
+    if (cells[0] == NO_CELL || firsts[0] != rank) return;
+    uvec3 of_cell = uvec3(best_weights[rank], best_axes[rank], best_positions[rank]);
+    write_split(cells[0], cells_from[cells[0]].n_references, of_cell);
 }

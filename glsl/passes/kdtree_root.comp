@@ -37,9 +37,9 @@ void set_groups() {
     levels[0].choose_groups_x = build.n_finite > KD_SMALL_CELL ? 1u : 0u;
     levels[0].choose_groups_y = 1u;
     levels[0].choose_groups_z = 1u;
-    levels[0].team_groups_x = 1u;
-    levels[0].team_groups_y = 1u;
-    levels[0].team_groups_z = 1u;
+    levels[0].small_groups_x = build.n_finite > KD_SMALL_CELL ? 0u : references.x;
+    levels[0].small_groups_y = references.y;
+    levels[0].small_groups_z = 1u;
     levels[0].block_groups_x = blocks.x;
     levels[0].block_groups_y = blocks.y;
     levels[0].block_groups_z = 1u;
@@ -49,12 +49,6 @@ void set_groups() {
     levels[0].cell_groups_x = one.x;
     levels[0].cell_groups_y = one.y;
     levels[0].cell_groups_z = 1u;
-    levels[0].spine_groups_x = 1u;
-    levels[0].spine_groups_y = 1u;
-    levels[0].spine_groups_z = 1u;
-    levels[0].pair_groups_x = 1u;
-    levels[0].pair_groups_y = 1u;
-    levels[0].pair_groups_z = 1u;
 }
 
 void main() {
@@ -71,8 +65,6 @@ void main() {
     levels[0].n_cells = 1u;
     levels[0].n_references = build.n_finite;
     levels[0].n_pairs = 1u;
-    levels[0].n_new_pairs = 1u;
-    levels[0].cutoff = 0xffffffffu;
     set_groups();
     KdCell cell;
     cell.box_min = build.box_min;

@@ -1110,17 +1110,13 @@ struct AccelConstants {
 #define CONSTANT_FIRST_SURFACE_LAYER 16u
 // Whether a kernel builds the lower level of a grid.
 #define CONSTANT_LOWER_LEVEL 10u
-// Which counts a prefix sum in a build adds up: `GRID_SCANS_CELLS`, `KD_SCANS_CELLS` and their like. The first three of
-// a grid's values equal those of `GRID_COUNTS_CELLS` and its like.
+// Which counts a prefix sum in a grid's build adds up. The first three values equal those of `GRID_COUNTS_CELLS` and
+// its like.
 #define CONSTANT_SCANS 11u
 #define GRID_SCANS_CELLS 0u
 #define GRID_SCANS_COLUMNS 1u
 #define GRID_SCANS_PAIRS 2u
 #define GRID_SCANS_DIGITS 3u
-// What a prefix sum in a kd-tree's build adds up: finite triangles, references on the sides of planes, or cells.
-#define KD_SCANS_TRIANGLES 0u
-#define KD_SCANS_REFERENCES 1u
-#define KD_SCANS_CELLS 2u
 
 // Constants that have the same value in all kernels over one scene.
 
@@ -1411,15 +1407,14 @@ struct GridSort {
 #define KD_GROUPS_X 1024u
 // The most references of a small cell, whose planes are all tried.
 #define KD_SMALL_CELL 64u
-// The least number of invocations that try the planes of a small cell, and the number of such teams in a workgroup.
-#define KD_TEAM_SIZE 32u
-#define KD_TEAMS 4u
+// A workgroup chooses the splits of the cells that are not small and begin in so many references.
+#define KD_CHOOSE_BLOCK 256u
 // The number of references that one workgroup counts by bins at a time. A cell with more is large.
-#define KD_BIN_BLOCK 4096u
-// Bins on an axis: two for each invocation of a workgroup.
-#define KD_BINS 256u
+#define KD_BIN_BLOCK 2048u
+// Bins on an axis: one for each invocation of a workgroup.
+#define KD_BINS 128u
 // Words of a cell's bins: on each axis, four for each bin.
-#define KD_BIN_WORDS 3072u
+#define KD_BIN_WORDS 1536u
 // Scales of triangles, 0 to 18 (src/accel/kdtree/scales.rs).
 #define KD_SCALES 19u
 // Records in `kd_levels`: of the levels 0 to `KD_WORD_DEPTH`, and of the one below.
@@ -1468,7 +1463,12 @@ struct KdBuild {
     uint n_pairs;
     // The deepest level.
     uint depth;
-    // Workgroups over the entries.
+    // Blocks of triangles whose sums are written.
+    uint n_summed_blocks;
+    // Workgroups over the pairs, and over the entries.
+    uint pair_groups_x;
+    uint pair_groups_y;
+    uint pair_groups_z;
     uint entry_groups_x;
     uint entry_groups_y;
     uint entry_groups_z;
@@ -1482,30 +1482,28 @@ struct KdLevel {
     // Of all levels above: references in leaves, and pairs of nodes, those of this level's nodes included.
     uint n_closed;
     uint n_pairs;
-    // Pairs of this level's nodes.
-    uint n_new_pairs;
     // The first cell that is not split for lack of capacity. All cells after it become leaves, too.
     uint cutoff;
-    // Sums over the level: references below and above their cells' planes; and, once the cutoff is known, splits,
-    // children with references, references of these, and references in leaves.
+    // References of the level below and above their cells' planes.
     uint n_below;
     uint n_above;
-    uint n_splits;
-    uint n_open;
-    uint n_next;
-    uint n_in_leaves;
-    // Workgroups over blocks of references that are counted by bins, over those by which cells that are not small are
-    // found, over `KD_TEAMS` cells each, over blocks and over groups of references, over groups of cells, of a prefix
-    // sum, and over groups of new pairs.
+    // Blocks of references, and groups of cells, whose sums are written.
+    uint n_summed_blocks;
+    uint n_summed_groups;
+    // Which sizes the children of cells have (kdtree_count_cells.comp).
+    uint child_sizes;
+    // Workgroups over blocks of references that are counted by bins, over `KD_CHOOSE_BLOCK` references each, over
+    // groups of references if there are small cells, over blocks and over groups of references, and over groups of
+    // cells.
     uint bin_groups_x;
     uint bin_groups_y;
     uint bin_groups_z;
     uint choose_groups_x;
     uint choose_groups_y;
     uint choose_groups_z;
-    uint team_groups_x;
-    uint team_groups_y;
-    uint team_groups_z;
+    uint small_groups_x;
+    uint small_groups_y;
+    uint small_groups_z;
     uint block_groups_x;
     uint block_groups_y;
     uint block_groups_z;
@@ -1515,12 +1513,6 @@ struct KdLevel {
     uint cell_groups_x;
     uint cell_groups_y;
     uint cell_groups_z;
-    uint spine_groups_x;
-    uint spine_groups_y;
-    uint spine_groups_z;
-    uint pair_groups_x;
-    uint pair_groups_y;
-    uint pair_groups_z;
 };
 
 // A reference of a kd-tree's build: a triangle in a cell, and the bounds of its piece there, grown by its margin
@@ -1788,7 +1780,8 @@ struct KdSlabExtent {
 #define BIND_KD_BUILT_PARENTS 141u
 // Two words for each built node: pairs and entries below it.
 #define BIND_KD_BELOW 142u
-// Two words for each built node: its children's pair and its first entry in the finished tree.
+// Two words for each built node: its children's pair and its first entry in the finished tree. Before these are found,
+// the first word of a pair's first node counts the nodes of the pair whose sums are in `below`.
 #define BIND_KD_PLACES 143u
 // Two words for each reference in a leaf, in the order in which leaves are made: the triangle; the built node (27
 // bits) and the scale of its cell.

@@ -207,14 +207,14 @@ fn sort_out(
     let mut polygon = vec![triangle.v0.to_array(), triangle.v1.to_array(), triangle.v2.to_array()];
     for face in 0..3 {
         for (is_above, limit) in [(false, cell.min[face] - reach), (true, cell.max[face] + reach)] {
-            polygon = cut(&polygon, face, is_above, limit);
-            if polygon.len() > MAX_CORNERS {
+            let Some(kept) = cut(&polygon, face, is_above, limit) else {
                 return pieces.map(|piece| Some((piece, triangle_ix)));
-            }
+            };
+            polygon = kept;
         }
     }
     let piece = |limits: &Bounds, is_below, limit| {
-        let corners = cut(&polygon, axis, is_below, limit);
+        let corners = cut_off(&polygon, axis, is_below, limit).0;
         let point = |p: &[f32; 3]| Bounds { min: p.map(|x| x - reach), max: p.map(|x| x + reach) };
         let bounds = corners.iter().map(point).reduce(|a, b| a.union(&b))?.intersection(limits);
         (0..3).all(|k| bounds.min[k] <= bounds.max[k]).then_some((bounds, triangle_ix))
@@ -230,23 +230,32 @@ fn slack_of(triangle: &Triangle) -> f32 {
     9.0 * unit * bounds.largest_coordinate() + 20.0 * unit * extent
 }
 
-/// Twin of `cut` in kd_clip.glsl: cuts off what is above a plane, or below it.
-fn cut(polygon: &[[f32; 3]], axis: usize, is_above: bool, position: f32) -> Vec<[f32; 3]> {
+/// Twin of `cut` in kd_clip.glsl: cuts off what is above a plane, or below it. Returns none if there are too many
+/// corners.
+fn cut(polygon: &[[f32; 3]], axis: usize, is_above: bool, position: f32) -> Option<Vec<[f32; 3]>> {
+    let (kept, has_room) = cut_off(polygon, axis, is_above, position);
+    has_room.then_some(kept)
+}
+
+/// Returns what is left, and whether the kernel has room for it, which replaces the corners that it has read.
+fn cut_off(polygon: &[[f32; 3]], axis: usize, is_above: bool, position: f32) -> (Vec<[f32; 3]>, bool) {
     let is_out = |p: &[f32; 3]| if is_above { p[axis] > position } else { p[axis] < position };
     if !polygon.iter().any(is_out) {
-        return polygon.to_vec();
+        return (polygon.to_vec(), true);
     }
     let mut kept = Vec::new();
+    let mut has_room = true;
     let before = polygon.iter().cycle().skip(polygon.len() - 1);
-    for (a, b) in before.zip(polygon) {
+    for (i, (a, b)) in before.zip(polygon).enumerate() {
         if is_out(a) != is_out(b) {
             kept.push(crossing(a, b, axis, position));
         }
         if !is_out(b) {
             kept.push(*b);
         }
+        has_room &= kept.len() <= MAX_CORNERS.min(i + 2);
     }
-    kept
+    (kept, has_room)
 }
 
 fn crossing(a: &[f32; 3], b: &[f32; 3], axis: usize, position: f32) -> [f32; 3] {

@@ -44,30 +44,30 @@ vec3 crossing(vec3 a, vec3 b, uint axis, float position) {
     return point;
 }
 
-// Cuts off the piece beyond a plane. Sets n to MAX_CORNERS + 1 if there are too many corners.
+// Cuts off the piece beyond a plane. Sets n to MAX_CORNERS + 1 if there are too many corners. The piece replaces the
+// corners that have been read; if that is all of them so far, a convex polygon gets one more at most.
 void cut(inout Polygon polygon, uint axis, float side, float position) {
     bool is_cut = false;
     for (uint i = 0u; i < polygon.n; ++i) {
         is_cut = is_cut || is_beyond(polygon.corners[i], axis, side, position);
     }
     if (!is_cut) return;
-    Polygon kept;
-    kept.n = 0u;
-    vec3 a = polygon.corners[polygon.n - 1u];
+    vec3 a = polygon.corners[polygon.n - 1u], b = polygon.corners[0];
+    uint n_kept = 0u;
     for (uint i = 0u; i < polygon.n; ++i) {
-        vec3 b = polygon.corners[i];
+        vec3 next = polygon.corners[min(i + 1u, MAX_CORNERS - 1u)];
         bool is_a_out = is_beyond(a, axis, side, position), is_b_out = is_beyond(b, axis, side, position);
-        if (is_a_out != is_b_out && kept.n <= MAX_CORNERS) {
-            if (kept.n < MAX_CORNERS) kept.corners[kept.n] = crossing(a, b, axis, position);
-            kept.n += 1u;
+        uint n_new = (is_a_out != is_b_out ? 1u : 0u) + (is_b_out ? 0u : 1u);
+        if (n_kept + n_new > min(i + 2u, MAX_CORNERS)) {
+            n_kept = MAX_CORNERS + 1u;
+            break;
         }
-        if (!is_b_out && kept.n <= MAX_CORNERS) {
-            if (kept.n < MAX_CORNERS) kept.corners[kept.n] = b;
-            kept.n += 1u;
-        }
+        if (is_a_out != is_b_out) polygon.corners[n_kept++] = crossing(a, b, axis, position);
+        if (!is_b_out) polygon.corners[n_kept++] = b;
         a = b;
+        b = next;
     }
-    polygon = kept;
+    polygon.n = n_kept;
 }
 
 // The bounds of the piece of a polygon that is not beyond a plane; least exceeds greatest if it is empty.

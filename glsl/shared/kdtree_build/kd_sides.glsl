@@ -1,11 +1,18 @@
-// How many references are on either side of their cells' planes, before any reference of the level.
+// How many references are on either side of their cells' planes, before any reference of the level. A kernel that
+// writes scan_blocks defines KD_SCAN_BLOCKS_ACCESS as its qualifier.
 #ifndef KDRAY_KD_SIDES
 #define KDRAY_KD_SIDES
 
 #include "kdtree_build/kd_build.glsl"
 
+#ifndef KD_SCAN_BLOCKS_ACCESS
+#define KD_SCAN_BLOCKS_ACCESS readonly
+#endif
+
 layout(std430, set = 0, binding = BIND_KD_SIDES) readonly buffer SidesBlock { uint sides[]; };
-layout(std430, set = 0, binding = BIND_KD_SCAN_BLOCKS) buffer ScanBlocksBlock { uvec4 scan_blocks[]; };
+layout(std430, set = 0, binding = BIND_KD_SCAN_BLOCKS) KD_SCAN_BLOCKS_ACCESS buffer ScanBlocksBlock {
+    uvec4 scan_blocks[];
+};
 
 // The numbers of references below and above, of all before a reference or of all of the level.
 uvec2 sides_before(uint reference_ix) {

@@ -9,9 +9,7 @@ layout(std430, set = 0, binding = BIND_KD_REFERENCES_FROM) readonly buffer Refer
     KdReference references_from[];
 };
 
-// The best split of each subgroup: weight, axis and position, as integers that sort like them.
-shared uvec3 best_of_subgroups[SCAN_GROUP_SIZE / 4u];
-
+// A split: weight, axis and position, as integers that sort like them.
 const uvec3 NO_SPLIT = uvec3(0x7f800000u, KD_NO_AXIS, 0xffffffffu);
 
 bool is_before(uvec3 a, uvec3 b) {
@@ -23,24 +21,11 @@ bool is_inside(Areas areas, float position) {
     return position > areas.least && position < areas.greatest;
 }
 
-// Replaces the best split by that at a position inside the cell if the latter is better.
+// Replaces the best split by that at a position if the latter is better. A plane must be inside the cell.
 void consider(inout uvec3 best, Areas areas, uint axis, float position, uvec2 n) {
+    if (!is_inside(areas, position)) return;
     uvec3 split = uvec3(floatBitsToUint(weight_of(areas, position, n.x, n.y)), axis, ordered(position));
     if (is_before(split, best)) best = split;
-}
-
-// The best of the splits of all invocations of some successive subgroups. Needs uniform control flow.
-uvec3 best_of(uvec3 mine, uint first_subgroup, uint n_subgroups) {
-    uvec3 best;
-    best.x = subgroupMin(mine.x);
-    best.y = subgroupMin(mine.x == best.x ? mine.y : 0xffffffffu);
-    best.z = subgroupMin(mine.xy == best.xy ? mine.z : 0xffffffffu);
-    if (subgroupElect()) best_of_subgroups[gl_SubgroupID] = best;
-    barrier();
-    for (uint i = first_subgroup; i < first_subgroup + n_subgroups; ++i) {
-        if (is_before(best_of_subgroups[i], best)) best = best_of_subgroups[i];
-    }
-    return best;
 }
 
 // Writes the split of a cell of n references, if it is cheaper than a leaf.

@@ -3,32 +3,29 @@
 //! [`accel::kdtree`](crate::accel::kdtree) builds on the CPU differ: it tries more planes, and clips more exactly.
 //!
 //! ```text
-//! bounds             finds the box of the triangles
+//! bounds             finds the box of the triangles, and counts the finite ones
 //! scales             counts how many triangles need each scale
-//! spine, root        open the first level: the root's cell
+//! root               opens the first level: the root's cell
 //! gather             writes its references
 //! each level, 0 to 32; without open cells, its dispatches have no workgroups
 //!   bins             counts the references of large cells by bins
 //!   choose           finds the split of each cell that is not small, a workgroup a cell
-//!   choose_small     finds the split of each small cell, a team of invocations a cell
+//!   choose_small     finds the split of each small cell, an invocation a reference
 //!   sort_out         finds each reference's sides of its cell's plane, and clips triangles that the plane cuts
-//!   spine            prefix sums over blocks of references
-//!   count_cells      counts splits, open children and references in leaves
-//!   spine            prefix sums over groups of cells, and the first group whose children would pass a capacity
-//!   split_cells      writes nodes and the cells of the next level, and sizes its dispatches
+//!   count_cells      counts splits, open children and references in leaves, and opens the next level
+//!   split_cells      writes nodes and the cells of the next level
 //!   scatter          writes the references of the next level, and those in leaves
-//! each level upwards
-//!   sum              counts pairs and entries below each node
-//! each level downwards
-//!   place            writes the nodes in depth-first order
+//! sum                counts pairs and entries below each node
+//! place              writes the nodes in depth-first order
 //! leaves             writes the entries of leaves, with triangles and planes
 //! slabs, if wanted   src/passes/kd_slabs.rs
 //! relocate, if wanted   makes the indices those of arrays that hold several trees
 //! ```
 //!
-//! Prefix sums give all places, and atomics only add, or find a least or greatest integer. So the same device builds
-//! the same tree, bit for bit. From the first group of a level's cells whose children would pass a capacity on, all
-//! cells of the level become leaves.
+//! Prefix sums give all places, and atomics only add, find a least or greatest integer, or find which workgroup comes
+//! last, whichever it is. So the same device builds the same tree, bit for bit. The last workgroup of `bounds`,
+//! `sort_out` and `count_cells` computes the prefix sums over all blocks (kdtree_build/kd_spine.glsl). From the first
+//! group of a level's cells whose children would pass a capacity on, all cells of the level become leaves.
 //!
 //! Zhou, Hou, Wang and Guo, "Real-time KD-tree construction on graphics hardware", 2008; Wu, Zhao and Liu, "SAH KD-tree
 //! construction on GPU", 2011.
@@ -42,26 +39,20 @@ use super::{Kernels, ONE_GROUP, spirv, then};
 use crate::{
     buffers::KdTreeBuffers,
     gpu::{Access, BindingLayout, Commands, ComputePipeline, Constants, Context, Dispatch, GpuError},
-    layout::{
-        KD_BLOCK_SIZE, KD_GROUPS_X, KD_SCANS_CELLS, KD_SCANS_REFERENCES, KD_SCANS_TRIANGLES, KdBuild, KdLevel, KdStage,
-        StructurePlace, constants,
-    },
+    layout::{KD_BLOCK_SIZE, KD_GROUPS_X, KdBuild, KdLevel, KdStage, StructurePlace},
 };
 
 /// All kernels of a build.
 struct KdTreePasses {
     bounds: ComputePipeline,
     scales: ComputePipeline,
-    spine_triangles: ComputePipeline,
     root: ComputePipeline,
     gather: ComputePipeline,
     bins: ComputePipeline,
     choose: ComputePipeline,
     choose_small: ComputePipeline,
     sort_out: ComputePipeline,
-    spine_references: ComputePipeline,
     count_cells: ComputePipeline,
-    spine_cells: ComputePipeline,
     split_cells: ComputePipeline,
     scatter: ComputePipeline,
     sum: ComputePipeline,
@@ -70,8 +61,8 @@ struct KdTreePasses {
     relocate: ComputePipeline,
 }
 
-/// Dispatches before the first level, of a level, and after all levels without those of `sum` and `place`.
-const N_STAGES: [u32; 3] = [5, 9, 1];
+/// Dispatches before the first level, of a level, and after all levels.
+const N_STAGES: [u32; 3] = [4, 7, 3];
 
 impl KdTreePasses {
     /// Creates the pipelines.
@@ -81,22 +72,16 @@ impl KdTreePasses {
     fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>) -> Result<Self, GpuError> {
         let kernels = Kernels { context, bindings };
         let none = Constants::new();
-        let spine = |name, scans| {
-            kernels.of_blocks(name, spirv!("kdtree_spine.comp"), &Constants::new().set(constants::SCANS, scans))
-        };
         Ok(Self {
             bounds: kernels.of_blocks("kdtree_bounds", spirv!("kdtree_bounds.comp"), &none)?,
             scales: kernels.of_blocks("kdtree_scales", spirv!("kdtree_scales.comp"), &none)?,
-            spine_triangles: spine("kdtree_spine_triangles", KD_SCANS_TRIANGLES)?,
             root: kernels.of_one("kdtree_root", spirv!("kdtree_root.comp"), &none)?,
             gather: kernels.of_blocks("kdtree_gather", spirv!("kdtree_gather.comp"), &none)?,
             bins: kernels.of_blocks("kdtree_bins", spirv!("kdtree_bins.comp"), &none)?,
             choose: kernels.of_blocks("kdtree_choose", spirv!("kdtree_choose.comp"), &none)?,
             choose_small: kernels.of_blocks("kdtree_choose_small", spirv!("kdtree_choose_small.comp"), &none)?,
             sort_out: kernels.of_blocks("kdtree_sort_out", spirv!("kdtree_sort_out.comp"), &none)?,
-            spine_references: spine("kdtree_spine_references", KD_SCANS_REFERENCES)?,
             count_cells: kernels.of_blocks("kdtree_count_cells", spirv!("kdtree_count_cells.comp"), &none)?,
-            spine_cells: spine("kdtree_spine_cells", KD_SCANS_CELLS)?,
             split_cells: kernels.of_blocks("kdtree_split_cells", spirv!("kdtree_split_cells.comp"), &none)?,
             scatter: kernels.of_blocks("kdtree_scatter", spirv!("kdtree_scatter.comp"), &none)?,
             sum: kernels.of_blocks("kdtree_sum", spirv!("kdtree_sum.comp"), &none)?,
@@ -109,8 +94,7 @@ impl KdTreePasses {
     /// Returns the number of dispatches of a build of levels 0 to `max_depth`.
     fn n_stages(max_depth: u32) -> u32 {
         let [before, of_level, after] = N_STAGES;
-        // Both `sum` and `place` run for all levels; `sum` has nothing to add at the root's.
-        before + of_level * (max_depth + 1) + max_depth + max_depth + 1 + after
+        before + of_level * (max_depth + 1) + after
     }
 
     /// Records what comes before the first level. Needs the first `n_triangles` of `triangles`. Leaves the root's
@@ -130,8 +114,6 @@ impl KdTreePasses {
         then(commands);
         commands.dispatch(&self.scales, None, &none, blocks());
         then(commands);
-        commands.dispatch(&self.spine_triangles, None, &none, ONE_GROUP);
-        then(commands);
         commands.dispatch(&self.root, None, &none, ONE_GROUP);
         then(commands);
         commands.dispatch(&self.gather, None, &none, blocks());
@@ -147,41 +129,34 @@ impl KdTreePasses {
             commands.dispatch(kernel, Some(level_ix), &KdStage { level_ix }, dispatch);
         };
         let cells = offset_of!(KdLevel, cell_groups_x);
-        let spine = offset_of!(KdLevel, spine_groups_x);
         commands.bind(buffers.set_of(level_ix));
         run(&self.bins, offset_of!(KdLevel, bin_groups_x));
         then(commands);
         run(&self.choose, offset_of!(KdLevel, choose_groups_x));
-        run(&self.choose_small, offset_of!(KdLevel, team_groups_x)); // of other cells: no barrier
+        run(&self.choose_small, offset_of!(KdLevel, small_groups_x)); // of other cells: no barrier
         then(commands);
         run(&self.sort_out, offset_of!(KdLevel, block_groups_x));
         then(commands);
-        run(&self.spine_references, spine);
-        then(commands);
         run(&self.count_cells, cells);
         then(commands);
-        run(&self.spine_cells, spine);
-        then(commands);
         run(&self.split_cells, cells);
-        then(commands);
-        run(&self.scatter, offset_of!(KdLevel, reference_groups_x));
+        run(&self.scatter, offset_of!(KdLevel, reference_groups_x)); // of other arrays: no barrier
         then(commands);
     }
 
     /// Records what comes after the last level. Needs the built nodes, and the references in leaves. Leaves `nodes`,
     /// `parents`, `leaf_triangles` and `leaf_planes`.
     fn finish(&self, commands: &Commands, buffers: &KdTreeBuffers) {
-        let max_depth = buffers.initial().max_depth;
-        let run = |kernel: &ComputePipeline, level_ix: u32| {
-            let offset = level_ix as usize * size_of::<KdLevel>() + offset_of!(KdLevel, pair_groups_x);
-            let dispatch = Dispatch::Indirect(buffers.levels.any(), offset as u64);
-            commands.dispatch(kernel, Some(level_ix), &KdStage { level_ix }, dispatch);
-            then(commands);
+        let run = |kernel: &ComputePipeline, groups: usize| {
+            let dispatch = Dispatch::Indirect(buffers.build.any(), groups as u64);
+            commands.dispatch(kernel, None, &KdStage::default(), dispatch);
         };
-        (1..=max_depth).rev().for_each(|level_ix| run(&self.sum, level_ix));
-        (0..=max_depth).for_each(|level_ix| run(&self.place, level_ix));
-        let entries = offset_of!(KdBuild, entry_groups_x) as u64;
-        commands.dispatch(&self.leaves, None, &KdStage::default(), Dispatch::Indirect(buffers.build.any(), entries));
+        let pairs = offset_of!(KdBuild, pair_groups_x);
+        run(&self.sum, pairs);
+        then(commands);
+        run(&self.place, pairs);
+        then(commands);
+        run(&self.leaves, offset_of!(KdBuild, entry_groups_x));
     }
 
     /// Records the relocation of a tree of at most `n` nodes and entries. Needs `build`. Updates `nodes`, `parents` and
