@@ -4,7 +4,7 @@
 // Kd-tree, bounds: one workgroup per block of triangles finds the bounds of the finite ones and counts them. Atomics
 // combine the blocks' bounds; a minimum, a maximum and a sum of integers are the same in every order. The last
 // workgroup finds how many finite triangles come before each block.
-// Reads triangles and n_triangles of build; updates least, greatest, n_finite and n_summed_blocks of build; writes
+// Reads triangles and n_triangles of build; updates least, greatest, n_finite and n_summed_blocks of build, and
 // scan_blocks.
 #include "kdtree_build/kd_build.glsl"
 
@@ -41,6 +41,7 @@ void main() {
         scan_blocks[block] = uvec4(total, 0u, 0u, 0u);
         memoryBarrierBuffer();
         is_last_group = atomicAdd(build.n_summed_blocks, 1u) == n_blocks - 1u;
+        memoryBarrierBuffer();
         atomicAdd(build.n_finite, total);
     }
     barrier();

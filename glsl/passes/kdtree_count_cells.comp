@@ -4,9 +4,8 @@
 // Kd-tree, count cells: counts the references of the cells' children, and the splits, the children with references and
 // the references in leaves of each group of cells. One workgroup per group of cells. The last one finds how many come
 // before each group, and the first group after which a capacity would be passed, if all cells before are split and all
-// cells after become leaves; and it opens the next level.
-// Reads sides; updates levels, cells_from, scan_blocks; writes n_limited, n_entries, n_pairs, depth, pair_groups and
-// entry_groups of build.
+// cells after become leaves; and it opens the next level. Reads build, sides; updates levels, cells_from, scan_blocks,
+// and n_limited of build; writes n_entries, n_pairs, depth, pair_groups and entry_groups of build.
 #define KD_SCAN_BLOCKS_ACCESS coherent
 #include "kdtree_build/kd_sides.glsl"
 #include "kdtree_build/kd_spine.glsl"
@@ -169,6 +168,7 @@ void main() {
         memoryBarrierBuffer();
         uint n_before = atomicAdd(levels[stage.level_ix].n_summed_groups, 1u);
         is_last_group = n_before == groups_over(n_cells) - 1u;
+        memoryBarrierBuffer();
     }
     barrier();
     if (is_last_group) scan_groups(groups_over(n_cells));

@@ -5,7 +5,7 @@
 // split into two. One workgroup per block of references. The references that are cut are few, and clipping is long, so
 // the workgroup first lists them and then clips them side by side. The last workgroup finds how many references come
 // below and above planes before each block.
-// Reads build, triangles, cells_from; updates levels, references_from; writes above, sides, scan_blocks.
+// Reads build, triangles, cells_from; updates levels, references_from, scan_blocks; writes above, sides.
 #include "kdtree_build/kd_clip.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;
@@ -129,6 +129,7 @@ void main() {
         scan_blocks[block] = uvec4(halves_of(sum), 0u, 0u);
         memoryBarrierBuffer();
         is_last_group = atomicAdd(levels[stage.level_ix].n_summed_blocks, 1u) == blocks_of(end) - 1u;
+        memoryBarrierBuffer();
     }
     barrier();
     if (is_last_group) scan_blocks_of_level(blocks_of(end));

@@ -1407,7 +1407,8 @@ struct GridSort {
 #define KD_GROUPS_X 1024u
 // The most references of a small cell, whose planes are all tried.
 #define KD_SMALL_CELL 64u
-// A workgroup chooses the splits of the cells that are not small and begin in so many references.
+// References among which a workgroup of `kdtree_choose` looks for cells that are not small, by every `KD_SMALL_CELL`-th
+// one.
 #define KD_CHOOSE_BLOCK 256u
 // The number of references that one workgroup counts by bins at a time. A cell with more is large.
 #define KD_BIN_BLOCK 2048u
@@ -1474,7 +1475,7 @@ struct KdBuild {
     uint entry_groups_z;
 };
 
-// A level of a kd-tree's build. It is 0 throughout if no cell is open there.
+// A level of a kd-tree's build. Without open cells, its numbers of cells, references and workgroups are 0.
 struct KdLevel {
     // Cells and references of the level.
     uint n_cells;
@@ -1482,7 +1483,8 @@ struct KdLevel {
     // Of all levels above: references in leaves, and pairs of nodes, those of this level's nodes included.
     uint n_closed;
     uint n_pairs;
-    // The first cell that is not split for lack of capacity. All cells after it become leaves, too.
+    // The first cell that is not split for lack of capacity, 0xffffffff if there is none. All cells after it become
+    // leaves, too.
     uint cutoff;
     // References of the level below and above their cells' planes.
     uint n_below;
@@ -1781,7 +1783,7 @@ struct KdSlabExtent {
 // Two words for each built node: pairs and entries below it.
 #define BIND_KD_BELOW 142u
 // Two words for each built node: its children's pair and its first entry in the finished tree. Before these are found,
-// the first word of a pair's first node counts the nodes of the pair whose sums are in `below`.
+// the first word of a pair of two splits counts those that `kdtree_sum` has finished.
 #define BIND_KD_PLACES 143u
 // Two words for each reference in a leaf, in the order in which leaves are made: the triangle; the built node (27
 // bits) and the scale of its cell.

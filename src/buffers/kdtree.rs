@@ -239,7 +239,6 @@ fn initial_build(capacities: KdTreeCapacities, options: &BuildOptions, cell_grou
         max_pairs: capacities.n_pairs,
         max_cells: capacities.n_cells,
         cell_groups_begin,
-        entry_groups_z: 1,
         ..KdBuild::default()
     }
 }

@@ -12,8 +12,8 @@ use kdray::{
     buffers::KdTreeRoom,
     gpu::{Buffer, BufferUse, Context, Timer},
     layout::{
-        KD_BIN_BLOCK, KD_BLOCK_SIZE, KD_HAS_SLAB, KD_LEAF, KD_PAIR_SHIFT, KD_SMALL_CELL, KD_WORD_DEPTH, KdNode, Slab,
-        StructurePlace, Triangle,
+        KD_BIN_BLOCK, KD_BLOCK_SIZE, KD_GROUPS_X, KD_HAS_SLAB, KD_LEAF, KD_PAIR_SHIFT, KD_SMALL_CELL, KD_WORD_DEPTH,
+        KdNode, SCAN_GROUP_SIZE, Slab, StructurePlace, Triangle,
     },
     passes::kdtree::{BuiltTree, KdTreeBuilder, KdTreeBuilderOptions},
     reference::{
@@ -171,6 +171,38 @@ fn triangles_of_very_different_sizes_have_a_valid_tree() {
 fn a_knot_of_20000_triangles_has_a_good_tree() {
     let context = device();
     check(&context, "knot", &knot(400, 25));
+    assert_silent(&context);
+}
+
+/// Dispatches have several rows of workgroups, and in the last row, workgroups beyond the last entry.
+#[test]
+fn more_workgroups_than_a_row_build_valid_trees() {
+    let context = device();
+    let in_leaves = |triangles: &[Triangle], room| {
+        let tree = BuildOptions { max_depth: Some(4), slabs: false, ..BuildOptions::default() };
+        let options = KdTreeBuilderOptions { tree, room, ..KdTreeBuilderOptions::default() };
+        let (found, arrays) = built(&builder(&context, triangles, &options));
+        assert_eq!([found.n_limited, found.depth], [0, 4]);
+        let mut in_leaves = arrays.leaf_triangles.clone();
+        KdTree::from_arrays(arrays, triangles).expect("a valid tree");
+        in_leaves.sort_unstable();
+        in_leaves.dedup();
+        in_leaves
+    };
+    // Blocks of triangles: few of these are finite, and the last one is.
+    let torus = meshes::torus(30, 20);
+    let mut triangles = vec![meshes::triangle(Vec3::NAN, Vec3::X, Vec3::Y); (KD_GROUPS_X * KD_BLOCK_SIZE + 1) as usize];
+    let last = triangles.len() - 1;
+    let places: Vec<_> = (0..torus.len()).map(|i| last - 873 * i).collect();
+    places.iter().zip(&torus).for_each(|(place, triangle)| triangles[*place] = *triangle);
+    let found = in_leaves(&triangles, KdTreeRoom { references: 1, pairs: 0, cells: 0 });
+    assert!(found.into_iter().rev().map(|ix| ix as usize).eq(places));
+    // Groups of references.
+    let n = KD_GROUPS_X * SCAN_GROUP_SIZE + 1;
+    let at = |i: u32| vec3((i % 363) as f32, (i / 363) as f32, 0.0);
+    let apart = |i| meshes::triangle(at(i), at(i) + 0.25 * Vec3::X, at(i) + 0.25 * Vec3::Y);
+    let found = in_leaves(&(0..n).map(apart).collect::<Vec<_>>(), KdTreeRoom { references: 1, pairs: 0, cells: 0 });
+    assert!(found.into_iter().eq(0..n));
     assert_silent(&context);
 }
 

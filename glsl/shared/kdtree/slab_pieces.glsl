@@ -56,7 +56,8 @@ bool clip(uint axis, float side, float position) {
         is_cut = is_cut || side * (corners[i][axis][gl_LocalInvocationIndex] - position) > 0.0;
     }
     if (!is_cut) return true;
-    // The piece replaces the corners that have been read. A convex polygon has one corner more than these at most.
+    // What is kept overwrites corners that have been read. Of a convex polygon, it is never more than one corner longer
+    // than what has been read.
     uint n_kept = 0u;
     vec3 a = corner(n_corners - 1u), b = corner(0u);
     float height_a = side * (along(a, axis) - position);

@@ -44,8 +44,9 @@ vec3 crossing(vec3 a, vec3 b, uint axis, float position) {
     return point;
 }
 
-// Cuts off the piece beyond a plane. Sets n to MAX_CORNERS + 1 if there are too many corners. The piece replaces the
-// corners that have been read; if that is all of them so far, a convex polygon gets one more at most.
+// Cuts off the piece beyond a plane. What is kept overwrites corners that have been read. Of a convex polygon, it is
+// never more than one corner longer than what has been read. If a bent polygon is longer, or has too many corners, n
+// becomes MAX_CORNERS + 1.
 void cut(inout Polygon polygon, uint axis, float side, float position) {
     bool is_cut = false;
     for (uint i = 0u; i < polygon.n; ++i) {

@@ -1,5 +1,5 @@
 // How many references are on either side of their cells' planes, before any reference of the level. A kernel that
-// writes scan_blocks defines KD_SCAN_BLOCKS_ACCESS as its qualifier.
+// writes scan_blocks defines KD_SCAN_BLOCKS_ACCESS as the qualifier of that array.
 #ifndef KDRAY_KD_SIDES
 #define KDRAY_KD_SIDES
 

@@ -5,6 +5,9 @@
 //     scan_blocks[block] = sums;
 //     memoryBarrierBuffer();
 //     is_last_group = atomicAdd(n_summed_blocks, 1u) == n_blocks - 1u;
+//     memoryBarrierBuffer();
+//
+// After the next barrier(), all invocations of the last workgroup can call sum_before_part.
 #ifndef KDRAY_KD_SPINE
 #define KDRAY_KD_SPINE
 

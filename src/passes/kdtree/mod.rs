@@ -9,7 +9,7 @@
 //! gather             writes its references
 //! each level, 0 to 32; without open cells, its dispatches have no workgroups
 //!   bins             counts the references of large cells by bins
-//!   choose           finds the split of each cell that is not small, a workgroup a cell
+//!   choose           finds the split of each cell that is not small, a workgroup for up to four cells
 //!   choose_small     finds the split of each small cell, an invocation a reference
 //!   sort_out         finds each reference's sides of its cell's plane, and clips triangles that the plane cuts
 //!   count_cells      counts splits, open children and references in leaves, and opens the next level
@@ -22,10 +22,11 @@
 //! relocate, if wanted   makes the indices those of arrays that hold several trees
 //! ```
 //!
-//! Prefix sums give all places, and atomics only add, find a least or greatest integer, or find which workgroup comes
-//! last, whichever it is. So the same device builds the same tree, bit for bit. The last workgroup of `bounds`,
-//! `sort_out` and `count_cells` computes the prefix sums over all blocks (kdtree_build/kd_spine.glsl). From the first
-//! group of a level's cells whose children would pass a capacity on, all cells of the level become leaves.
+//! Prefix sums give all places. Atomics only add, combine bits, find a least or greatest integer, or find which
+//! workgroup or invocation comes last, and the result does not depend on which one that is. So the same device builds
+//! the same tree, bit for bit. The last workgroup of `bounds`, `sort_out` and `count_cells` computes the prefix sums
+//! over all blocks (kdtree_build/kd_spine.glsl). From the first group of a level's cells whose children would pass a
+//! capacity on, all cells of the level become leaves.
 //!
 //! Zhou, Hou, Wang and Guo, "Real-time KD-tree construction on graphics hardware", 2008; Wu, Zhao and Liu, "SAH KD-tree
 //! construction on GPU", 2011.
@@ -39,7 +40,10 @@ use super::{Kernels, ONE_GROUP, spirv, then};
 use crate::{
     buffers::KdTreeBuffers,
     gpu::{Access, BindingLayout, Commands, ComputePipeline, Constants, Context, Dispatch, GpuError},
-    layout::{KD_BLOCK_SIZE, KD_GROUPS_X, KdBuild, KdLevel, KdStage, StructurePlace},
+    layout::{
+        KD_BIN_BLOCK, KD_BIN_WORDS, KD_BINS, KD_BLOCK_SIZE, KD_CHOOSE_BLOCK, KD_GROUPS_X, KD_ROWS, KD_SMALL_CELL,
+        KdBuild, KdLevel, KdStage, SCAN_GROUP_SIZE, StructurePlace,
+    },
 };
 
 /// All kernels of a build.
@@ -60,6 +64,14 @@ struct KdTreePasses {
     leaves: ComputePipeline,
     relocate: ComputePipeline,
 }
+
+// What the kernels need of the constants of the layout.
+const _: () = {
+    assert!(KD_BINS == SCAN_GROUP_SIZE && KD_BIN_WORDS == 12 * KD_BINS);
+    assert!(KD_SMALL_CELL <= SCAN_GROUP_SIZE && KD_SMALL_CELL <= KD_BIN_BLOCK);
+    assert!(KD_CHOOSE_BLOCK.is_multiple_of(KD_SMALL_CELL));
+    assert!(KD_BLOCK_SIZE == KD_ROWS * SCAN_GROUP_SIZE && KD_BLOCK_SIZE <= 1 << 10);
+};
 
 /// Dispatches before the first level, of a level, and after all levels.
 const N_STAGES: [u32; 3] = [4, 7, 3];
