@@ -178,7 +178,8 @@ fn a_knot_of_20000_triangles_has_a_good_tree() {
 #[test]
 fn more_workgroups_than_a_row_build_valid_trees() {
     let context = device();
-    let in_leaves = |triangles: &[Triangle], room| {
+    let in_leaves = |triangles: &[Triangle]| {
+        let room = KdTreeRoom { references: 1, pairs: 0, cells: 0 };
         let tree = BuildOptions { max_depth: Some(4), slabs: false, ..BuildOptions::default() };
         let options = KdTreeBuilderOptions { tree, room, ..KdTreeBuilderOptions::default() };
         let (found, arrays) = built(&builder(&context, triangles, &options));
@@ -189,19 +190,20 @@ fn more_workgroups_than_a_row_build_valid_trees() {
         in_leaves.dedup();
         in_leaves
     };
-    // Blocks of triangles: few of these are finite, and the last one is.
+    // Blocks of triangles: few of these are finite, and the last one is. An invocation has ten of the blocks' sums.
     let torus = meshes::torus(30, 20);
-    let mut triangles = vec![meshes::triangle(Vec3::NAN, Vec3::X, Vec3::Y); (KD_GROUPS_X * KD_BLOCK_SIZE + 1) as usize];
+    let n = (KD_GROUPS_X + KD_GROUPS_X / 4) * KD_BLOCK_SIZE + 1;
+    let mut triangles = vec![meshes::triangle(Vec3::NAN, Vec3::X, Vec3::Y); n as usize];
     let last = triangles.len() - 1;
     let places: Vec<_> = (0..torus.len()).map(|i| last - 873 * i).collect();
     places.iter().zip(&torus).for_each(|(place, triangle)| triangles[*place] = *triangle);
-    let found = in_leaves(&triangles, KdTreeRoom { references: 1, pairs: 0, cells: 0 });
+    let found = in_leaves(&triangles);
     assert!(found.into_iter().rev().map(|ix| ix as usize).eq(places));
     // Groups of references.
     let n = KD_GROUPS_X * SCAN_GROUP_SIZE + 1;
     let at = |i: u32| vec3((i % 363) as f32, (i / 363) as f32, 0.0);
     let apart = |i| meshes::triangle(at(i), at(i) + 0.25 * Vec3::X, at(i) + 0.25 * Vec3::Y);
-    let found = in_leaves(&(0..n).map(apart).collect::<Vec<_>>(), KdTreeRoom { references: 1, pairs: 0, cells: 0 });
+    let found = in_leaves(&(0..n).map(apart).collect::<Vec<_>>());
     assert!(found.into_iter().eq(0..n));
     assert_silent(&context);
 }
