@@ -4,8 +4,8 @@
 // Kd-tree, choose: finds the cheapest split (src/accel/kdtree/sah.rs) of each cell that is not small. Each bin has
 // three planes: through its least begin, its greatest end, and its edge. Those are counted as if all references that
 // begin or end in the bin did so on the costlier side, so that no weight is too low. One workgroup per KD_CHOOSE_BLOCK
-// references takes one cell after the other. It finds them by every KD_SMALL_CELL-th reference: of a cell with more
-// references, the first such one counts.
+// references takes one cell after the other. It looks at every KD_SMALL_CELL-th reference, and takes a cell at the
+// first of these that belongs to it.
 // Reads build, levels, references_from; reads and clears large_bins; updates cells_from.
 #include "kdtree_build/kd_bins.glsl"
 #include "kdtree_build/kd_splits.glsl"

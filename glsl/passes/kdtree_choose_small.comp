@@ -8,11 +8,11 @@
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;
 
-// References that a workgroup may have to do with.
+// A workgroup looks at so many references for each invocation: its cells lie among these.
 const uint N_ROWS = 2u;
 const uint NO_CELL = 0xffffffffu;
 
-// The begin and the end on each axis of the references of the cells.
+// The begin and the end of each reference of the workgroup's cells, on each axis.
 shared vec2 sides[N_ROWS * SCAN_GROUP_SIZE][3];
 // The best split of each cell, at the place of its first reference: weight, axis and position, as integers that sort
 // like them.

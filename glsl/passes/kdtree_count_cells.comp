@@ -19,7 +19,7 @@ shared uvec3 sums_before_full;
 // Sizes of the children of the workgroup's cells.
 shared uint child_sizes;
 
-// Sizes of children, each a bit of a word.
+// Bits of a word that tells which sizes children have.
 const uint SMALL = 1u;
 const uint NOT_SMALL = 2u;
 const uint LARGE = 4u;
@@ -71,7 +71,7 @@ uint first_full_of(uvec2 part, inout uvec3 before) {
 }
 
 void set_groups(uint next_ix, uint n_cells, uint n_references) {
-    // Other workgroups have changed this word.
+    // An atomic reads what other workgroups have written.
     uint sizes = atomicOr(levels[stage.level_ix].child_sizes, 0u);
     uint n_bin_blocks = (n_references + KD_BIN_BLOCK - 1u) / KD_BIN_BLOCK;
     uint n_choose_blocks = (n_references + KD_CHOOSE_BLOCK - 1u) / KD_CHOOSE_BLOCK;

@@ -40,7 +40,7 @@ void write_tree() {
     tree.reserved = 0u;
 }
 
-// Where a pair comes, and the first entry below it.
+// The index of a pair in the finished tree, and that of the first entry below it.
 uvec2 place_of(uint pair_ix) {
     uvec2 place = uvec2(1u, 0u);
     for (uint node_ix = built_parents[pair_ix]; node_ix != 0u; node_ix = built_parents[node_ix >> 1]) {

@@ -1,9 +1,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 // Kd-tree, sum: adds up the pairs and the entries below each split. One workgroup per group of pairs. An invocation
-// begins at a pair of leaves and goes towards the root, as far as it comes last: where two splits have the same parent,
-// the one that is finished later goes on. No invocation waits for another, and the sums do not depend on which one goes
-// on.
+// begins at a pair of leaves and goes towards the root. At a pair of two splits, only the invocation that comes second
+// goes on. No invocation waits for another, and the sums do not depend on which one goes on.
 // Reads build, built_nodes, built_parents; updates below, places.
 #include "kdtree_build/kd_build.glsl"
 

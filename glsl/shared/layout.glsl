@@ -1492,7 +1492,7 @@ struct KdLevel {
     // Blocks of references, and groups of cells, whose sums are written.
     uint n_summed_blocks;
     uint n_summed_groups;
-    // Which sizes the children of cells have (kdtree_count_cells.comp).
+    // Bits that tell which sizes the cells' children have (kdtree_count_cells.comp).
     uint child_sizes;
     // Workgroups over blocks of references that are counted by bins, over `KD_CHOOSE_BLOCK` references each, over
     // groups of references if there are small cells, over blocks and over groups of references, and over groups of

@@ -207,7 +207,7 @@ fn clipped(piece: Vec<Vec3>, axis: usize, side: f32, position: f32) -> Option<Ve
         if height_b <= 0.0 {
             kept.push(*b);
         }
-        // The kernel replaces the corners that it has read.
+        // The kernel has no room for more, since it overwrites corners that it has read.
         if kept.len() > MAX_CORNERS.min(i + 2) {
             return None;
         }
