@@ -27,18 +27,17 @@ impl Script {
     }
 
     /// Moves the camera to the place of the current frame, unless it was moved there before. The move counts as an
-    /// input of the user.
+    /// input of the user. Until the camera rests, it is in motion, however long a frame takes.
     pub fn direct(&mut self, session: &mut Session) {
-        if std::mem::replace(&mut self.is_placed, true) {
-            return;
-        }
         let now = Instant::now();
-        session.controller.place(self.tour.camera(self.frame_ix));
-        session.pace.note_input(now);
         if self.is_still() {
             session.pace.rest();
         } else {
             session.pace.moved(now);
+        }
+        if !std::mem::replace(&mut self.is_placed, true) {
+            session.controller.place(self.tour.camera(self.frame_ix));
+            session.pace.note_input(now);
         }
     }
 
