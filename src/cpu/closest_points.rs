@@ -48,8 +48,8 @@ impl<S: Simd> QueryColumns<S> {
     #[inline(always)]
     fn near(&self, node: &WideNode, best_squared: f32) -> Entered {
         let simd = self.scale.simd;
-        let [lower, upper] = [0, 3].map(|first| {
-            Vec3x16([0, 1, 2].map(|axis| f32x16::load_array_ref(simd, &node.sides[first + axis]))) * self.scale
+        let [lower, upper] = [0, 1].map(|side| {
+            Vec3x16([0, 1, 2].map(|axis| f32x16::load_array_ref(simd, &node.sides[axis][side]))) * self.scale
         });
         let ([below_x, below_y, below_z], [above_x, above_y, above_z]) =
             ((lower - self.position).0, (self.position - upper).0);

@@ -113,6 +113,8 @@ pub struct WideTraverser<'a> {
 /// A ray that is on its way.
 struct Flight {
     ray: TraversalRay,
+    /// Whether it enters boxes through their upper sides, for each axis.
+    goes_down: [bool; 3],
     best: Hit,
     /// The subtree that it visits next.
     subtree: u32,
@@ -128,10 +130,8 @@ struct RayColumns<S: Simd> {
     bias: [f32x16<S>; 3],
     t_enter: f32x16<S>,
     shears: Shears<S>,
-    /// For each axis, the side through which the ray enters boxes, as an index into [`WideNode::sides`].
-    near_sides: [usize; 3],
-    /// For each axis, the side through which the ray leaves boxes.
-    far_sides: [usize; 3],
+    /// Whether the ray enters boxes through their upper sides, for each axis.
+    goes_down: [bool; 3],
 }
 
 /// Returns the lanes whose interval of t is not empty. An end that is NaN ends no interval: it comes from `min` and
@@ -156,34 +156,33 @@ pub(super) struct Entered {
 
 impl<S: Simd> RayColumns<S> {
     #[inline(always)]
-    fn new(simd: S, ray: &TraversalRay) -> Self {
+    fn new(simd: S, Flight { ray, goes_down, .. }: &Flight) -> Self {
         let [x, y, z, _] = ray.inv_direction;
         let [bias_x, bias_y, bias_z, _] = ray.bias;
-        let goes_down = [x < 0.0, y < 0.0, z < 0.0];
         Self {
             inv_direction: [f32x16::splat(simd, x), f32x16::splat(simd, y), f32x16::splat(simd, z)],
             bias: [f32x16::splat(simd, bias_x), f32x16::splat(simd, bias_y), f32x16::splat(simd, bias_z)],
             t_enter: f32x16::splat(simd, ray.t_enter),
             shears: Shears::splat(simd, &ray.hit_filter.shear),
-            near_sides: [0, 1, 2].map(|axis| if goes_down[axis] { 3 + axis } else { axis }),
-            far_sides: [0, 1, 2].map(|axis| if goes_down[axis] { axis } else { 3 + axis }),
+            goes_down: *goes_down,
         }
     }
 
-    /// Returns the t at which the ray meets a side of each box. `axis`: that of the side.
+    /// Returns the t at which the ray meets the lower or the upper side of each box on an axis.
     #[inline(always)]
-    fn t_at(&self, node: &WideNode, axis: usize, side: usize) -> f32x16<S> {
-        f32x16::load_array_ref(self.t_enter.simd, &node.sides[side]) * self.inv_direction[axis] + self.bias[axis]
+    fn t_at(&self, node: &WideNode, axis: usize, is_upper: bool) -> f32x16<S> {
+        let side = f32x16::load_array_ref(self.t_enter.simd, &node.sides[axis][usize::from(is_upper)]);
+        side * self.inv_direction[axis] + self.bias[axis]
     }
 
     /// Returns the children whose boxes the ray enters no farther than `t_best`. If a product overflows, the t of a
     /// side may be NaN. Then the ray may seem to enter a box that it misses.
     #[inline(always)]
     fn enter(&self, node: &WideNode, t_best: f32) -> Entered {
-        let ([near_x, near_y, near_z], [far_x, far_y, far_z]) = (self.near_sides, self.far_sides);
-        let (x, y, z) = (self.t_at(node, 0, near_x), self.t_at(node, 1, near_y), self.t_at(node, 2, near_z));
+        let [x_down, y_down, z_down] = self.goes_down;
+        let (x, y, z) = (self.t_at(node, 0, x_down), self.t_at(node, 1, y_down), self.t_at(node, 2, z_down));
         let t_enter = x.max(y).max(z.max(self.t_enter));
-        let (x, y, z) = (self.t_at(node, 0, far_x), self.t_at(node, 1, far_y), self.t_at(node, 2, far_z));
+        let (x, y, z) = (self.t_at(node, 0, !x_down), self.t_at(node, 1, !y_down), self.t_at(node, 2, !z_down));
         let t_exit = x.min(y).min(z.min(f32x16::splat(self.t_enter.simd, t_best)));
         Entered { lanes: entered(t_enter, t_exit), t_enter: t_enter.to_array() }
     }
@@ -285,7 +284,10 @@ impl Flight {
         let ray = TraversalRay::new(inputs, &near);
         // The comparison is not `>`, since a NaN has to miss.
         let enters = ray.t_enter <= ray.t_exit;
-        enters.then(|| Self { ray, best: near.miss(), subtree: 0, t_start, t_max: search_ray.t_max })
+        enters.then(|| {
+            let [x, y, z, _] = ray.inv_direction.map(|d| d < 0.0);
+            Self { ray, goes_down: [x, y, z], best: near.miss(), subtree: 0, t_start, t_max: search_ray.t_max }
+        })
     }
 
     /// Visits a node or a block. Returns whether the ray goes on, to `subtree`.
@@ -297,7 +299,7 @@ impl Flight {
         (nodes, blocks): (&[WideNode], &[TriangleBlock]),
         stack: &mut Stack,
     ) -> bool {
-        let columns = RayColumns::new(simd, &self.ray);
+        let columns = RayColumns::new(simd, self);
         let next = if self.subtree & IS_BLOCK != 0 {
             let block = &blocks[(self.subtree & !IS_BLOCK) as usize];
             columns.intersect(inputs, &self.ray.hit_filter, block, &mut self.best);
