@@ -124,7 +124,8 @@ impl<S: Simd> Shears<S> {
     /// the corners' coordinates on each axis.
     #[inline(always)]
     fn corners(&self, corner: &[[f32; LANES]; 3], axis: usize) -> [f32x16<S>; 3] {
-        let (simd, [x, y, z]) = (self.x.simd, axis_last([0, 1, 2], axis));
+        // By arithmetic, since the axis of a single ray cannot be predicted.
+        let (simd, [x, y, z]) = (self.x.simd, [(axis + 1) % 3, (axis + 2) % 3, axis]);
         self.corner([
             f32x16::load_array_ref(simd, &corner[x]),
             f32x16::load_array_ref(simd, &corner[y]),

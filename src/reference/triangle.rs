@@ -42,6 +42,8 @@
 //! less than 3e-14 wide. Then t is between the corners' depths, but anywhere along a needle. In larger sums,
 //! underflow is below 2^-32 of the sum.
 
+use std::hint::select_unpredictable;
+
 use glam::{Mat4, Vec4, Vec4Swizzles};
 
 use crate::layout::{Hit, Triangle};
@@ -81,17 +83,19 @@ pub(crate) fn axis_last<T: Copy>([x, y, z]: [T; 3], axis: usize) -> [T; 3] {
     }
 }
 
+/// Does what [`axis_last`] does, where nothing predicts the axis.
+#[inline(always)]
+fn any_axis_last([x, y, z]: [f32; 3], axis: usize) -> [f32; 3] {
+    let last = |of_x, of_y, of_z| select_unpredictable(axis == 0, of_x, select_unpredictable(axis == 1, of_y, of_z));
+    [last(y, z, x), last(z, x, y), last(x, y, z)]
+}
+
 /// Returns the axis of the component of largest magnitude, the first one of equals. Comparisons with a NaN fail, so
 /// with a NaN it can be a later axis.
 pub fn longest_axis(v: [f32; 3]) -> usize {
     let [x, y, z] = v.map(f32::abs);
-    if x >= y && x >= z {
-        0
-    } else if y >= z {
-        1
-    } else {
-        2
-    }
+    // Nothing predicts the axes of scattered rays, so there are no branches.
+    select_unpredictable((x >= y) & (x >= z), 0, select_unpredictable(y >= z, 1, 2))
 }
 
 impl Shear {
@@ -99,8 +103,8 @@ impl Shear {
     #[inline]
     pub fn of(origin: [f32; 3], direction: [f32; 3]) -> Self {
         let axis = longest_axis(direction);
-        let [x, y, z] = axis_last(direction, axis);
-        Self { origin: axis_last(origin, axis), x: x / z, y: y / z, z: 1.0 / z, axis }
+        let [x, y, z] = any_axis_last(direction, axis);
+        Self { origin: any_axis_last(origin, axis), x: x / z, y: y / z, z: 1.0 / z, axis }
     }
 
     /// Returns the triangle's corners as seen from the ray.
