@@ -255,7 +255,8 @@ fn casts_follow_one_another() {
 #[test]
 fn streams_find_the_hits_of_casts() {
     let limits = DeviceOverrides { loop_limit: Some(100), n_suspension_slots: Some(40), ..Default::default() };
-    for device in [Device::new(), Device(pretended(limits))] {
+    let copies = DeviceOverrides { copies_inputs: true, ..Default::default() };
+    for device in [Device::new(), Device(pretended(limits)), Device(pretended(copies))] {
         let world = MeshWithTree::new(meshes::torus(40, 20));
         let rays = some_rays(&world, 1000, 0.0..=0.0);
         let mut caster = device.caster(&world, Traversal::Mask).with_batches_of(130);

@@ -105,7 +105,7 @@ fn open(selector: DeviceSelector) -> Result<Device, GpuError> {
         return Ok(open.clone());
     }
     let index = DeviceSelector::Index(info.index);
-    let device = Device::open(&ContextOptions::new(Some(index), false))?;
+    let device = Device::open(&ContextOptions { for_streams: true, ..ContextOptions::new(Some(index), false) })?;
     devices.push(device.clone());
     Ok(device)
 }

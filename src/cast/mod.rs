@@ -110,7 +110,7 @@ pub struct GpuCaster {
     rays_per_batch: usize,
     mask: u8,
     /// What chunks of a stream need, made at its first use.
-    lanes: Vec<stream::Lane>,
+    lanes: stream::Lanes,
 }
 
 impl GpuCaster {
@@ -138,7 +138,7 @@ impl GpuCaster {
             any: None,
             point_search: None,
             accel_kind: geometry.accel().kind(),
-            lanes: Vec::new(),
+            lanes: Default::default(),
         })
     }
 

@@ -34,6 +34,11 @@ const RAYS_PER_SUBMISSION: [usize; 2] = [1 << 16, 1 << 18];
 const SUBMISSIONS_PER_STREAM: usize = 4;
 /// The most lanes. Each has at most 12 MiB of rays and 4 MiB of hits.
 const MOST_LANES: usize = 16;
+/// In one of so many lanes, the host writes the rays to the device's memory. In the others, the device copies them from
+/// the host's memory, if it can do so while kernels run. So both ways are in use, each of which alone is slower than
+/// the bus. This is for streams of bare rays and hits: with whole hits, the host's memory is too busy
+/// (docs/experiments.md).
+const LANES_PER_WRITTEN: usize = 4;
 /// Number of rays that the CPU casts at a time.
 const RAYS_PER_CPU_CAST: usize = 1 << 19;
 
@@ -105,6 +110,9 @@ pub(super) struct Lane {
     bound: Option<(AccelBuffers, BindingSet)>,
 }
 
+/// The lanes for streams in which rays or hits are whole, and those for streams in which both are bare.
+pub(super) type Lanes = [Vec<Lane>; 2];
+
 impl GpuCaster {
     /// Casts `n_rays` rays of which only some are in memory at a time. `make` writes the rays from an index on, and
     /// `take` gets their hits: chunks of [`RAYS_PER_CHUNK`], which begin at multiples of this number, and a last one of
@@ -124,12 +132,13 @@ impl GpuCaster {
     ) -> Result<(), GpuError> {
         let kernel = self.prepare_kernel(query)?;
         let n_threads = rayon::current_num_threads();
-        let most = rays_per_submission(n_rays, self.rays_per_batch, R::IS_BARE && H::IS_BARE);
+        let are_bare = R::IS_BARE && H::IS_BARE;
+        let most = rays_per_submission(n_rays, self.rays_per_batch, are_bare);
         let n_lanes = n_rays.div_ceil(most).min(n_threads).min(MOST_LANES);
         let submissions = submissions(n_rays, most, n_lanes);
         // A thread that shares its work while no other one is idle could be made to run the whole of another lane.
         let chunks_per_task = if 2 * n_lanes <= n_threads.max(2) { 1 } else { usize::MAX };
-        let mut lanes = self.lanes(n_lanes, most, [size_of::<R>(), size_of::<H>()])?;
+        let mut lanes = self.lanes(n_lanes, most, [size_of::<R>(), size_of::<H>()], are_bare)?;
         let (next, caster) = (AtomicUsize::new(0), &*self);
         let run = |lane: &mut Lane| {
             while let Some(range) = submissions.get(next.fetch_add(1, Ordering::Relaxed)) {
@@ -147,7 +156,7 @@ impl GpuCaster {
         };
         lanes[..n_lanes].par_iter_mut().with_max_len(1).try_for_each(run)?;
         // A lane whose wait has failed is not used again, since the device may still read its memory.
-        self.lanes = lanes;
+        self.lanes[usize::from(are_bare)] = lanes;
         Ok(())
     }
 
@@ -170,15 +179,16 @@ impl GpuCaster {
 
     /// Takes the lanes, each with room for `len` rays and hits of these sizes in bytes. At least the first `n` are
     /// bound.
-    fn lanes(&mut self, n: usize, len: usize, sizes: [usize; 2]) -> Result<Vec<Lane>, GpuError> {
-        let mut lanes = mem::take(&mut self.lanes);
+    fn lanes(&mut self, n: usize, len: usize, sizes: [usize; 2], are_bare: bool) -> Result<Vec<Lane>, GpuError> {
+        let mut lanes = mem::take(&mut self.lanes[usize::from(are_bare)]);
         let room = len.next_power_of_two().min(most_rays(self.context.limits()));
-        // Lanes that were too small for one kind of stream have room for the other kind, too.
+        // Lanes that were too small for whole rays have room for whole hits, too.
         let before = lanes.first().map_or([0; 2], |lane| lane.exchange.bytes());
         lanes.retain(|lane| array::from_fn(|ix| lane.exchange.bytes()[ix] >= len * sizes[ix]) == [true; 2]);
         let bytes = array::from_fn(|ix| (room * sizes[ix]).max(before[ix]));
         while lanes.len() < n {
-            let exchange = Exchange::new(&self.context, ["stream_rays", "stream_hits"], bytes)?;
+            let by_copies = are_bare && !lanes.len().is_multiple_of(LANES_PER_WRITTEN);
+            let exchange = Exchange::new(&self.context, ["stream_rays", "stream_hits"], bytes, by_copies)?;
             lanes.push(Lane { exchange, bound: None });
         }
         for lane in lanes[..n].iter_mut().filter(|lane| lane.bound.is_none()) {
@@ -191,7 +201,7 @@ impl GpuCaster {
 
     /// Lets go of the structure. The lanes' memory stays: to map it takes longer than many casts.
     pub(super) fn unbind_lanes(&mut self) {
-        self.lanes.iter_mut().for_each(|lane| lane.bound = None);
+        self.lanes.iter_mut().flatten().for_each(|lane| lane.bound = None);
     }
 }
 

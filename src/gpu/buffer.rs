@@ -23,6 +23,8 @@ const ROW_BYTES: u64 = 16;
 pub enum BufferUse {
     /// A bound storage buffer.
     Storage,
+    /// A bound storage buffer that the queue for copies writes.
+    Input,
     /// A bound uniform buffer.
     Uniform,
     /// A bound storage buffer that also holds workgroup counts of indirect dispatches.
@@ -254,7 +256,7 @@ impl<T: Pod> Buffer<T> {
 impl BufferUse {
     fn flags(self) -> vk::BufferUsageFlags {
         let own = match self {
-            Self::Storage => vk::BufferUsageFlags::STORAGE_BUFFER,
+            Self::Storage | Self::Input => vk::BufferUsageFlags::STORAGE_BUFFER,
             Self::Uniform => vk::BufferUsageFlags::UNIFORM_BUFFER,
             Self::Indirect => vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::INDIRECT_BUFFER,
             Self::Index => vk::BufferUsageFlags::INDEX_BUFFER,
@@ -278,34 +280,42 @@ impl BufferUse {
 
 impl AnyBuffer {
     /// Does the work of [`Buffer::new`]. `texel_bytes`: the size of a texel, if the use includes texels.
-    fn on_device(
+    pub(super) fn on_device(
         context: &Arc<Context>,
         name: &str,
         bytes: u64,
         usage: BufferUse,
         texel_bytes: u64,
     ) -> Result<Self, GpuError> {
-        let is_bound = matches!(usage, BufferUse::Storage | BufferUse::Uniform | BufferUse::Indirect);
+        let is_bound =
+            matches!(usage, BufferUse::Storage | BufferUse::Input | BufferUse::Uniform | BufferUse::Indirect);
         let limit = if is_bound { context.limits().storage_range } else { context.limits().buffer_bytes };
         if bytes > limit {
             return Err(GpuError::TooLarge { object: name.to_owned(), bytes, limit });
         }
-        let mut buffer = Self::new(&context.device, name, bytes, usage.flags(), MemoryLocation::GpuOnly)?;
+        let device = &context.device;
+        let sharing = device.copy_family.filter(|_| usage == BufferUse::Input).map(|copies| [device.family, copies]);
+        let mut buffer = Self::new(device, name, bytes, usage.flags(), sharing, MemoryLocation::GpuOnly)?;
         if matches!(usage, BufferUse::Texels | BufferUse::Address) {
             buffer.add_texels(texel_bytes)?;
         }
         Ok(buffer)
     }
 
+    /// `sharing`: the families whose queues use the buffer, if they are two.
     fn new(
         device: &Arc<RawDevice>,
         name: &str,
         bytes: u64,
         usage: vk::BufferUsageFlags,
+        sharing: Option<[u32; 2]>,
         location: MemoryLocation,
     ) -> Result<Self, GpuError> {
         device.count_creation("vkCreateBuffer", name)?;
-        let info = vk::BufferCreateInfo::default().size(bytes).usage(usage);
+        let mut info = vk::BufferCreateInfo::default().size(bytes).usage(usage);
+        if let Some(families) = &sharing {
+            info = info.sharing_mode(vk::SharingMode::CONCURRENT).queue_family_indices(families);
+        }
         // SAFETY: the raw buffer is destroyed on every path that does not hand it to an owner.
         unsafe {
             let raw = device.raw.create_buffer(&info, None).map_err(GpuError::call("vkCreateBuffer", name))?;
@@ -414,7 +424,7 @@ impl Staging {
         let usage = vk::BufferUsageFlags::STORAGE_BUFFER
             | vk::BufferUsageFlags::TRANSFER_SRC
             | vk::BufferUsageFlags::TRANSFER_DST;
-        let buffer = AnyBuffer::new(&context.device, &format!("{name} staging"), bytes, usage, location)?;
+        let buffer = AnyBuffer::new(&context.device, &format!("{name} staging"), bytes, usage, None, location)?;
         let mapped = buffer.allocation.mapped_ptr().expect("host-visible memory stays mapped").cast();
         Ok(Self { buffer: Arc::new(buffer), mapped })
     }

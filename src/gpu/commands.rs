@@ -90,16 +90,28 @@ impl CommandBuffer {
         timer: Option<&Timer>,
         body: impl FnOnce(&Commands),
     ) -> Result<Self, GpuError> {
+        Self::record_for(context.device.family, context, name, timer, body)
+    }
+
+    /// Does what [`CommandBuffer::record`] does for the queues of a family.
+    pub(super) fn record_for(
+        family: u32,
+        context: &Arc<Context>,
+        name: &str,
+        timer: Option<&Timer>,
+        body: impl FnOnce(&Commands),
+    ) -> Result<Self, GpuError> {
         let mut body = Some(body);
-        Self::record_once(context, name, timer, &mut |commands| {
+        Self::record_once(family, context, name, timer, &mut |commands| {
             if let Some(body) = body.take() {
                 body(commands);
             }
         })
     }
 
-    /// Does what [`CommandBuffer::record`] does. Its many callers would each get a copy of this code.
+    /// Does what [`CommandBuffer::record_for`] does. Its many callers would each get a copy of this code.
     fn record_once(
+        family: u32,
         context: &Arc<Context>,
         name: &str,
         timer: Option<&Timer>,
@@ -107,7 +119,7 @@ impl CommandBuffer {
     ) -> Result<Self, GpuError> {
         let device = &context.device;
         device.count_creation("vkAllocateCommandBuffers", name)?;
-        let pool = device.take_pool(name)?;
+        let pool = device.take_pool(name, family)?;
         let mut buffer = Self { pool, name: name.to_owned(), _kept: Vec::new(), device: Arc::clone(device) };
         let raw = pool.buffer;
         device.set_name(raw, name);

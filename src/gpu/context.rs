@@ -7,7 +7,7 @@ use ash::vk;
 use super::{
     CommandBuffer, Commands, DeviceInfo, DeviceOverrides, DeviceSelector, ExternalDevice, GpuError, Limits, Submission,
     TimelinePoint,
-    devices::{list, queue_family, select},
+    devices::{copy_family, list, queue_family, select},
     extras::{DeviceExtras, Purpose},
     instance::Instance,
     pipeline::Made,
@@ -25,6 +25,10 @@ pub struct ContextOptions {
     /// Whether the Khronos validation layer runs, with synchronization validation. Commands then have no debug
     /// labels.
     pub validate: bool,
+    /// Whether a GPU with memory of its own is opened with a second queue, for copies. Streams of bare rays and hits
+    /// ([`GpuCaster::cast_stream`](crate::cast::GpuCaster::cast_stream)) are a fifth faster with it, and some shorter
+    /// casts slower (docs/experiments.md).
+    pub for_streams: bool,
     /// Properties that tests substitute for the device's own.
     #[doc(hidden)]
     pub overrides: DeviceOverrides,
@@ -34,7 +38,7 @@ impl ContextOptions {
     /// Returns options for the selected device, or for the best one if `device` is `None`. `validate` turns the
     /// validation layer on.
     pub fn new(device: Option<DeviceSelector>, validate: bool) -> Self {
-        Self { device, validate, overrides: DeviceOverrides::default() }
+        Self { device, validate, ..Self::default() }
     }
 }
 
@@ -42,6 +46,8 @@ impl ContextOptions {
 pub struct Context {
     pub(super) device: Arc<RawDevice>,
     pub(super) queue: Queue,
+    /// The queue for copies that run while kernels do.
+    copies: Option<Queue>,
     predicates_branches: bool,
     fuses_fma: OnceLock<bool>,
     n_lanes: OnceLock<u32>,
@@ -59,7 +65,8 @@ impl Context {
     pub(super) fn new(options: &ContextOptions) -> Result<Arc<Self>, GpuError> {
         let instance = Instance::new(options.validate)?;
         let (physical, info) = select(&instance, options.device.as_ref(), |_| true)?;
-        Self::open(instance, physical, info, Purpose::Compute, &options.overrides)
+        let purpose = if options.for_streams { Purpose::Streams } else { Purpose::Compute };
+        Self::open(instance, physical, info, purpose, &options.overrides)
     }
 
     /// Opens a device and makes the surface of a window, in which the context can show pictures.
@@ -100,19 +107,23 @@ impl Context {
     ) -> Result<Arc<Self>, GpuError> {
         // SAFETY: the physical device belongs to the instance.
         let families = unsafe { instance.raw.get_physical_device_queue_family_properties(physical) };
-        let family = queue_family(&families).expect("`select` refuses a device without such a queue");
+        let family = queue_family(&families).expect("`select` refuses a device without such a queue") as u32;
+        let copies = purpose == Purpose::Streams && info.kind == "discrete GPU";
+        let copy_family = copy_family(&families).filter(|_| copies).map(|family| family as u32);
         let extras = DeviceExtras::of(&instance, physical, purpose)
             .map_err(GpuError::call("vkEnumerateDeviceExtensionProperties", &info.name))?
             .with_bounds_checks(overrides.bounds_checks);
         let device = extras
-            .create_device(&instance, physical, family as u32)
+            .create_device(&instance, physical, &[family].into_iter().chain(copy_family).collect::<Vec<_>>())
             .map_err(GpuError::call("vkCreateDevice", &info.name))?;
         // SAFETY: the device was created with one queue of this family.
-        let queue = unsafe { device.get_device_queue(family as u32, 0) };
-        let opened = Opened { physical, device, family: family as u32, info, extras, is_external: false };
+        let queue_of = |family| unsafe { device.get_device_queue(family, 0) };
+        let (queue, copies) = (queue_of(family), copy_family.map(queue_of));
+        let opened = Opened { physical, device, family, copy_family, info, extras, is_external: false };
         let device = RawDevice::new(instance, opened, purpose, overrides)?;
-        let queue = Queue::new(Arc::clone(&device), queue, None);
-        Ok(Self::with_device(device, queue, overrides))
+        let queue_of = |raw| Queue::new(Arc::clone(&device), raw, None);
+        let (queue, copies) = (queue_of(queue), copies.map(queue_of));
+        Ok(Self::with_device(device, queue, copies, overrides))
     }
 
     /// Opens a context on the caller's device.
@@ -132,16 +143,22 @@ impl Context {
             physical,
             device: external.device,
             family: external.queue_family,
+            copy_family: None,
             info,
             extras: DeviceExtras::of_external(external.int64_atomics),
             is_external: true,
         };
         let device = RawDevice::new(instance, opened, Purpose::Compute, overrides)?;
         let queue = Queue::new(Arc::clone(&device), external.queue, Some(external.queue_lock));
-        Ok(Self::with_device(device, queue, overrides))
+        Ok(Self::with_device(device, queue, None, overrides))
     }
 
-    fn with_device(device: Arc<RawDevice>, queue: Queue, overrides: &DeviceOverrides) -> Arc<Self> {
+    fn with_device(
+        device: Arc<RawDevice>,
+        queue: Queue,
+        copies: Option<Queue>,
+        overrides: &DeviceOverrides,
+    ) -> Arc<Self> {
         Arc::new(Self {
             predicates_branches: device.info.is_software() && overrides.n_lanes.is_none(),
             fuses_fma: OnceLock::new(),
@@ -150,6 +167,7 @@ impl Context {
             pipelines: Mutex::default(),
             device,
             queue,
+            copies,
         })
     }
 
@@ -238,7 +256,7 @@ impl Context {
 
     /// Whether a call has found the device lost, by any handle of it. All later work fails then.
     pub fn is_lost(&self) -> bool {
-        self.queue.is_lost()
+        self.queue.is_lost() || self.copies.as_ref().is_some_and(Queue::is_lost)
     }
 
     /// Returns the greatest number of submissions that the device had at once, by all threads.
@@ -256,16 +274,28 @@ impl Context {
         self.wait_for(self.submit(vec![buffer])?)
     }
 
+    /// Whether copies to the device's memory run while kernels do, by [`Context::run_copies`].
+    pub(super) fn copies_beside_kernels(&self) -> bool {
+        self.copies.is_some() || self.device.overrides.copies_inputs
+    }
+
+    /// Does what [`Context::run`] does for copies, on the queue for copies if there is one. Commands that are submitted
+    /// later see what was written after a barrier, as if the copies had been submitted to the same queue.
+    ///
+    /// # Errors
+    /// Fails as [`Context::run`] does.
+    pub(super) fn run_copies(self: &Arc<Self>, name: &str, record: impl FnOnce(&Commands)) -> Result<(), GpuError> {
+        let queue = self.copies.as_ref().unwrap_or(&self.queue);
+        let family = self.device.copy_family.unwrap_or(self.device.family);
+        let buffer = CommandBuffer::record_for(family, self, name, None, record)?;
+        queue.wait_for(submit_to(queue, vec![buffer])?)
+    }
+
     /// Submits command buffers in order. Each is in a `VkSubmitInfo2` of its own, because a driver's watchdog times
     /// each of these separately. One `vkQueueSubmit2` takes all of them, because a call for each would cost 6 us per
     /// command buffer on an H200. If the call fails, no command buffer has begun.
     pub fn submit(&self, buffers: Vec<CommandBuffer>) -> Result<Submission, GpuError> {
-        let infos: Vec<_> = (buffers.iter())
-            .map(|buffer| [vk::CommandBufferSubmitInfo::default().command_buffer(buffer.raw())])
-            .collect();
-        let submit_infos: Vec<_> =
-            infos.iter().map(|info| vk::SubmitInfo2::default().command_buffer_infos(info)).collect();
-        self.queue.submit(&submit_infos, buffers)
+        submit_to(&self.queue, buffers)
     }
 
     /// Submits a command buffer of copies. The copies wait for the point `after` and signal the point `then`.
@@ -309,6 +339,14 @@ impl Context {
     pub fn wait_for_all(&self) -> Result<(), GpuError> {
         self.queue.wait_for_all()
     }
+}
+
+/// Submits command buffers to a queue, each in a `VkSubmitInfo2` of its own.
+fn submit_to(queue: &Queue, buffers: Vec<CommandBuffer>) -> Result<Submission, GpuError> {
+    let infos: Vec<_> =
+        (buffers.iter()).map(|buffer| [vk::CommandBufferSubmitInfo::default().command_buffer(buffer.raw())]).collect();
+    let submit_infos: Vec<_> = infos.iter().map(|info| vk::SubmitInfo2::default().command_buffer_infos(info)).collect();
+    queue.submit(&submit_infos, buffers)
 }
 
 /// Returns the property, which `probe` finds out at the first call.

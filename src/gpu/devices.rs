@@ -259,6 +259,13 @@ fn missing(
     needs.iter().filter(|(has, _)| !has).map(|(_, name)| (*name).to_owned()).collect()
 }
 
+/// Returns the first family for copies alone. On GPUs with memory of their own, its queues are engines that copy while
+/// kernels run.
+pub(super) fn copy_family(families: &[vk::QueueFamilyProperties]) -> Option<usize> {
+    let other = vk::QueueFlags::SPARSE_BINDING | vk::QueueFlags::PROTECTED;
+    families.iter().position(|family| family.queue_flags & !other == vk::QueueFlags::TRANSFER)
+}
+
 /// Returns the first family that supports graphics and compute.
 pub(super) fn queue_family(families: &[vk::QueueFamilyProperties]) -> Option<usize> {
     let both = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;

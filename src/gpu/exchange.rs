@@ -5,26 +5,37 @@ use std::{slice, sync::Arc};
 use bytemuck::Pod;
 use gpu_allocator::MemoryLocation;
 
-use super::{Access, Binding, Commands, Context, GpuError, buffer::Staging};
+use super::{Access, AnyBuffer, Binding, BufferUse, Commands, Context, GpuError, buffer::Staging};
 
 /// Mapped memory of inputs of a kernel, and of its outputs. A run ends before the host sees the memory again.
 pub struct Exchange {
     inputs: Staging,
+    /// Number of bytes of the inputs that the host may have written.
+    filled: u64,
+    /// The device's copy of the inputs, if kernels do not read the mapped memory itself.
+    copy: Option<Arc<AnyBuffer>>,
     outputs: Staging,
     context: Arc<Context>,
 }
 
 impl Exchange {
-    /// Creates memory with undefined contents. `names` and `bytes`: of the inputs and of the outputs.
+    /// Creates memory with undefined contents. `names` and `bytes`: of the inputs and of the outputs. `by_copies`:
+    /// whether a queue for copies takes the inputs to the device, if there is one. Otherwise the host or the kernel
+    /// does.
     ///
     /// # Errors
     /// A buffer exceeds the device's limits, or memory is exhausted.
-    pub fn new(context: &Arc<Context>, names: [&str; 2], bytes: [usize; 2]) -> Result<Self, GpuError> {
-        // The host only writes inputs, in order, so their memory may be write-combined. On devices whose whole memory
-        // is mapped, it is the device's own. The host reads outputs, so their memory has to be cached.
-        let inputs = mapped(context, names[0], bytes[0], MemoryLocation::CpuToGpu)?;
+    pub fn new(context: &Arc<Context>, names: [&str; 2], bytes: [usize; 2], by_copies: bool) -> Result<Self, GpuError> {
+        // The host only writes inputs, in order, so that without copies their memory may be write-combined. On devices
+        // whose whole memory is mapped, it is the device's own. The host reads outputs, so their memory has to be
+        // cached.
+        let is_copied = by_copies && context.copies_beside_kernels();
+        let location = if is_copied { MemoryLocation::GpuToCpu } else { MemoryLocation::CpuToGpu };
+        let inputs = mapped(context, names[0], bytes[0], location)?;
+        let copy = || AnyBuffer::on_device(context, names[0], inputs.buffer().bytes(), BufferUse::Input, 4);
+        let copy = is_copied.then(copy).transpose()?.map(Arc::new);
         let outputs = mapped(context, names[1], bytes[1], MemoryLocation::GpuToCpu)?;
-        Ok(Self { inputs, outputs, context: Arc::clone(context) })
+        Ok(Self { inputs, filled: 0, copy, outputs, context: Arc::clone(context) })
     }
 
     /// Returns the bytes of the memory of inputs, and of that of outputs.
@@ -35,7 +46,7 @@ impl Exchange {
     /// Returns the storage buffers that kernels read inputs from and write outputs to. Only the commands of a run, and
     /// those that its `finish` waits for, may use them.
     pub(crate) fn bindings(&self) -> [Binding<'_>; 2] {
-        [Binding::Buffer(self.inputs.buffer()), Binding::Buffer(self.outputs.buffer())]
+        [Binding::Buffer(self.copy.as_ref().unwrap_or(self.inputs.buffer())), Binding::Buffer(self.outputs.buffer())]
     }
 
     /// Returns the memory of the first `n` inputs. To read it is slow, and so is any order of writing but the elements'
@@ -45,6 +56,7 @@ impl Exchange {
     /// There is room for fewer.
     pub fn inputs<I: Pod>(&mut self, n: usize) -> &mut [I] {
         let at = first::<I>(&self.inputs, n);
+        self.filled = (n * size_of::<I>()) as u64;
         // SAFETY: the memory holds `n` elements, which any bytes are, and stays mapped as long as its owner. The host
         // accesses it through this borrow alone. A device that still reads it, because a wait has failed, at most
         // computes outputs that nobody gets.
@@ -67,7 +79,14 @@ impl Exchange {
     ) -> Result<&[O], GpuError> {
         let outputs = first::<O>(&self.outputs, n);
         // The host's writes before a submission need no barrier.
+        if let Some(copy) = self.copy.as_ref().filter(|_| self.filled > 0) {
+            self.context
+                .run_copies("inputs", |commands| commands.copy_buffer(self.inputs.buffer(), copy, self.filled))?;
+        }
         self.context.run("exchange", |commands| {
+            if self.copy.is_some() {
+                commands.barrier(Access::TransferWrite, Access::AnyUse); // inputs
+            }
             record(commands);
             commands.barrier(Access::ComputeWrite, Access::HostRead); // outputs
         })?;
@@ -103,14 +122,27 @@ fn mapped(context: &Arc<Context>, name: &str, bytes: usize, location: MemoryLoca
 
 #[cfg(test)]
 mod tests {
-    use super::{super::ContextOptions, *};
+    use super::{
+        super::{ContextOptions, DeviceOverrides},
+        *,
+    };
 
     /// What stands for a kernel copies inputs to outputs.
     #[test]
     fn outputs_are_those_of_the_last_commands() {
-        let context = Context::new(&ContextOptions::new(None, true)).expect("a device with validation");
-        let mut exchange = Exchange::new(&context, ["in", "out"], [400, 400]).expect("buffers");
-        let [inputs, outputs] = [&exchange.inputs, &exchange.outputs].map(|it| it.buffer().clone());
+        for by_copies in [false, true] {
+            outputs_follow_inputs(by_copies);
+        }
+    }
+
+    fn outputs_follow_inputs(by_copies: bool) {
+        let overrides = DeviceOverrides { copies_inputs: true, ..Default::default() };
+        let options = ContextOptions { overrides, ..ContextOptions::new(None, true) };
+        let context = Context::new(&options).expect("a device with validation");
+        let mut exchange = Exchange::new(&context, ["in", "out"], [400, 400], by_copies).expect("buffers");
+        assert_eq!(exchange.copy.is_some(), by_copies);
+        let inputs = exchange.copy.as_ref().unwrap_or(exchange.inputs.buffer()).clone();
+        let outputs = exchange.outputs.buffer().clone();
         let fence = |commands: &Commands| commands.barrier(Access::TransferWrite, Access::AnyUse);
         for n in [100, 3, 0, 50] {
             let expected: Vec<u32> = (0..n as u32).map(|ix| ix ^ n as u32).collect();

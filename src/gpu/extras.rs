@@ -13,6 +13,8 @@ use super::{
 pub(super) enum Purpose {
     /// The device computes pictures and other results in memory.
     Compute,
+    /// The device also copies while kernels run.
+    Streams,
     /// The device also runs the driver's own ray tracing, for comparison.
     RayTracing,
     /// The device also shows pictures in a window.
@@ -70,23 +72,26 @@ impl DeviceExtras {
         names.extend(self.statistics.then_some(StatisticsCalls::EXTENSION));
         names.extend(self.unchecked.then_some(robustness::EXTENSION));
         match self.purpose {
-            Purpose::Compute => {}
+            Purpose::Compute | Purpose::Streams => {}
             Purpose::RayTracing => names.extend(RayTracingCalls::EXTENSIONS),
             Purpose::Window => names.push(khr::swapchain::NAME),
         }
         names.into_iter().map(CStr::as_ptr).collect()
     }
 
-    /// Creates a device with one queue of the family.
+    /// Creates a device with one queue of each family.
     pub fn create_device(
         self,
         instance: &Instance,
         physical: vk::PhysicalDevice,
-        family: u32,
+        families: &[u32],
     ) -> VkResult<ash::Device> {
         let extensions = self.extensions();
         let priorities = [1.0];
-        let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&priorities)];
+        let queue = |family: &u32| {
+            vk::DeviceQueueCreateInfo::default().queue_family_index(*family).queue_priorities(&priorities)
+        };
+        let queues: Vec<_> = families.iter().map(queue).collect();
         let RequiredFeatures { of_1_0, mut of_1_2, mut of_1_3 } = RequiredFeatures::new(self.int64_atomics);
         // Every device has this feature.
         let of_1_0 = of_1_0.robust_buffer_access(self.bounds_checks);

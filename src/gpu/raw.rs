@@ -24,7 +24,7 @@ impl Context {
     /// # Errors
     /// Memory is exhausted.
     pub(crate) fn with_queue<T>(&self, submit: impl FnOnce(vk::Queue, vk::CommandPool) -> T) -> Result<T, GpuError> {
-        let pool = self.device.take_pool("overlay")?;
+        let pool = self.device.take_pool("overlay", self.device.family)?;
         let result = self.queue.with_raw(|queue| submit(queue, pool.raw));
         // SAFETY: the caller guarantees it.
         unsafe { self.device.give_pool(pool) };

@@ -48,8 +48,10 @@ pub(super) struct RawDevice {
     pub presentation: Option<khr::swapchain::Device>,
     #[cfg(feature = "view")]
     pub physical: vk::PhysicalDevice,
-    /// Index of the queue's family, of which command pools are made.
+    /// Index of the queue's family.
     pub family: u32,
+    /// Index of the family of the queue for copies, if the device was opened with one.
+    pub copy_family: Option<u32>,
     /// Command pools that are not in use, with a command buffer each.
     pub pools: Mutex<Vec<CommandPool>>,
     /// Shared with the overlay's renderer, which is dropped before the device.
@@ -70,6 +72,8 @@ pub(super) struct RawDevice {
 pub(super) struct CommandPool {
     pub raw: vk::CommandPool,
     pub buffer: vk::CommandBuffer,
+    /// Index of the family to whose queues the buffer is submitted.
+    pub family: u32,
 }
 
 /// Handles and properties of an open device.
@@ -77,6 +81,7 @@ pub(super) struct Opened {
     pub physical: vk::PhysicalDevice,
     pub device: ash::Device,
     pub family: u32,
+    pub copy_family: Option<u32>,
     pub info: DeviceInfo,
     pub extras: DeviceExtras,
     pub is_external: bool,
@@ -89,7 +94,7 @@ impl RawDevice {
         purpose: Purpose,
         overrides: &DeviceOverrides,
     ) -> Result<Arc<Self>, GpuError> {
-        let Opened { physical, device, family, info, extras, is_external } = opened;
+        let Opened { physical, device, family, copy_family, info, extras, is_external } = opened;
         // SAFETY: the physical device belongs to the instance, and the device to the physical device.
         let (families, properties, pipeline_cache) = unsafe {
             (
@@ -112,6 +117,7 @@ impl RawDevice {
             #[cfg(feature = "view")]
             physical,
             family,
+            copy_family,
             pipeline_cache,
             layouts: Mutex::default(),
             pools: Mutex::default(),
@@ -129,20 +135,22 @@ impl RawDevice {
         }))
     }
 
-    /// Takes a command pool that is not in use, or makes one.
-    pub fn take_pool(&self, name: &str) -> Result<CommandPool, GpuError> {
-        if let Some(pool) = lock(Rank::Pools, &self.pools)?.pop() {
-            return Ok(pool);
+    /// Takes a command pool of a queue family that is not in use, or makes one.
+    pub fn take_pool(&self, name: &str, family: u32) -> Result<CommandPool, GpuError> {
+        let mut pools = lock(Rank::Pools, &self.pools)?;
+        if let Some(place) = pools.iter().rposition(|pool| pool.family == family) {
+            return Ok(pools.swap_remove(place));
         }
+        drop(pools);
         let info = vk::CommandPoolCreateInfo::default()
-            .queue_family_index(self.family)
+            .queue_family_index(family)
             .flags(vk::CommandPoolCreateFlags::TRANSIENT);
         // SAFETY: the pool is destroyed on every path that does not hand it to an owner.
         unsafe {
             let raw = self.raw.create_command_pool(&info, None).map_err(GpuError::call("vkCreateCommandPool", name))?;
             let info = vk::CommandBufferAllocateInfo::default().command_pool(raw).command_buffer_count(1);
             match self.raw.allocate_command_buffers(&info) {
-                Ok(buffers) => Ok(CommandPool { raw, buffer: buffers[0] }),
+                Ok(buffers) => Ok(CommandPool { raw, buffer: buffers[0], family }),
                 Err(result) => {
                     self.raw.destroy_command_pool(raw, None);
                     Err(GpuError::call("vkAllocateCommandBuffers", name)(result))
