@@ -83,7 +83,7 @@ pub(crate) fn axis_last<T: Copy>([x, y, z]: [T; 3], axis: usize) -> [T; 3] {
     }
 }
 
-/// Does what [`axis_last`] does, where nothing predicts the axis.
+/// Does what [`axis_last`] does, for an axis that branches would mispredict.
 #[inline(always)]
 fn any_axis_last([x, y, z]: [f32; 3], axis: usize) -> [f32; 3] {
     let last = |of_x, of_y, of_z| select_unpredictable(axis == 0, of_x, select_unpredictable(axis == 1, of_y, of_z));
