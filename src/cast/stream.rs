@@ -32,7 +32,7 @@ const RAYS_PER_SUBMISSION: [usize; 2] = [1 << 16, 1 << 18];
 /// A stream is divided into this number of submissions, if their size stays within the bounds. While the device casts
 /// the rays of one, the host makes those of the next.
 const SUBMISSIONS_PER_STREAM: usize = 4;
-/// The most lanes. Each has at most 12 MiB of rays and 4 MiB of hits.
+/// The most lanes. Each has at most 12 MiB of mapped memory, or 14 MiB if rays and hits are bare.
 const MOST_LANES: usize = 16;
 /// In one of so many lanes, the host writes the rays to the device's memory. In the others, the device copies them from
 /// the host's memory, if it can do so while kernels run. So both ways are in use, each of which alone is slower than
@@ -187,7 +187,8 @@ impl GpuCaster {
         lanes.retain(|lane| array::from_fn(|ix| lane.exchange.bytes()[ix] >= len * sizes[ix]) == [true; 2]);
         let bytes = array::from_fn(|ix| (room * sizes[ix]).max(before[ix]));
         while lanes.len() < n {
-            let by_copies = are_bare && !lanes.len().is_multiple_of(LANES_PER_WRITTEN);
+            let is_written = lanes.len().is_multiple_of(LANES_PER_WRITTEN) && !self.context.overrides().copies_inputs;
+            let by_copies = are_bare && !is_written;
             let exchange = Exchange::new(&self.context, ["stream_rays", "stream_hits"], bytes, by_copies)?;
             lanes.push(Lane { exchange, bound: None });
         }

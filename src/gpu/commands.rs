@@ -32,6 +32,8 @@ pub struct Commands<'a> {
     pub(super) raw: vk::CommandBuffer,
     pub(super) device: &'a RawDevice,
     timer: Option<&'a Timer>,
+    /// Whether the commands get debug labels. Queues that only copy do not know them.
+    has_labels: bool,
     /// Whether a pass has been recorded. The timer needs to know the first pass of a command buffer.
     has_passes: Cell<bool>,
     /// What the commands use.
@@ -130,7 +132,8 @@ impl CommandBuffer {
                 .map_err(GpuError::call("vkResetCommandPool", name))?;
             device.raw.begin_command_buffer(raw, &begin).map_err(GpuError::call("vkBeginCommandBuffer", name))?;
         }
-        let commands = Commands { timer, ..Commands::new(device, raw) };
+        let has_labels = device.has_labels && family == device.family;
+        let commands = Commands { timer, has_labels, ..Commands::new(device, raw) };
         commands.labelled(name, || body(&commands));
         buffer._kept = commands.kept.into_inner();
         // SAFETY: the buffer is being recorded.
@@ -157,7 +160,8 @@ impl Drop for CommandBuffer {
 
 impl<'a> Commands<'a> {
     fn new(device: &'a RawDevice, raw: vk::CommandBuffer) -> Self {
-        Self { raw, device, timer: None, has_passes: Cell::new(false), kept: RefCell::default() }
+        let (has_labels, has_passes, kept) = (device.has_labels, Cell::new(false), RefCell::default());
+        Self { raw, device, timer: None, has_labels, has_passes, kept }
     }
 
     /// Wraps a command buffer that the caller records and submits. Its passes are not timed, and its caller keeps what
@@ -209,7 +213,7 @@ impl Commands<'_> {
     }
 
     fn debug_utils(&self) -> Option<&ash::ext::debug_utils::Device> {
-        self.device.debug_utils.as_ref().filter(|_| self.device.has_labels)
+        self.device.debug_utils.as_ref().filter(|_| self.has_labels)
     }
 
     /// Resets the timer, if there is one: its rows are then those of the passes that follow.

@@ -1,12 +1,12 @@
-//! The context: an open Vulkan device with its queue, its memory and its limits.
+//! The context: an open Vulkan device with its queues, its memory and its limits.
 
 use std::sync::{Arc, Mutex, OnceLock};
 
 use ash::vk;
 
 use super::{
-    CommandBuffer, Commands, DeviceInfo, DeviceOverrides, DeviceSelector, ExternalDevice, GpuError, Limits, Submission,
-    TimelinePoint,
+    AnyBuffer, CommandBuffer, Commands, DeviceInfo, DeviceOverrides, DeviceSelector, ExternalDevice, GpuError, Limits,
+    Submission, TimelinePoint,
     devices::{copy_family, list, queue_family, select},
     extras::{DeviceExtras, Purpose},
     instance::Instance,
@@ -25,9 +25,9 @@ pub struct ContextOptions {
     /// Whether the Khronos validation layer runs, with synchronization validation. Commands then have no debug
     /// labels.
     pub validate: bool,
-    /// Whether a GPU with memory of its own is opened with a second queue, for copies. Streams of bare rays and hits
-    /// ([`GpuCaster::cast_stream`](crate::cast::GpuCaster::cast_stream)) are a fifth faster with it, and some shorter
-    /// casts slower (docs/experiments.md).
+    /// Whether a discrete GPU that has a queue for copies alone is opened with it, too. Streams of bare rays and hits
+    /// ([`GpuCaster::cast_stream`](crate::cast::GpuCaster::cast_stream)) are up to a fifth faster with it, and some
+    /// shorter casts slower (docs/experiments.md).
     pub for_streams: bool,
     /// Properties that tests substitute for the device's own.
     #[doc(hidden)]
@@ -42,11 +42,11 @@ impl ContextOptions {
     }
 }
 
-/// A Vulkan device with one queue for graphics and compute. All threads may use it at once.
+/// A Vulkan device with a queue for graphics and compute. All threads may use it at once.
 pub struct Context {
     pub(super) device: Arc<RawDevice>,
     pub(super) queue: Queue,
-    /// The queue for copies that run while kernels do.
+    /// The queue for copies that run while kernels do, if the device was opened for streams and has one.
     copies: Option<Queue>,
     predicates_branches: bool,
     fuses_fma: OnceLock<bool>,
@@ -256,7 +256,7 @@ impl Context {
 
     /// Whether a call has found the device lost, by any handle of it. All later work fails then.
     pub fn is_lost(&self) -> bool {
-        self.queue.is_lost() || self.copies.as_ref().is_some_and(Queue::is_lost)
+        self.queue.is_lost()
     }
 
     /// Returns the greatest number of submissions that the device had at once, by all threads.
@@ -274,20 +274,27 @@ impl Context {
         self.wait_for(self.submit(vec![buffer])?)
     }
 
-    /// Whether copies to the device's memory run while kernels do, by [`Context::run_copies`].
-    pub(super) fn copies_beside_kernels(&self) -> bool {
+    /// Whether [`Context::copy_to_input`] is for the inputs of streams: copies run while kernels do, or a test demands
+    /// it.
+    pub(super) fn copies_inputs(&self) -> bool {
         self.copies.is_some() || self.device.overrides.copies_inputs
     }
 
-    /// Does what [`Context::run`] does for copies, on the queue for copies if there is one. Commands that are submitted
-    /// later see what was written after a barrier, as if the copies had been submitted to the same queue.
+    /// Copies bytes to a buffer for [`BufferUse::Input`](super::BufferUse::Input), and waits for the end. The copy runs
+    /// on the queue for copies, if there is one. Kernels see it after a barrier.
     ///
     /// # Errors
     /// Fails as [`Context::run`] does.
-    pub(super) fn run_copies(self: &Arc<Self>, name: &str, record: impl FnOnce(&Commands)) -> Result<(), GpuError> {
+    pub(super) fn copy_to_input(
+        self: &Arc<Self>,
+        from: &Arc<AnyBuffer>,
+        to: &Arc<AnyBuffer>,
+        bytes: u64,
+    ) -> Result<(), GpuError> {
         let queue = self.copies.as_ref().unwrap_or(&self.queue);
         let family = self.device.copy_family.unwrap_or(self.device.family);
-        let buffer = CommandBuffer::record_for(family, self, name, None, record)?;
+        let copy = |commands: &Commands| commands.copy_buffer(from, to, bytes);
+        let buffer = CommandBuffer::record_for(family, self, "inputs", None, copy)?;
         queue.wait_for(submit_to(queue, vec![buffer])?)
     }
 
@@ -332,7 +339,8 @@ impl Context {
         self.queue.wait_for(submission)
     }
 
-    /// Waits until the device has ended all that any thread has submitted before.
+    /// Waits until the device has ended all that any thread has submitted before, but for inputs that are copied, whose
+    /// threads wait themselves.
     ///
     /// # Errors
     /// Fails as [`Context::wait_for`] does.

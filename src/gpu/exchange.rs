@@ -7,7 +7,8 @@ use gpu_allocator::MemoryLocation;
 
 use super::{Access, AnyBuffer, Binding, BufferUse, Commands, Context, GpuError, buffer::Staging};
 
-/// Mapped memory of inputs of a kernel, and of its outputs. A run ends before the host sees the memory again.
+/// Mapped memory of inputs of a kernel, and of its outputs. A run ends before the host sees the memory again. After a
+/// run that has failed, a copy of the inputs may not have ended: then no other run may follow.
 pub struct Exchange {
     inputs: Staging,
     /// Number of bytes of the inputs that the host may have written.
@@ -29,7 +30,7 @@ impl Exchange {
         // The host only writes inputs, in order, so that without copies their memory may be write-combined. On devices
         // whose whole memory is mapped, it is the device's own. The host reads outputs, so their memory has to be
         // cached.
-        let is_copied = by_copies && context.copies_beside_kernels();
+        let is_copied = by_copies && context.copies_inputs();
         let location = if is_copied { MemoryLocation::GpuToCpu } else { MemoryLocation::CpuToGpu };
         let inputs = mapped(context, names[0], bytes[0], location)?;
         let copy = || AnyBuffer::on_device(context, names[0], inputs.buffer().bytes(), BufferUse::Input, 4);
@@ -80,12 +81,12 @@ impl Exchange {
         let outputs = first::<O>(&self.outputs, n);
         // The host's writes before a submission need no barrier.
         if let Some(copy) = self.copy.as_ref().filter(|_| self.filled > 0) {
-            self.context
-                .run_copies("inputs", |commands| commands.copy_buffer(self.inputs.buffer(), copy, self.filled))?;
+            self.context.copy_to_input(self.inputs.buffer(), copy, self.filled)?;
         }
         self.context.run("exchange", |commands| {
             if self.copy.is_some() {
-                commands.barrier(Access::TransferWrite, Access::AnyUse); // inputs
+                // Inputs. The copies have ended, but what another queue has written is not visible without a barrier.
+                commands.barrier(Access::TransferWrite, Access::AnyUse);
             }
             record(commands);
             commands.barrier(Access::ComputeWrite, Access::HostRead); // outputs
@@ -137,7 +138,7 @@ mod tests {
 
     fn outputs_follow_inputs(by_copies: bool) {
         let overrides = DeviceOverrides { copies_inputs: true, ..Default::default() };
-        let options = ContextOptions { overrides, ..ContextOptions::new(None, true) };
+        let options = ContextOptions { for_streams: true, overrides, ..ContextOptions::new(None, true) };
         let context = Context::new(&options).expect("a device with validation");
         let mut exchange = Exchange::new(&context, ["in", "out"], [400, 400], by_copies).expect("buffers");
         assert_eq!(exchange.copy.is_some(), by_copies);
@@ -148,7 +149,9 @@ mod tests {
             let expected: Vec<u32> = (0..n as u32).map(|ix| ix ^ n as u32).collect();
             exchange.inputs(n).copy_from_slice(&expected);
             let copy = |commands: &Commands| {
-                fence(commands);
+                if !by_copies {
+                    fence(commands);
+                }
                 commands.copy_buffer(&inputs, &outputs, 400);
                 fence(commands);
             };

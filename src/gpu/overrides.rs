@@ -21,8 +21,7 @@ pub struct DeviceOverrides {
     /// Whether each buffer has memory of its own, which is overwritten before it is released. In a block that buffers
     /// share, a kernel that reads a released buffer finds what was there, and nobody notices.
     pub marks_released: bool,
-    /// Whether the inputs of an [`Exchange`](super::Exchange) are copied to the device's memory even if the device has
-    /// no queue for copies.
+    /// Whether all inputs of streams are copied to the device's memory, even if the device has no queue for copies.
     pub copies_inputs: bool,
     /// Number of rays whose state can be stored at a time, if kernels have to stop before the loop limit.
     pub n_suspension_slots: Option<usize>,

@@ -1,13 +1,13 @@
-//! The queue: submissions, what they keep alive until the device has ended them, and presentation.
+//! Queues: submissions, what they keep alive until the device has ended them, and presentation.
 //!
-//! One lock guards the queue, as Vulkan demands. It is held while work is handed to the driver, never while somebody
+//! One lock guards each queue, as Vulkan demands. It is held while work is handed to the driver, never while somebody
 //! waits for the device: each submission has a fence of its own, so threads wait for their own work alone.
 
 use std::{
     collections::VecDeque,
     sync::{
         Arc, Mutex,
-        atomic::{AtomicBool, AtomicU32, Ordering},
+        atomic::{AtomicU32, Ordering},
     },
     thread,
     time::Duration,
@@ -24,13 +24,11 @@ use super::{
 /// Time between two looks at a fence under validation.
 const POLLING_INTERVAL: Duration = Duration::from_micros(100);
 
-/// The device's queue. It is shared by all threads.
+/// A queue of the device. It is shared by all threads.
 pub(super) struct Queue {
     state: Mutex<State>,
     /// The lock of an external queue, under which all users of the queue submit.
     external_lock: Option<Arc<Mutex<()>>>,
-    /// Whether a call has found the device lost. All work has ended then.
-    is_lost: AtomicBool,
     /// Greatest number of submissions that were in flight at once.
     most_in_flight: AtomicU32,
     device: Arc<RawDevice>,
@@ -63,8 +61,7 @@ pub struct Submission(Arc<Fence>);
 impl Queue {
     pub fn new(device: Arc<RawDevice>, raw: vk::Queue, external_lock: Option<Arc<Mutex<()>>>) -> Self {
         let state = State { raw, in_flight: VecDeque::new(), free_fences: Vec::new() };
-        let (is_lost, most_in_flight) = Default::default();
-        Self { state: Mutex::new(state), external_lock, is_lost, most_in_flight, device }
+        Self { state: Mutex::new(state), external_lock, most_in_flight: AtomicU32::new(0), device }
     }
 
     /// Submits command buffers, and keeps them until the device has ended them. The semaphores and
@@ -75,7 +72,7 @@ impl Queue {
         commands: Vec<CommandBuffer>,
     ) -> Result<Submission, GpuError> {
         let names = || commands.iter().map(CommandBuffer::name).collect::<Vec<_>>().join(", ");
-        if self.is_lost.load(Ordering::Relaxed) {
+        if self.is_lost() {
             return Err(GpuError::call("vkQueueSubmit2", &names())(vk::Result::ERROR_DEVICE_LOST));
         }
         let mut state = self.lock();
@@ -137,7 +134,8 @@ impl Queue {
         self.wait_for_all()?;
         let _state = self.lock();
         let _external = self.lock_external();
-        // SAFETY: the lock is held.
+        // SAFETY: the lock is held. Another queue is used only where nothing is presented, and not any more while the
+        // context is dropped.
         self.note(unsafe { self.device.raw.device_wait_idle() }).map_err(GpuError::call("vkDeviceWaitIdle", "kdray"))
     }
 
@@ -158,14 +156,14 @@ impl Queue {
     /// Notes if a call has found the device lost.
     fn note<T>(&self, result: VkResult<T>) -> VkResult<T> {
         if matches!(result, Err(vk::Result::ERROR_DEVICE_LOST)) {
-            self.is_lost.store(true, Ordering::Relaxed);
+            self.device.is_lost.store(true, Ordering::Relaxed);
         }
         result
     }
 
-    /// Whether a call has found the device lost.
+    /// Whether a call of any queue has found the device lost.
     pub fn is_lost(&self) -> bool {
-        self.is_lost.load(Ordering::Relaxed)
+        self.device.is_lost.load(Ordering::Relaxed)
     }
 
     /// Returns the greatest number of submissions that were in flight at once.

@@ -4,7 +4,7 @@
 use std::{
     ffi::CString,
     mem::ManuallyDrop,
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Arc, Mutex, PoisonError, atomic::AtomicBool},
 };
 
 use ash::{ext, khr, vk};
@@ -48,6 +48,8 @@ pub(super) struct RawDevice {
     pub presentation: Option<khr::swapchain::Device>,
     #[cfg(feature = "view")]
     pub physical: vk::PhysicalDevice,
+    /// Whether a call of any queue has found the device lost. All work has ended then.
+    pub is_lost: AtomicBool,
     /// Index of the queue's family.
     pub family: u32,
     /// Index of the family of the queue for copies, if the device was opened with one.
@@ -116,6 +118,7 @@ impl RawDevice {
             raw: device,
             #[cfg(feature = "view")]
             physical,
+            is_lost: AtomicBool::new(false),
             family,
             copy_family,
             pipeline_cache,

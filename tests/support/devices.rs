@@ -77,7 +77,7 @@ fn lock() -> MutexGuard<'static, Opened> {
 }
 
 fn open(overrides: DeviceOverrides) -> Arc<Context> {
-    let options = ContextOptions { overrides, ..ContextOptions::new(None, true) };
+    let options = ContextOptions { for_streams: true, overrides, ..ContextOptions::new(None, true) };
     let device = Device::open(&options).expect("a device with validation");
     // SAFETY: the tests keep to what the hidden modules state.
     Arc::clone(unsafe { device.context() })
