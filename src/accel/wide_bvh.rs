@@ -294,6 +294,8 @@ impl WideBvh {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use glam::{Vec3, vec3};
 
     use super::*;
@@ -407,17 +409,20 @@ mod tests {
         boxes.filter(|of| of.min[0] <= of.max[0]).map(|of| of.half_area()).collect()
     }
 
-    /// Returns the number of lanes and the area of every way to put a subtree into lanes of a node.
-    fn all_ways(subtree: &Subtree) -> Vec<(usize, f64)> {
+    /// Returns the number of lanes and the area of every way to put a subtree into lanes of a node, and its triangles.
+    fn all_ways(subtree: &Subtree) -> (Vec<(usize, f64)>, BTreeSet<u32>) {
         let bounds = subtree.bounds().expect("a subtree of triangles");
-        let Subtree::Inner(inner) = subtree else { return vec![(1, bounds.half_area())] };
-        let [of_a, of_b] = inner.children.each_ref().map(all_ways);
+        let inner = match subtree {
+            Subtree::Inner(inner) => inner,
+            one => return (vec![(1, bounds.half_area())], one.triangle_ixs().unwrap().into_iter().collect()),
+        };
+        let [(of_a, in_a), (of_b, in_b)] = inner.children.each_ref().map(all_ways);
+        let triangle_ixs = &in_a | &in_b;
         let both = of_a.iter().flat_map(|a| of_b.iter().map(move |b| (a.0 + b.0, a.1 + b.1)));
         let mut ways: Vec<_> = both.filter(|way| way.0 <= WIDTH).collect();
         let below = ways.iter().map(|way| way.1).fold(f64::INFINITY, f64::min);
-        let of_one = bounds.half_area() + if subtree.triangle_ixs().is_some() { 0.0 } else { below };
-        ways.push((1, of_one));
-        ways
+        ways.push((1, bounds.half_area() + if triangle_ixs.len() > WIDTH { below } else { 0.0 }));
+        (ways, triangle_ixs)
     }
 
     #[test]
@@ -425,7 +430,7 @@ mod tests {
         let triangles = &triangles()[..220];
         let tree = KdTree::build(triangles, &BuildOptions::default());
         let root = Subtree::of(&tree, triangles, 0, &Bounds::from(tree.bounds()), 0);
-        let ways = all_ways(&root);
+        let (ways, _) = all_ways(&root);
         assert!(ways.len() > 10_000, "{} ways", ways.len());
         let least = ways.iter().map(|way| way.1).fold(f64::INFINITY, f64::min);
         let bvh = WideBvh::new(&tree, triangles);

@@ -142,8 +142,8 @@ mod tests {
         let context = Context::new(&options).expect("a device with validation");
         let mut exchange = Exchange::new(&context, ["in", "out"], [400, 400], by_copies).expect("buffers");
         assert_eq!(exchange.copy.is_some(), by_copies);
-        let inputs = exchange.copy.as_ref().unwrap_or(exchange.inputs.buffer()).clone();
-        let outputs = exchange.outputs.buffer().clone();
+        let [Binding::Buffer(inputs), Binding::Buffer(outputs)] = exchange.bindings() else { panic!("no buffers") };
+        let (inputs, outputs) = (Arc::clone(inputs), Arc::clone(outputs));
         let fence = |commands: &Commands| commands.barrier(Access::TransferWrite, Access::AnyUse);
         for n in [100, 3, 0, 50] {
             let expected: Vec<u32> = (0..n as u32).map(|ix| ix ^ n as u32).collect();
