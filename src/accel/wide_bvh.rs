@@ -72,8 +72,8 @@ pub struct WideBvh {
 /// The triangles of a block, in ascending order.
 type BlockList = ArrayVec<u32, WIDTH>;
 
-/// Half of the surface area of all boxes of a subtree, if it takes at most one, two and up to sixteen lanes of a node,
-/// and each lane has a block or a node.
+/// Half of the least surface area that all boxes of a subtree can have together. The element at `i` is for a subtree
+/// that takes at most `i + 1` lanes of a node. Each lane has a block or a node.
 type LeastAreas = [f64; WIDTH];
 
 /// A subtree before it is written to the arrays.
@@ -193,7 +193,7 @@ impl Subtree {
         }
     }
 
-    /// Appends what takes the lanes of a node in which the subtree may take `n_lanes`.
+    /// Appends the blocks and nodes that stand for the subtree in the lanes of a node, at most `n_lanes`.
     fn append_to(self, lanes: &mut ArrayVec<Self, WIDTH>, n_lanes: usize) {
         match self {
             Self::Empty => (),
@@ -214,7 +214,7 @@ fn share_lanes([a, b]: &[Subtree; 2], n_lanes: usize) -> (usize, f64) {
     shares.min_by(|a, b| a.1.total_cmp(&b.1)).expect("there are two lanes")
 }
 
-/// Appends what takes `n_lanes` lanes of a node for two subtrees.
+/// Appends the blocks and nodes that stand for two subtrees in the lanes of a node, at most `n_lanes`.
 fn append_both(subtrees: [Subtree; 2], lanes: &mut ArrayVec<Subtree, WIDTH>, n_lanes: usize) {
     let (n_of_a, _) = share_lanes(&subtrees, n_lanes);
     let [a, b] = subtrees;
