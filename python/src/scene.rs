@@ -33,6 +33,9 @@ const RAYS_AT_ONCE: [usize; 2] = [1 << 25, 1 << 18];
 /// The same number of queries that take longer.
 const QUERIES_AT_ONCE: [usize; 2] = [1 << 20, 1 << 16];
 
+/// Up to so many queries are one task. Handed over to a thread of a pool, a single ray takes six times as long.
+const FEW: usize = 64;
+
 /// The number of rays for which `build` chooses the structure, since it does not know how many will follow.
 const RAYS_TO_BUILD_FOR: usize = 1 << 23;
 
@@ -219,7 +222,7 @@ impl Core {
 
     /// Sees to what casts `n` queries, and calls `chunk` on a pool of threads for each `at_once` of them: the first
     /// number is for GPUs, the second for others. In between, the caller's own thread lets Python raise
-    /// KeyboardInterrupt.
+    /// KeyboardInterrupt. It casts a few queries itself.
     fn in_chunks(
         &self,
         py: Python,
@@ -229,8 +232,11 @@ impl Core {
     ) -> PyResult<()> {
         let pool = pool(n_threads)?;
         self.with(py, |state| {
-            if n > 0 {
+            if n > 0 && !state.is_built() {
                 watched(&pool, |progress| state.prepare(n, progress), |_| Ok(()))?;
+            }
+            if (1..=FEW).contains(&n) && state.cpu_is_ready(n) {
+                return chunk(0..n, state.caster(n, mask)?);
             }
             let at_once = at_once[usize::from(!state.has_gpu())];
             for first in (0..n).step_by(at_once) {
@@ -370,7 +376,7 @@ impl Core {
         let rows = Rows::new(&rays, &range)?;
         let mut columns = columns_of(&mut outputs)?;
         self.in_chunks(py, (rows.len(), RAYS_AT_ONCE), (mask, n_threads), |range, (caster, placed)| {
-            if columns.have_faces() {
+            if columns.have_faces() && range.len() > FEW {
                 placed.table.expect(placed, range.len());
             }
             let chunks = columns.split_off_chunks(range.len(), RAYS_PER_CHUNK);

@@ -90,9 +90,11 @@ pub struct State {
     geometries: Vec<Option<Geometry>>,
     /// Counts changes.
     now: u64,
-    /// The change that last added, removed or deformed a geometry, and the one that last moved or masked one.
+    /// The change that last added, removed or deformed a geometry, the one that last moved or masked one, and the one
+    /// that last moved one.
     shapes_at: u64,
     places_at: u64,
+    transforms_at: u64,
     /// The world of the last query.
     ready: Option<Ready>,
     /// Whether each geometry of the last world has a structure of its own, and how the world is searched.
@@ -101,9 +103,9 @@ pub struct State {
 
 impl State {
     pub fn new(engine: Engine) -> Self {
-        let (now, shapes_at, places_at) = Default::default();
+        let (now, shapes_at, places_at, transforms_at) = Default::default();
         let cpu = Engine::on_cpu();
-        Self { engine, cpu, geometries: Vec::new(), now, shapes_at, places_at, ready: None, last: None }
+        Self { engine, cpu, geometries: Vec::new(), now, shapes_at, places_at, transforms_at, ready: None, last: None }
     }
 
     /// Returns the number of identifiers that were given out.
@@ -183,7 +185,7 @@ impl State {
             let geometry = self.geometry_mut(*id)?;
             (geometry.transform, geometry.moved_at) = (*transform, now);
         }
-        self.places_at = now;
+        (self.places_at, self.transforms_at) = (now, now);
         Ok(())
     }
 
@@ -231,6 +233,11 @@ impl State {
         self.ready.as_ref().is_some_and(is_current)
     }
 
+    /// Whether the CPU casts `n` rays or points, and has all that it needs for them.
+    pub fn cpu_is_ready(&self, n: usize) -> bool {
+        goes_to_cpu(&self.engine, n) && self.ready.as_ref().is_some_and(|ready| ready.on_cpu.is_some())
+    }
+
     /// Returns what casts `n` rays or points with a mask, and what their hits are in. The scene is prepared.
     pub fn caster(&mut self, n: usize, mask: u8) -> PyResult<(&mut Caster<'static>, Placed<'_>)> {
         let ready = self.ready.as_mut().expect("the scene is prepared");
@@ -270,7 +277,10 @@ impl State {
         for caster in ready.on_device.iter_mut().chain(&mut ready.on_cpu) {
             caster.set_world(&ready.world)?;
         }
-        (ready.places_at, ready.table) = (self.places_at, FaceTable::default());
+        if self.transforms_at > ready.places_at {
+            ready.table = FaceTable::default();
+        }
+        ready.places_at = self.places_at;
         Ok(ready)
     }
 
@@ -352,17 +362,22 @@ impl Ready {
     /// waited for. It is made at the first use.
     fn caster(&mut self, [engine, cpu]: [&Engine; 2], n: usize) -> PyResult<(&mut Caster<'static>, Placed<'_>)> {
         let Self { world, places, table, traversal, on_device, on_cpu, n_small, .. } = self;
-        let is_small = engine.device().is_some_and(|device| !device.is_software()) && n < SMALL_BATCH;
+        let is_small = engine.device().is_some() && goes_to_cpu(engine, n);
         let lacks_structure = on_cpu.is_none() && matches!(world.accel_options(), AccelOptions::LazyTree(_));
         let stays_on_device = is_small && lacks_structure && *n_small < BATCHES_BEFORE_BUILD;
         *n_small += u32::from(stays_on_device);
-        let caster = if engine.device().is_none() || is_small && !stays_on_device {
+        let caster = if goes_to_cpu(engine, n) && !stays_on_device {
             made(on_cpu, || cpu.caster_of_world(world, Traversal::OF_CPU))
         } else {
             made(on_device, || engine.caster_of_world(world, *traversal))
         };
         Ok((caster?, Placed { world, places, table }))
     }
+}
+
+/// Whether `n` rays or points take less time on the CPU. A software device is the CPU, but was asked for.
+fn goes_to_cpu(engine: &Engine, n: usize) -> bool {
+    engine.device().is_none_or(|device| !device.is_software() && n < SMALL_BATCH)
 }
 
 fn made<T>(place: &mut Option<T>, make: impl FnOnce() -> Result<T, GpuError>) -> PyResult<&mut T> {

@@ -42,6 +42,24 @@ def test_hits_are_those_of_brute_force(device, random):
     assert (scene.test_occlusions(rays) == (hits["t_hit"] < np.inf)).all()
 
 
+def test_few_queries_have_the_answers_of_many(device, random):
+    scene, rays = fresh(device, [soup(random, 100), soup(random, 50)]), random_rays(random, 1000)
+    queries = [
+        scene.cast_rays,
+        lambda rays: {"occluded": scene.test_occlusions(rays)},
+        lambda rays: {"counts": scene.count_intersections(rays)},
+        lambda rays: {"t_hit": scene.list_intersections(rays, max_hits=2)["t_hit"]},
+        lambda rays: scene.compute_closest_points(rays[:, :3]),
+    ]
+    for query in queries:
+        query(rays[:1])
+        expected = query(rays)
+        for size in [1, 64, 65]:
+            parts = [query(rays[first : first + size]) for first in range(0, len(rays), size)]
+            for name, column in expected.items():
+                np.testing.assert_array_equal(np.concatenate([part[name] for part in parts]), column)
+
+
 def test_points_of_hits(device, random):
     parts = [soup(random, 100), soup(random, 50)]
     scene, rays = fresh(device, parts), random_rays(random, 3000)

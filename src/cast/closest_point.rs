@@ -89,5 +89,5 @@ fn check_structure(kind: AccelKind) -> Result<(), BadOptions> {
 
 /// Counts the points that can only miss. Their position is not finite, or their `t_max` is NaN or negative.
 pub fn count_invalid_points(points: &[QueryPoint]) -> u64 {
-    points.par_iter().filter(|point| !reference::closest_point::is_point(point)).count() as u64
+    points.par_iter().with_min_len(1024).filter(|point| !reference::closest_point::is_point(point)).count() as u64
 }

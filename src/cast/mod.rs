@@ -352,7 +352,7 @@ fn most_rays(limits: &Limits) -> usize {
 /// Counts the rays that can only miss. They have a NaN, an infinite origin or direction, or a direction that is zero
 /// or so short that all its components are denormal (less than 2^-126).
 pub fn count_invalid(rays: &[Ray]) -> u64 {
-    rays.par_iter().filter(|ray| !reference::cast::is_ray(ray)).count() as u64
+    rays.par_iter().with_min_len(1024).filter(|ray| !reference::cast::is_ray(ray)).count() as u64
 }
 
 /// Casts rays on the current rayon pool, as [`GpuCaster`] does on a device.
@@ -489,7 +489,8 @@ const RAYS_PER_TRIANGLE: usize = 4;
 /// not underflow.
 fn are_scattered(rays: &[Ray], bounds: [Vec3; 2]) -> bool {
     let underflows = |ray: &Ray| ray.direction != Vec3::ZERO && ray.direction.length_squared() < f32::MIN_POSITIVE;
-    cpu::are_scattered(rays, bounds, |ray| (ray.origin, ray.direction)) && !rays.par_iter().any(underflows)
+    cpu::are_scattered(rays, bounds, |ray| (ray.origin, ray.direction))
+        && !rays.par_iter().with_min_len(1024).any(underflows)
 }
 
 /// Casts rays by a [`CpuCaster`], and returns one hit for each. The hits are those that a [`GpuCaster`] finds.

@@ -29,19 +29,20 @@ impl<S: Simd> PointColumns<S> {
     }
 }
 
-/// Returns a number if it is from 0 to 1, or else the nearer one of the two. NaN stays.
-#[inline(always)]
-fn clamped<S: Simd>(x: f32x16<S>) -> f32x16<S> {
-    let [zero, one] = [0.0, 1.0].map(|end| f32x16::splat(x.simd, end));
-    x.simd_lt(zero).select(zero, x.simd_gt(one).select(one, x))
-}
-
 /// The place of the origin's foot on the line from `a` along an edge, as a share of the edge. 0 if the edge has no
 /// length.
 #[inline(always)]
 fn share_along<S: Simd>(a: Vec3x16<S>, edge: Vec3x16<S>) -> f32x16<S> {
     let squared = edge.dot(edge);
     squared.simd_gt(0.0).select(-a.dot(edge) / squared, f32x16::splat(squared.simd, 0.0))
+}
+
+/// The place of the point of an edge that is closest to the origin: 0 at `a`, 1 at the edge's other end. NaN stays.
+#[inline(always)]
+fn share_on<S: Simd>(a: Vec3x16<S>, edge: Vec3x16<S>) -> f32x16<S> {
+    let (along, squared) = (-a.dot(edge), edge.dot(edge));
+    let [zero, one] = [0.0, 1.0].map(|end| f32x16::splat(along.simd, end));
+    along.simd_le(zero).select(zero, along.simd_ge(squared).select(one, along / squared))
 }
 
 /// [`closest_on_triangles`] if the edge from `a` to `b` is each triangle's longest one.
@@ -51,10 +52,10 @@ fn closest_beside_longest<S: Simd>(corners @ [a, b, c]: Corners<S>) -> PointColu
     let simd = ab.0[0].simd;
     let (zero, all) = (f32x16::splat(simd, 0.0), mask32x16::splat(simd, true));
     let along_ab = share_along(a, ab);
-    let along_bc = clamped(share_along(b, c - b));
+    let along_bc = share_on(b, c - b);
     let mut best = PointColumns { squared: a.dot(a), u: zero, v: zero };
-    best.take_closer(corners, [clamped(along_ab), zero], all);
-    best.take_closer(corners, [zero, clamped(share_along(a, ac))], all);
+    best.take_closer(corners, [share_on(a, ab), zero], all);
+    best.take_closer(corners, [zero, share_on(a, ac)], all);
     best.take_closer(corners, [1.0 - along_bc, along_bc], all);
     let height_along_ab = -share_along(ac, ab);
     let height = ac - ab * height_along_ab;

@@ -64,7 +64,7 @@ pub fn count_hits(inputs: &KernelInputs, traversal: Traversal, rays: &[Ray]) -> 
         });
         n_hits
     };
-    rays.par_iter().map_init(|| Traverser::new(inputs, traversal), count).collect()
+    rays.par_iter().with_min_len(64).map_init(|| Traverser::new(inputs, traversal), count).collect()
 }
 
 /// Returns the hits of all rays one after the other, at most `most` of each ray, and where those of each ray end. With

@@ -29,14 +29,26 @@ fn share_along(a: Vec3, edge: Vec3) -> f32 {
     if squared > 0.0 { -a.dot(edge) / squared } else { 0.0 }
 }
 
+/// The place of the point of an edge that is closest to the origin: 0 at `a`, 1 at the edge's other end.
+fn share_on(a: Vec3, edge: Vec3) -> f32 {
+    let (along, squared) = (-a.dot(edge), edge.dot(edge));
+    if along <= 0.0 {
+        0.0
+    } else if along >= squared {
+        1.0
+    } else {
+        along / squared
+    }
+}
+
 /// [`closest_on_triangle`] if the edge from `a` to `b` is the longest one.
 fn closest_beside_longest(corners @ [a, b, c]: [Vec3; 3]) -> PointOnTriangle {
     let (ab, ac) = (b - a, c - a);
     let along_ab = share_along(a, ab);
-    let along_bc = share_along(b, c - b).clamp(0.0, 1.0);
+    let along_bc = share_on(b, c - b);
     let mut best = PointOnTriangle { squared: a.dot(a), u: 0.0, v: 0.0 };
-    best.take_closer(corners, [along_ab.clamp(0.0, 1.0), 0.0]);
-    best.take_closer(corners, [0.0, share_along(a, ac).clamp(0.0, 1.0)]);
+    best.take_closer(corners, [share_on(a, ab), 0.0]);
+    best.take_closer(corners, [0.0, share_on(a, ac)]);
     best.take_closer(corners, [1.0 - along_bc, along_bc]);
     let height_along_ab = -share_along(ac, ab);
     let height = ac - height_along_ab * ab;

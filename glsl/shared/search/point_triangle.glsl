@@ -36,6 +36,13 @@ float share_along(vec3 a, vec3 edge, float edge_squared) {
     return edge_squared > 0.0 ? -dot_in_order(a, edge) / edge_squared : 0.0;
 }
 
+// The place of the point of an edge that is closest to the origin: 0 at a, 1 at the edge's other end. Both ends are
+// found by comparisons: of two equal numbers, a GPU's quotient need not be 1.
+float share_on(vec3 a, vec3 edge) {
+    float along = -dot_in_order(a, edge), squared = dot_in_order(edge, edge);
+    return along <= 0.0 ? 0.0 : along >= squared ? 1.0 : min(along / squared, 1.0);
+}
+
 // `closest_on_triangle` if the edge from a to b is the longest one.
 PointOnTriangle closest_beside_longest(vec3 a, vec3 b, vec3 c) {
     precise vec3 ab = b - a;
@@ -43,10 +50,10 @@ PointOnTriangle closest_beside_longest(vec3 a, vec3 b, vec3 c) {
     precise vec3 bc = c - b;
     float ab_squared = dot_in_order(ab, ab);
     float along_ab = share_along(a, ab, ab_squared);
-    float along_bc = clamp(share_along(b, bc, dot_in_order(bc, bc)), 0.0, 1.0);
+    float along_bc = share_on(b, bc);
     PointOnTriangle best = PointOnTriangle(dot_in_order(a, a), 0.0, 0.0);
-    take_closer(a, b, c, clamp(along_ab, 0.0, 1.0), 0.0, best);
-    take_closer(a, b, c, 0.0, clamp(share_along(a, ac, dot_in_order(ac, ac)), 0.0, 1.0), best);
+    take_closer(a, b, c, share_on(a, ab), 0.0, best);
+    take_closer(a, b, c, 0.0, share_on(a, ac), best);
     take_closer(a, b, c, 1.0 - along_bc, along_bc, best);
     float height_along_ab = -share_along(ac, ab, ab_squared);
     precise vec3 height = ac - height_along_ab * ab;
