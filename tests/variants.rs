@@ -25,7 +25,7 @@ use kdray::{
     world::{FlatScene, World},
 };
 use support::{
-    MeshWithTree, device, meshes,
+    MeshWithTree, device, meshes, n_outliers,
     random::Random,
     rays::{N_KINDS, nasty_ray, outward_ray},
     scenes, world_by,
@@ -118,9 +118,7 @@ fn check(context: &Arc<Context>, name: &str, triangles: Vec<Triangle>) {
     let with_tree = world_of_tree(&world);
     let rays: Vec<PathRay> = (0..N_RAYS).map(|i| nasty_ray(&mut Random(i as u64), &world, i)).collect();
     let without_tree = traced(context, &with_tree, &rays, Traversal::Brute);
-    // These rays aim at vertices and edges. A GPU's division rounds differently: on an H200, one ray in twelve hits
-    // another triangle.
-    let n_outliers = if context.is_software() { N_RAYS / 200 } else { N_RAYS / 8 };
+    let n_outliers = n_outliers(context, N_RAYS).max(N_RAYS / 200);
     check_against_cpu(name, &world, &rays, (&without_tree, n_outliers));
     let assert_same = |variant: &dyn Display, found: &Traced| {
         if let Some(difference) = difference(&rays, &without_tree, found) {

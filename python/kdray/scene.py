@@ -49,7 +49,7 @@ class RaycastingScene:
     nthreads : threads that work for queries on the CPU. 0: as many as :func:`kdray.set_threads` says.
     device : None for the best GPU, or the CPU where there is none; "cpu"; the index of one of :func:`kdray.devices`,
         or part of its name. Batches of fewer than 4096 rays or points are cast by the CPU, whatever the GPU: this is
-        quicker, and finds the same hits.
+        quicker, and finds the same hits but for rounding.
     origin : the point (3,) that coordinates are relative to inside the scene. None: 0, or if the first triangles have
         float64 vertices that lie beyond 1024, the middle of these vertices.
     """

@@ -233,7 +233,7 @@ impl State {
         self.ready.as_ref().is_some_and(is_current)
     }
 
-    /// Whether the CPU casts `n` rays or points, and has all that it needs for them.
+    /// Whether the CPU casts `n` rays or points, by a caster that exists. The scene is prepared.
     pub fn cpu_is_ready(&self, n: usize) -> bool {
         goes_to_cpu(&self.engine, n) && self.ready.as_ref().is_some_and(|ready| ready.on_cpu.is_some())
     }
@@ -375,7 +375,7 @@ impl Ready {
     }
 }
 
-/// Whether `n` rays or points take less time on the CPU. A software device is the CPU, but was asked for.
+/// Whether the CPU casts `n` rays or points: there is no device, or there is a GPU and they are few.
 fn goes_to_cpu(engine: &Engine, n: usize) -> bool {
     engine.device().is_none_or(|device| !device.is_software() && n < SMALL_BATCH)
 }

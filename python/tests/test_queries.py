@@ -43,21 +43,22 @@ def test_hits_are_those_of_brute_force(device, random):
 
 
 def test_few_queries_have_the_answers_of_many(device, random):
-    scene, rays = fresh(device, [soup(random, 100), soup(random, 50)]), random_rays(random, 1000)
+    scene, rays = fresh(device, [soup(random, 1500), soup(random, 1500)]), random_rays(random, 1000)
     queries = [
-        scene.cast_rays,
-        lambda rays: {"occluded": scene.test_occlusions(rays)},
-        lambda rays: {"counts": scene.count_intersections(rays)},
-        lambda rays: {"t_hit": scene.list_intersections(rays, max_hits=2)["t_hit"]},
-        lambda rays: scene.compute_closest_points(rays[:, :3]),
+        lambda rays, n: scene.cast_rays(rays, nthreads=n),
+        lambda rays, n: {"occluded": scene.test_occlusions(rays, nthreads=n)},
+        lambda rays, n: {"counts": scene.count_intersections(rays, nthreads=n)},
+        lambda rays, n: {"t_hit": scene.list_intersections(rays, nthreads=n, max_hits=2)["t_hit"]},
+        lambda rays, n: scene.compute_closest_points(rays[:, :3], nthreads=n),
     ]
-    for query in queries:
-        query(rays[:1])
-        expected = query(rays)
-        for size in [1, 64, 65]:
-            parts = [query(rays[first : first + size]) for first in range(0, len(rays), size)]
-            for name, column in expected.items():
-                np.testing.assert_array_equal(np.concatenate([part[name] for part in parts]), column)
+    for moves in [False, True]:
+        if moves:
+            scene.update_transforms([1], [np.diag([1, -2, 1, 1])])
+        for query in queries:
+            for size, n_threads, n in [(1, 1, 50), (64, 0, 640), (65, 2, 650)]:
+                parts = [query(rays[first : first + size], n_threads) for first in range(0, n, size)]
+                for name, column in query(rays[:n], 0).items():
+                    np.testing.assert_array_equal(np.concatenate([part[name] for part in parts]), column)
 
 
 def test_points_of_hits(device, random):

@@ -92,6 +92,9 @@ def test_many_hits_are_described_as_few_are(device, random):
         lambda scene: None,
         lambda scene: scene.update_transforms([1], mirrored[:1]),
         lambda scene: scene.update_transforms([0, 1], [mirrored[1], turned[0]]),
+        lambda scene: scene.set_masks([0], [2]),
+        lambda scene: (scene.set_masks([0], [255]), scene.update_transforms([1], turned[1:])),
+        lambda scene: (scene.update_transforms([1], mirrored[:1]), scene.set_masks([1], [6])),
         lambda scene: scene.update_vertices(1, 0.5 * parts[1][0]),
     ]
     for change in changes:

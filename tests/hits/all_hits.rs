@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::support::{
-    MeshWithTree, assert_silent, device, kept, meshes, pretended,
+    MeshWithTree, assert_silent, device, kept, meshes, n_outliers, pretended,
     random::Random,
     rays::{met_in_double_precision, nasty_ray},
 };
@@ -120,9 +120,9 @@ fn check_device(context: &Arc<Context>, world: &MeshWithTree, rays: &[Ray], acce
     let geometry = Geometry::new(&world.triangles, accel).expect("a structure of these triangles");
     let expected = CpuCaster::new(geometry, traversal).all_hits(rays, None);
     let mut caster = GpuCaster::new(context, geometry, traversal).expect("a caster");
-    let n_outliers = if context.is_software() { 0 } else { rays.len().div_ceil(100) };
     let found = caster.all_hits(rays, None).expect("lists");
-    agree(n_outliers, &expected, &found).unwrap_or_else(|e| panic!("{traversal} {}: {e}", accel.kind()));
+    agree(n_outliers(context, rays.len()), &expected, &found)
+        .unwrap_or_else(|e| panic!("{traversal} {}: {e}", accel.kind()));
     assert_eq!(caster.count_hits(rays).expect("counts"), counts_of(&found));
     // A batch of 7 rays lists 14 hits at a time, or those of one ray.
     let few = &rays[..50];
@@ -221,9 +221,8 @@ fn limits_keep_the_nearest_hits() {
         let (found, expected) = (caster.all_hits(&rays, Some(most)), nearest(&all, rays.len(), most as usize));
         assert_eq!(found.ray_splits, expected.ray_splits, "{most}");
         assert_eq!(t_of(&found), t_of(&expected), "{most}");
-        let n_outliers = if context.is_software() { 0 } else { 3 };
         let from_device = on_device.all_hits(&rays, Some(most)).expect("lists");
-        agree(n_outliers, &found, &from_device).unwrap_or_else(|e| panic!("{most}: {e}"));
+        agree(n_outliers(&context, rays.len()), &found, &from_device).unwrap_or_else(|e| panic!("{most}: {e}"));
     }
     if kept::leaves_out("lists that are limited before t are rounded") {
         return;

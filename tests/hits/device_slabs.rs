@@ -60,7 +60,9 @@ fn check(context: &Arc<Context>, name: &str, triangles: &[Triangle]) -> KdTree {
     let arrays = arrays_with_slabs(context, &bare, triangles);
     let of_twin = kd_slabs(&bare, triangles);
     let n_far = arrays.slabs.iter().zip(&of_twin).filter(|(a, b)| !are_near(a, b)).count();
-    assert!(n_far <= of_twin.len() / 200, "{name}: {n_far} of {} slabs are not the twin's", of_twin.len());
+    // Slabs of an inclined plane, whose corners are rounded, depend on the last bits of quotients.
+    let most = if context.is_software() { of_twin.len() / 200 } else { of_twin.len() / 20 };
+    assert!(n_far <= most, "{name}: {n_far} of {} slabs are not the twin's", of_twin.len());
     let tree = KdTree::from_arrays(arrays, triangles).unwrap_or_else(|error| panic!("{name}: {error}"));
     println!("{name}: {} slabs, the host has {}", n_slabs(&tree), n_slabs(&tree_of(triangles, true)));
     tree

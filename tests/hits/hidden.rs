@@ -2,7 +2,7 @@
 //! mesh without these triangles.
 
 use crate::support::{
-    MeshWithTree, compare, device, meshes, packets::traced_one_by_one, random::Random, rays::nasty_ray,
+    MeshWithTree, compare, device, meshes, n_outliers, packets::traced_one_by_one, random::Random, rays::nasty_ray,
 };
 use fearless_simd::Level;
 use glam::Vec3;
@@ -72,7 +72,6 @@ fn occluded(hits: &[Hit]) -> Vec<bool> {
 #[test]
 fn the_device_finds_what_is_not_hidden() {
     let context = device();
-    let n_outliers = |n_rays: usize| if context.is_software() { 0 } else { n_rays.div_ceil(500) };
     for case in cases() {
         let rays = case.rays();
         let expected = case.by_brute_force(&rays);
@@ -80,10 +79,11 @@ fn the_device_finds_what_is_not_hidden() {
             let caster = GpuCaster::new(&context, case.mesh.geometry(), traversal).expect("a caster");
             let mut caster = caster.hiding(&case.hidden).expect("hidden triangles");
             let closest = caster.cast(&rays, Query::Closest, 1).expect("a cast").hits;
-            compare::hits(n_outliers(rays.len()), &expected, &closest).unwrap_or_else(|e| panic!("{traversal}: {e}"));
+            compare::hits(n_outliers(&context, rays.len()), &expected, &closest)
+                .unwrap_or_else(|e| panic!("{traversal}: {e}"));
             let any = caster.cast(&rays, Query::Any, 1).expect("a cast").hits;
             let differing = occluded(&expected).iter().zip(occluded(&any)).filter(|(a, b)| *a != b).count();
-            assert!(differing <= n_outliers(rays.len()), "{traversal}: {differing}");
+            assert!(differing <= n_outliers(&context, rays.len()), "{traversal}: {differing}");
             assert!(any.iter().all(|hit| !case.hidden.contains(&hit.triangle_ix)), "{traversal}");
         }
     }

@@ -19,7 +19,7 @@ pub mod rays;
 pub mod scenes;
 pub mod textured;
 
-pub use devices::{assert_silent, device, pretended, with_lanes, without_wide_atomics};
+pub use devices::{assert_silent, device, n_outliers, pretended, with_lanes, without_wide_atomics};
 
 use glam::Vec3;
 use kdray::{

@@ -37,7 +37,7 @@ float share_along(vec3 a, vec3 edge, float edge_squared) {
 }
 
 // The place of the point of an edge that is closest to the origin: 0 at a, 1 at the edge's other end. Both ends are
-// found by comparisons: of two equal numbers, a GPU's quotient need not be 1.
+// found by comparisons: of two equal numbers, a GPU's quotient need not be 1, and that of a lesser one may be above 1.
 float share_on(vec3 a, vec3 edge) {
     float along = -dot_in_order(a, edge), squared = dot_in_order(edge, edge);
     return along <= 0.0 ? 0.0 : along >= squared ? 1.0 : min(along / squared, 1.0);
