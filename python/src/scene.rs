@@ -33,8 +33,8 @@ const RAYS_AT_ONCE: [usize; 2] = [1 << 25, 1 << 18];
 /// The same number of queries that take longer.
 const QUERIES_AT_ONCE: [usize; 2] = [1 << 20, 1 << 16];
 
-/// Up to so many queries are cast by the calling thread. They are one task: the library divides no fewer, and handed
-/// over to a thread of a pool, a single ray takes several times as long.
+/// Calls of up to so many queries are cast by the calling thread. The library does not divide so few among threads, and
+/// to hand a single ray over to a pool takes several times as long as to cast it.
 const FEW: usize = 64;
 
 /// The number of rays for which `build` chooses the structure, since it does not know how many will follow.
@@ -223,7 +223,7 @@ impl Core {
 
     /// Sees to what casts `n` queries, and calls `chunk` on a pool of threads for each `at_once` of them: the first
     /// number is for GPUs, the second for others. In between, the caller's own thread lets Python raise
-    /// KeyboardInterrupt. It casts a few queries itself, once the CPU's caster exists.
+    /// KeyboardInterrupt. If the queries are few and the CPU's caster has been made, that thread calls `chunk` itself.
     fn in_chunks(
         &self,
         py: Python,
@@ -377,7 +377,7 @@ impl Core {
         let rows = Rows::new(&rays, &range)?;
         let mut columns = columns_of(&mut outputs)?;
         self.in_chunks(py, (rows.len(), RAYS_AT_ONCE), (mask, n_threads), |range, (caster, placed)| {
-            // The table is made by many threads, which few queries do not wait for.
+            // The calling thread casts few queries alone, and many threads make the table.
             if columns.have_faces() && range.len() > FEW {
                 placed.table.expect(placed, range.len());
             }
@@ -459,7 +459,8 @@ impl Core {
                 ray_ids.extend((ends[0]..ends[1]).map(|_| ix as u32));
             }
             let face = |hit: &Hit| Face::of(placed, hit.triangle_ix);
-            let faces: Vec<_> = all.hits.par_iter().with_min_len(1 << 14).map(face).collect();
+            let hits_per_task = if all.ray_splits.len() <= FEW + 1 { usize::MAX } else { 1024 };
+            let faces: Vec<_> = all.hits.par_iter().with_min_len(hits_per_task).map(face).collect();
             t_hit.extend(all.hits.iter().map(|hit| hit.t));
             geometry_ids.extend(faces.iter().map(|face| face.geometry_id));
             primitive_ids.extend(faces.iter().map(|face| face.primitive_id));

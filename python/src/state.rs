@@ -90,10 +90,11 @@ pub struct State {
     geometries: Vec<Option<Geometry>>,
     /// Counts changes.
     now: u64,
-    /// The change that last added, removed or deformed a geometry, the one that last moved or masked one, and the one
-    /// that last moved one.
+    /// The last change that added, removed or deformed a geometry.
     shapes_at: u64,
+    /// The last change of a transform or a mask.
     places_at: u64,
+    /// The last change of a transform.
     transforms_at: u64,
     /// The world of the last query.
     ready: Option<Ready>,
@@ -233,7 +234,7 @@ impl State {
         self.ready.as_ref().is_some_and(is_current)
     }
 
-    /// Whether the CPU casts `n` rays or points, by a caster that exists. The scene is prepared.
+    /// Whether the CPU casts `n` rays or points, and its caster has been made. The scene is prepared.
     pub fn cpu_is_ready(&self, n: usize) -> bool {
         goes_to_cpu(&self.engine, n) && self.ready.as_ref().is_some_and(|ready| ready.on_cpu.is_some())
     }
@@ -362,11 +363,12 @@ impl Ready {
     /// waited for. It is made at the first use.
     fn caster(&mut self, [engine, cpu]: [&Engine; 2], n: usize) -> PyResult<(&mut Caster<'static>, Placed<'_>)> {
         let Self { world, places, table, traversal, on_device, on_cpu, n_small, .. } = self;
-        let is_small = engine.device().is_some() && goes_to_cpu(engine, n);
+        let goes_to_cpu = goes_to_cpu(engine, n);
         let lacks_structure = on_cpu.is_none() && matches!(world.accel_options(), AccelOptions::LazyTree(_));
-        let stays_on_device = is_small && lacks_structure && *n_small < BATCHES_BEFORE_BUILD;
+        let may_stay = engine.device().is_some() && lacks_structure && *n_small < BATCHES_BEFORE_BUILD;
+        let stays_on_device = goes_to_cpu && may_stay;
         *n_small += u32::from(stays_on_device);
-        let caster = if goes_to_cpu(engine, n) && !stays_on_device {
+        let caster = if goes_to_cpu && !stays_on_device {
             made(on_cpu, || cpu.caster_of_world(world, Traversal::OF_CPU))
         } else {
             made(on_device, || engine.caster_of_world(world, *traversal))

@@ -37,7 +37,7 @@ fn share_along<S: Simd>(a: Vec3x16<S>, edge: Vec3x16<S>) -> f32x16<S> {
     squared.simd_gt(0.0).select(-a.dot(edge) / squared, f32x16::splat(squared.simd, 0.0))
 }
 
-/// The place of the point of an edge that is closest to the origin: 0 at `a`, 1 at the edge's other end. NaN stays.
+/// The edge's point that is closest to the origin, as a share of the edge: 0 at `a`, 1 at the other end. NaN stays.
 #[inline(always)]
 fn share_on<S: Simd>(a: Vec3x16<S>, edge: Vec3x16<S>) -> f32x16<S> {
     let (along, squared) = (-a.dot(edge), edge.dot(edge));

@@ -64,7 +64,7 @@ pub fn count_hits(inputs: &KernelInputs, traversal: Traversal, rays: &[Ray]) -> 
         });
         n_hits
     };
-    // As many as Python's callers cast themselves (`FEW` in python/src/scene.rs).
+    // `FEW` in python/src/scene.rs relies on it that so few rays are not divided among threads.
     rays.par_iter().with_min_len(64).map_init(|| Traverser::new(inputs, traversal), count).collect()
 }
 

@@ -29,7 +29,7 @@ fn share_along(a: Vec3, edge: Vec3) -> f32 {
     if squared > 0.0 { -a.dot(edge) / squared } else { 0.0 }
 }
 
-/// The place of the point of an edge that is closest to the origin: 0 at `a`, 1 at the edge's other end.
+/// The edge's point that is closest to the origin, as a share of the edge: 0 at `a`, 1 at the other end.
 fn share_on(a: Vec3, edge: Vec3) -> f32 {
     let (along, squared) = (-a.dot(edge), edge.dot(edge));
     if along <= 0.0 {

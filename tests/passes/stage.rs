@@ -130,7 +130,7 @@ impl Stage {
     /// is exactly the CPU's. Elsewhere divisions are 2.5 units in the last place off (Vulkan's precision of OpFDiv),
     /// so a few rays at corners take another path.
     pub fn n_outliers(&self, n: u32) -> usize {
-        if self.context.is_software() { 0 } else { n as usize / 50 }
+        if self.context.is_software() { 0 } else { n as usize / 500 }
     }
 
     /// Returns the kernels' counters, one row per bounce.

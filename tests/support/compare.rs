@@ -64,6 +64,11 @@ pub fn hits(n_outliers: usize, expected: &[Hit], found: &[Hit]) -> Result<(), St
     })
 }
 
+/// Succeeds if all hits are equal, or where some may not be, as [`hits`] does.
+pub fn exact_or_hits(n_outliers: usize, expected: &[Hit], found: &[Hit]) -> Result<(), String> {
+    if n_outliers == 0 { exact(expected, found) } else { hits(n_outliers, expected, found) }
+}
+
 /// Describes the first ray whose two hits differ in any bit, and says how many rays differ. Returns none if all hits
 /// are equal.
 pub fn first_difference(rays: &[PathRay], expected: &[Hit], found: &[Hit]) -> Option<String> {

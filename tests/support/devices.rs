@@ -37,9 +37,9 @@ pub fn device() -> Arc<Context> {
     pretended(DeviceOverrides::default())
 }
 
-/// Returns how many of `n` rays may have other hits than on the CPU, if they aim at corners and edges, begin on
-/// triangles, or meet needles edge-on. None on software drivers, whose arithmetic is exactly the CPU's. Vulkan allows
-/// quotients an error of 2.5 units in the last place (OpFDiv), and one in twelve differs on an H200.
+/// Returns how many of `n` rays may have other hits than on the CPU: none on software drivers, whose arithmetic is
+/// exactly the CPU's. Vulkan allows quotients an error of 2.5 units in the last place (OpFDiv). Of rays that aim at
+/// corners and edges, begin on triangles, or meet needles edge-on, one in twelve has another hit on an H200.
 pub fn n_outliers(context: &Context, n: usize) -> usize {
     if context.is_software() { 0 } else { n.div_ceil(8) }
 }

@@ -36,8 +36,8 @@ float share_along(vec3 a, vec3 edge, float edge_squared) {
     return edge_squared > 0.0 ? -dot_in_order(a, edge) / edge_squared : 0.0;
 }
 
-// The place of the point of an edge that is closest to the origin: 0 at a, 1 at the edge's other end. Both ends are
-// found by comparisons: of two equal numbers, a GPU's quotient need not be 1, and that of a lesser one may be above 1.
+// The edge's point that is closest to the origin, as a share of the edge: 0 at a, 1 at the other end. On a GPU, x / x
+// need not be 1, and x / y may exceed 1 though x < y. So comparisons find the ends, and the quotient is limited.
 float share_on(vec3 a, vec3 edge) {
     float along = -dot_in_order(a, edge), squared = dot_in_order(edge, edge);
     return along <= 0.0 ? 0.0 : along >= squared ? 1.0 : min(along / squared, 1.0);
