@@ -15,8 +15,11 @@ use super::{Access, Binding, Context, GpuError, memory::Object, raw_device::RawD
 const MOST_STAGING_BYTES: usize = 8 << 20;
 /// Number of bytes that a thread copies at a time.
 const COPIED_BYTES: usize = 1 << 18;
-/// Size of a vector of four words, bytes. Kernels that read by address load one such vector at a time.
-const ROW_BYTES: u64 = 16;
+/// Least alignment of a buffer's memory, bytes: a line of the cache, so that no two buffers share one. On an H200
+/// (driver 580.159), where buffers may begin at any multiple of 16, a kernel lost hits or did not end when the buffer
+/// that it wrote began in the 32 bytes in which one that it only reads ended (docs/experiments.md). Kernels that read
+/// by address load 16 aligned bytes at a time.
+const LINE_BYTES: u64 = 128;
 
 /// How kernels use a buffer. Every buffer can also be copied from and to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -320,8 +323,7 @@ impl AnyBuffer {
         unsafe {
             let raw = device.raw.create_buffer(&info, None).map_err(GpuError::call("vkCreateBuffer", name))?;
             let mut requirements = device.raw.get_buffer_memory_requirements(raw);
-            // Kernels that read by address read four aligned words at once.
-            requirements.alignment = requirements.alignment.max(ROW_BYTES);
+            requirements.alignment = requirements.alignment.max(LINE_BYTES);
             let allocation = match device.allocate(name, requirements, location, Object::Buffer(raw)) {
                 Ok(allocation) => ManuallyDrop::new(allocation),
                 Err(error) => {

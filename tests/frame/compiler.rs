@@ -49,7 +49,7 @@ fn pictures_are_the_same_whichever_compiler_made_the_kernels() {
         // Another device may round differently, so a few pixels may differ from the CPU's.
         None => (0..2).for_each(|i| {
             let n_differing = differing(&pictures[i], &on_cpu(&scenes[i], &options[i]), 2e-3).len();
-            assert!(n_differing <= 14, "{name}: {n_differing} of 6912 pixels differ from the CPU's");
+            assert!(n_differing <= 20, "{name}: {n_differing} of 6912 pixels differ from the CPU's");
         }),
     }
 }

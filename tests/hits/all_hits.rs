@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use crate::support::{
-    MeshWithTree, assert_silent, compare, device, kept, meshes, n_outliers, pretended,
+    MeshWithTree, assert_silent, device, kept,
+    lists::{agree, counts_of, list},
+    meshes, n_outliers, pretended,
     random::Random,
     rays::{met_in_double_precision, nasty_ray},
 };
@@ -66,30 +68,6 @@ fn all_hits(lists: impl IntoIterator<Item = Vec<Hit>>) -> AllHits {
         all.ray_splits.push(all.hits.len() as u64);
     }
     all
-}
-
-fn counts_of(all: &AllHits) -> Vec<u32> {
-    all.ray_splits.windows(2).map(|ends| (ends[1] - ends[0]) as u32).collect()
-}
-
-fn list(all: &AllHits, ray_ix: usize) -> &[Hit] {
-    &all.hits[all.ray_splits[ray_ix] as usize..all.ray_splits[ray_ix + 1] as usize]
-}
-
-/// Succeeds if no more than `n_outliers` rays have other lists. Where some may, hits are compared but for rounding.
-fn agree(n_outliers: usize, expected: &AllHits, found: &AllHits) -> Result<(), String> {
-    assert_eq!(expected.ray_splits.len(), found.ray_splits.len());
-    let differs = |ray_ix: &usize| match (list(expected, *ray_ix), list(found, *ray_ix)) {
-        (expected, found) if n_outliers == 0 => expected != found,
-        (expected, found) => compare::hits(0, expected, found).is_err(),
-    };
-    let differing: Vec<_> = (0..expected.ray_splits.len() - 1).filter(differs).collect();
-    match differing.first() {
-        Some(&first) if differing.len() > n_outliers => {
-            Err(format!("{} rays, as {first}: {:?} {:?}", differing.len(), list(expected, first), list(found, first)))
-        }
-        _ => Ok(()),
-    }
 }
 
 /// Returns a grid of each kind.

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 pub const MISS: Hit = Hit { t: f32::INFINITY, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
 /// The greatest error of a distance, as a share of the distance to the triangle's farthest corner.
-const TOLERANCE: f64 = 1.0 / (1 << 20) as f64;
+const TOLERANCE: f64 = 1.0 / (1 << 19) as f64;
 
 fn corners(triangle: &Triangle) -> [DVec3; 3] {
     [triangle.v0, triangle.v1, triangle.v2].map(|v| v.as_dvec3())

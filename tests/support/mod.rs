@@ -12,6 +12,7 @@ pub mod devices;
 #[cfg(target_os = "linux")]
 pub mod display;
 pub mod kept;
+pub mod lists;
 pub mod meshes;
 pub mod packets;
 pub mod random;
