@@ -123,7 +123,8 @@ pub struct ExternalBuffer {
 }
 
 impl ExternalBuffer {
-    /// Wraps `bytes` bytes of a buffer, from an offset on.
+    /// Wraps `bytes` bytes of a buffer, from an offset on. Of ranges that kernels read and those that they write, none
+    /// should share 128 aligned bytes: on an H200, a kernel lost hits where two shared 32 (docs/experiments.md).
     ///
     /// # Safety
     /// The handle is a buffer of the context's device with the usage `STORAGE_BUFFER` and at least `offset + bytes`
