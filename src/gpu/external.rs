@@ -123,8 +123,8 @@ pub struct ExternalBuffer {
 }
 
 impl ExternalBuffer {
-    /// Wraps `bytes` bytes of a buffer, from an offset on. Of ranges that kernels read and those that they write, none
-    /// should share 128 aligned bytes: on an H200, a kernel lost hits where two shared 32 (docs/experiments.md).
+    /// Wraps `bytes` bytes of a buffer, from an offset on. A range that kernels read and one that they write should not
+    /// share an aligned block of 128 bytes: on an H200, a kernel lost hits where they shared 32 (docs/experiments.md).
     ///
     /// # Safety
     /// The handle is a buffer of the context's device with the usage `STORAGE_BUFFER` and at least `offset + bytes`

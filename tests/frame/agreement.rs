@@ -8,7 +8,7 @@ use kdray::{
     world::FlatScene,
 };
 
-use super::studio::{differing, on_both, options};
+use super::studio::{device, differing, on_both, options};
 use crate::support::scenes;
 
 /// Largest accepted difference of a pixel's radiance: some 2^-13 of a steep highlight's `pow`.
@@ -33,7 +33,8 @@ fn device_and_cpu_agree_on_the_scenes_that_ship() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(format!("{name}.toml"));
         let scene = scenes::load(&path);
         let raster = options(96, 72, depth(&scene));
-        check(name, &scene, &RenderOptions { primary: Primary::Trace, ..raster.clone() }, 0.003);
+        let share = if device().is_software() { 0.002 } else { 0.003 };
+        check(name, &scene, &RenderOptions { primary: Primary::Trace, ..raster.clone() }, share);
         // Corners are snapped to 1/16 px. Triangles of less than a pixel have many outlines, which snapping moves
         // far.
         check(name, &scene, &raster, 0.05);
@@ -49,9 +50,10 @@ fn device_and_cpu_agree_whatever_the_options() {
             check("mixed", &scene, &RenderOptions { traversal, primary, ..options(80, 60, 5) }, share);
         }
     }
-    // An even height beside a large width: the middle row of an odd height sees an edge of the floor exactly edge-on,
-    // which an H200's rasterizer gives to the sky.
-    for (width, height, max_depth) in [(1, 1, 1), (7, 91, 2), (131, 4, 4)] {
+    // In three rows, the walls' seam at y = 0 is exactly on the middle row's samples. An H200's rasterizer leaves some
+    // of them empty, which lie beside the camera.
+    let wide = if device().is_software() { (130, 3, 4) } else { (131, 4, 4) };
+    for (width, height, max_depth) in [(1, 1, 1), (7, 91, 2), wide] {
         check("odd size", &scenes::mixed(), &options(width, height, max_depth), 0.03);
     }
     let denoise = Denoise::Paper { threshold: 0.3 };

@@ -22,8 +22,13 @@ fn check(stage: &Stage, n_rays: u32) {
     stage.set_hits(&[]);
     stage.trace(&FIRST, |commands, batch| stage.passes.trace.record(commands, &stage.resources, batch));
     let found = stage.resources.queue.hits.download().expect("hits");
-    let n_outliers = n_outliers(&stage.context, n_rays as usize);
-    compare::exact_or_hits(n_outliers, &expected, &found).unwrap();
+    // Many of these rays begin on triangles: on an H200, 4 % have another hit. A single ray must have its own.
+    let n_outliers = if n_rays == 1 { 0 } else { n_outliers(&stage.context, n_rays as usize) };
+    if stage.context.is_software() {
+        compare::exact(&expected, &found).unwrap();
+    } else {
+        compare::hits(n_outliers, &expected, &found).unwrap();
+    }
     assert!(stage.counters()[0].n_hits.abs_diff(n_hits) as usize <= n_outliers, "{n_rays} rays");
 }
 

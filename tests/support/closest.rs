@@ -10,8 +10,6 @@ use rayon::prelude::*;
 pub const MISS: Hit = Hit { t: f32::INFINITY, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
 /// The greatest error of a distance, as a share of the distance to the triangle's farthest corner.
 const TOLERANCE: f64 = 1.0 / (1 << 20) as f64;
-/// The greatest error of a point in an instance's space, as a share of its greatest coordinate.
-const ROUNDING: f64 = 1.0 / (1 << 24) as f64;
 
 fn corners(triangle: &Triangle) -> [DVec3; 3] {
     [triangle.v0, triangle.v1, triangle.v2].map(|v| v.as_dvec3())
@@ -40,8 +38,7 @@ impl Exact {
         let of_edges = edges.iter().map(|(from, to)| to_edge(*from, *to)).fold(f64::INFINITY, f64::min);
         let of_plane = if is_inside { (point - a).dot(normal).abs() / normal.length() } else { f64::INFINITY };
         let reach = corners.iter().map(|corner| corner.distance(point)).fold(0.0, f64::max);
-        let tolerance = TOLERANCE * reach + ROUNDING * point.abs().max_element();
-        Self { distance: of_edges.min(of_plane), tolerance }
+        Self { distance: of_edges.min(of_plane), tolerance: TOLERANCE * reach }
     }
 }
 
