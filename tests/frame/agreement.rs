@@ -50,8 +50,8 @@ fn device_and_cpu_agree_whatever_the_options() {
             check("mixed", &scene, &RenderOptions { traversal, primary, ..options(80, 60, 5) }, share);
         }
     }
-    // In three rows, the walls' seam at y = 0 is exactly on the middle row's samples. An H200's rasterizer leaves some
-    // of them empty, which lie beside the camera.
+    // In three rows, the walls' seam at y = 0 is exactly on the middle row's samples. An H200's rasterizer leaves those
+    // beside the camera empty.
     let wide = if device().is_software() { (130, 3, 4) } else { (131, 4, 4) };
     for (width, height, max_depth) in [(1, 1, 1), (7, 91, 2), wide] {
         check("odd size", &scenes::mixed(), &options(width, height, max_depth), 0.03);

@@ -12,7 +12,7 @@ use crate::support::{scenes, with_lanes};
 #[test]
 fn a_device_with_lanes_to_spare_gives_the_same_bits() {
     let scene = scenes::mixed();
-    // A GPU has lanes to spare for these few rays.
+    // So few rays leave lanes of a GPU idle, so it is taken for a device with a single lane.
     let (world, plain) = (world_of(&scene), with_lanes(1));
     let options = RenderOptions { primary: Primary::Trace, ..options(40, 30, 4) };
     let picture = |context: &std::sync::Arc<Context>| {

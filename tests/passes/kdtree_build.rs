@@ -251,8 +251,8 @@ fn submits_and_timers_do_not_change_the_tree() {
 }
 
 /// Leaves out one barrier after the other. Synchronization validation of Debian 12 (1.3.239) sees all hazards but that
-/// between `bounds` and `scales`, of words that atomics alone update. Software drivers run kernels in order even
-/// so. On a GPU they overlap, and a kernel that reads what is not there yet may never end, as on an H200.
+/// between `bounds` and `scales`, of words that atomics alone update. Without a barrier, software drivers still
+/// run kernels in order. On a GPU, kernels overlap, and one that reads unfinished data may never end: seen on an H200.
 #[test]
 fn every_barrier_of_a_build_is_needed() {
     const N_LEVELS: u32 = 4;
