@@ -106,15 +106,27 @@ impl Packed {
         macro_rules! of_size {
             ($($n_words:literal)*) => {
                 match self.byte_stride / 4 {
-                    $($n_words => decode::<$n_words>(bytes, count, self.filter),)*
+                    $($n_words => decode::<$n_words>(bytes, count),)*
                     _ => unreachable!("n_bytes accepts no other stride"),
                 }
             };
         }
-        of_size!(
+        let mut decoded = of_size!(
             1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 24 25 26 27 28 29 30 31 32 33 34 35 36 37 38
             39 40 41 42 43 44 45 46 47 48 49 50 51 52 53 54 55 56 57 58 59 60 61 62 63 64
-        )
+        )?;
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut decoded);
+        match (self.filter, self.byte_stride) {
+            (Filter::None, _) => {}
+            (Filter::Octahedral, 4) => meshopt::decode_filter_oct::<i8>(bytemuck::cast_slice_mut(bytes)),
+            (Filter::Octahedral, _) => meshopt::decode_filter_oct::<i16>(bytemuck::cast_slice_mut(bytes)),
+            (Filter::Quaternion, _) => meshopt::decode_filter_quat(bytemuck::cast_slice_mut(bytes)),
+            // It decodes each word on its own.
+            (Filter::Exponential, _) => meshopt::decode_filter_exp::<1>(bytemuck::cast_slice_mut(bytes)),
+            (Filter::Color, 4) => meshopt::decode_filter_color::<u8>(bytemuck::cast_slice_mut(bytes)),
+            (Filter::Color, _) => meshopt::decode_filter_color::<u16>(bytemuck::cast_slice_mut(bytes)),
+        }
+        Ok(words(decoded))
     }
 }
 
@@ -128,20 +140,13 @@ impl<const N: usize> Default for Element<N> {
     }
 }
 
-fn decode<const N: usize>(bytes: &[u8], count: usize, filter: Filter) -> meshopt::Result<Vec<u8>> {
-    let elements = meshopt::decode_vertex_buffer::<Element<N>>(bytes, count)?;
-    let mut elements: Vec<[u32; N]> = elements.into_iter().map(|element| element.0).collect();
-    let bytes: &mut [u8] = bytemuck::cast_slice_mut(elements.as_flattened_mut());
-    match (filter, N) {
-        (Filter::None, _) => {}
-        (Filter::Octahedral, 1) => meshopt::decode_filter_oct::<i8>(bytemuck::cast_slice_mut(bytes)),
-        (Filter::Octahedral, _) => meshopt::decode_filter_oct::<i16>(bytemuck::cast_slice_mut(bytes)),
-        (Filter::Quaternion, _) => meshopt::decode_filter_quat(bytemuck::cast_slice_mut(bytes)),
-        (Filter::Exponential, _) => meshopt::decode_filter_exp::<N>(&mut elements),
-        (Filter::Color, 1) => meshopt::decode_filter_color::<u8>(bytemuck::cast_slice_mut(bytes)),
-        (Filter::Color, _) => meshopt::decode_filter_color::<u16>(bytemuck::cast_slice_mut(bytes)),
+/// Returns the words of all elements. This is compiled once for each size, so it is short.
+fn decode<const N: usize>(bytes: &[u8], count: usize) -> meshopt::Result<Vec<u32>> {
+    let mut words = Vec::with_capacity(N * count);
+    for Element(element) in &meshopt::decode_vertex_buffer::<Element<N>>(bytes, count)? {
+        words.extend_from_slice(element);
     }
-    Ok(words(elements.into_flattened()))
+    Ok(words)
 }
 
 fn words(words: Vec<u32>) -> Vec<u8> {
