@@ -80,7 +80,9 @@ fn of_name(path: &Path) -> Option<&'static str> {
         "max" => Some("is a file of 3ds Max: export it from there as glTF or OBJ"),
         "mtl" => Some("holds the materials of an OBJ file: name the OBJ file"),
         "gcode" => Some("holds the moves of a printer: name the STL file from which it was made"),
-        "png" | "jpg" | "jpeg" | "tif" | "tiff" | "tga" | "bmp" | "webp" => Some("is an image and no scene"),
+        "png" | "jpg" | "jpeg" | "tif" | "tiff" | "tga" | "bmp" | "webp" | "gif" | "hdr" | "exr" | "dds" | "ktx2" => {
+            Some("is an image and no scene")
+        }
         "dxf" => Some("is a DXF file, which is not read: FreeCAD, for example, saves it as OBJ or STL"),
         "igs" | "iges" => Some("is an IGES file, which has no triangles: FreeCAD, for example, saves it as OBJ or STL"),
         _ => None,
@@ -136,5 +138,9 @@ mod tests {
         assert!(of_other_name(Path::new("a.off"), b"OFF\n3 1 0\n").contains("an OFF file"));
         assert!(of_other_name(Path::new("a.fbx"), b"Kaydara FBX Binary  \0").contains("FBX"));
         assert!(of_other_name(Path::new("/"), b" ").contains("a folder"));
+        for image in ["png", "jpg", "tif", "tga", "bmp", "webp", "gif", "hdr", "exr", "dds", "ktx2"] {
+            let path = format!("a.{image}");
+            assert!(of_other_name(Path::new(&path), b"\0").contains("is an image"), "{path}");
+        }
     }
 }
