@@ -8,20 +8,20 @@ layout(local_size_x = 1) in;
 layout(std430, set = 0, binding = BIND_KD_SCALE_COUNTS) readonly buffer ScaleCountsBlock { uint scale_counts[]; };
 layout(std430, set = 0, binding = BIND_KD_CELLS_FROM) writeonly buffer CellsFromBlock { KdCell cells_from[]; };
 
-// Twins of src/accel/bounds.rs and of LIMITS and NEEDY_SHARE in src/accel/kdtree/scales.rs.
+// Twins of src/accel/bounds.rs and of LIMITS and TRIANGLES_PER_NEEDY in src/accel/kdtree/scales.rs.
 const float MARGIN = 1.0 / 131072.0;
 const float LEAST_MARGIN = 1.17549435e-38;
 const float LARGEST = 3.4028235e38;
 const float LEAST_WITH_SCALES = 8.2718061e-25; // 2^-80
 const float GREATEST_WITH_SCALES = 1.1529215e18; // 2^60
-const uint NEEDY_SHARE = 16u;
+const uint TRIANGLES_PER_NEEDY = 16u;
 
 uint finest_needed(float largest) {
     if (!(largest >= LEAST_WITH_SCALES && largest <= GREATEST_WITH_SCALES)) return 0u;
     uint n_needy = 0u;
     for (uint scale = KD_SCALES - 1u; scale > 0u; --scale) {
         n_needy += scale_counts[scale];
-        if (n_needy * NEEDY_SHARE >= build.n_triangles) return scale;
+        if (n_needy * TRIANGLES_PER_NEEDY >= build.n_triangles) return scale;
     }
     return 0u;
 }

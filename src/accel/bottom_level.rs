@@ -202,7 +202,7 @@ impl BottomLevel {
         }
     }
 
-    /// The numbers of the host's nodes or cells, and of entries.
+    /// The number of the host's nodes or cells, and that of entries (indices of triangles).
     pub fn sizes(&self) -> (usize, usize) {
         (self.nodes().len() + self.cells().len(), self.leaf_triangles().len())
     }

@@ -1,7 +1,8 @@
 //! Structures that are built when they are needed. The host keeps the options; each device builds the structure for
-//! itself, and the host builds one at the first [`Lazy::get`]. Both grids have the same bits, unless the device had to
-//! lower the limit of references ([`GridOptions::max_references`](super::grid::GridOptions::max_references)). The
-//! kd-trees differ a little, and lead rays to the same hits.
+//! itself, and the host builds one at the first [`Lazy::get`]. The host's grid and the device's have the same bits,
+//! unless the device had to lower the limit of references
+//! ([`GridOptions::max_references`](super::grid::GridOptions::max_references)). Their kd-trees differ a little, and
+//! lead rays to the same hits.
 
 use std::sync::OnceLock;
 
@@ -25,7 +26,7 @@ pub trait Structure: Sized {
     fn of(triangles: &[Triangle], options: &Self::Options) -> Self;
 
     /// Returns the statistics of the structure that [`Structure::of`] has built with the same arguments.
-    fn sizes(&self, n_triangles: usize, options: &Self::Options) -> Statistics;
+    fn statistics(&self, n_triangles: usize, options: &Self::Options) -> Statistics;
 }
 
 impl Structure for Grid {
@@ -35,7 +36,7 @@ impl Structure for Grid {
         Self::build(triangles, options)
     }
 
-    fn sizes(&self, _: usize, _: &GridOptions) -> Statistics {
+    fn statistics(&self, _: usize, _: &GridOptions) -> Statistics {
         Statistics::Grid(self.statistics())
     }
 }
@@ -47,7 +48,7 @@ impl Structure for KdTree {
         Self::build(triangles, options)
     }
 
-    fn sizes(&self, n_triangles: usize, options: &BuildOptions) -> Statistics {
+    fn statistics(&self, n_triangles: usize, options: &BuildOptions) -> Statistics {
         Statistics::KdTree(self.statistics(n_triangles, options))
     }
 }
@@ -176,7 +177,7 @@ impl<S: Structure> Lazy<S> {
     pub fn statistics(&self, triangles: &[Triangle]) -> Statistics {
         match self.on_device.get() {
             Some(build) => build.statistics.clone(),
-            None => self.get(triangles).sizes(triangles.len(), &self.options),
+            None => self.get(triangles).statistics(triangles.len(), &self.options),
         }
     }
 

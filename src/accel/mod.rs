@@ -39,7 +39,8 @@ pub enum Accel {
     LazyTree(LazyTree),
     /// A grid. Each device builds its own grid. The host builds a grid only at the first [`Lazy::get`].
     Grid(LazyGrid),
-    /// A kd-tree or a grid for each geometry, and a hierarchy over the instances. Devices may build kd-trees.
+    /// For worlds of instances: a kd-tree or a grid for each geometry, and a hierarchy over the instances. Devices may
+    /// build the structures of geometries.
     TwoLevel(Box<TwoLevel>),
 }
 
@@ -48,10 +49,11 @@ pub enum Accel {
 pub enum AccelOptions {
     /// Options of a kd-tree that the host builds.
     KdTree(BuildOptions),
-    /// Options of a kd-tree that each device builds, of at most 32 levels. Of kept meshes, each device builds the trees
-    /// of those with 2048 triangles or more, and the host builds the others.
+    /// Options of a kd-tree that each device builds, of at most 32 levels. In a world of instances, each device builds
+    /// the trees of geometries with 2048 triangles or more, and the host builds the others.
     LazyTree(BuildOptions),
-    /// Options of a grid.
+    /// Options of a grid, which each device builds. In a world of instances, the host builds those of geometries with
+    /// fewer than 2048 triangles.
     Grid(GridOptions),
 }
 

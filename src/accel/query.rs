@@ -1,4 +1,5 @@
-//! Kinds of ray queries.
+//! What `cast` looks for. All hits and closest points have kernels of their own (`passes/all_hits.rs`,
+//! `passes/closest_point.rs`).
 
 /// Kind of ray query.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,5 +1,6 @@
-//! The one list of searches. Each is an acceleration structure with an algorithm that leads rays through it. Option
-//! words, help, the modules of kernels and the benches follow from the list.
+//! Searches: an acceleration structure with an algorithm that leads rays through it. Option words, help and `bench
+//! traversal` follow from this list. search_modules.rs names the SPIR-V modules; `bench driver` has a selection of its
+//! own.
 
 use std::{fmt, str::FromStr};
 

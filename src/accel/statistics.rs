@@ -1,4 +1,4 @@
-//! Sizes of acceleration structures.
+//! Statistics of acceleration structures.
 
 use std::fmt::{self, Display};
 

@@ -26,7 +26,8 @@ use crate::layout::{Instance, TOP_LEAF, TOP_MAX_DEPTH, TopNode};
 /// The margin of an instance's box for each unit of 1 + `Instance::condition`, as a multiple of the largest coordinate
 /// of the world.
 const MARGIN: f64 = 68.0 / (1 << 24) as f64;
-/// More than what margins add to margins: these are at most 1.7 % of m' ([`MAX_CONDITION`]).
+/// Margins enlarge the largest coordinate m', and thus themselves, by at most 1.7 % ([`MAX_CONDITION`]). This factor
+/// covers that.
 const GROWTH: f64 = 1.02;
 /// The greatest `Instance::condition` for which an instance keeps its own space.
 pub const MAX_CONDITION: f64 = 4096.0;
@@ -42,8 +43,8 @@ pub struct TopLevel {
     pub nodes: Vec<TopNode>,
     /// The box that holds all instances, with their margins. World units.
     pub bounds: Bounds,
-    /// The share of the distance of a ray's origin by which boxes are too small for the ray, if the origin is beyond 4
-    /// times the largest coordinate of `bounds`: the greatest margin as a share of that coordinate.
+    /// For rays whose origin is beyond 4 times the largest coordinate of `bounds`: all boxes have to be grown by this
+    /// factor times the origin's distance. It is the greatest margin, divided by that coordinate.
     pub pad_from_afar: f32,
 }
 

@@ -3,9 +3,9 @@
 //! single-ray traversal using multi-branching BVHs", 2008).
 //!
 //! It is made from a kd-tree. Leaves become blocks of triangles, and siblings with at most sixteen triangles may become
-//! one block. Of the splits above the blocks, up to fifteen become one node. They are chosen so that the sum of the
-//! surface areas of all boxes is least. So is, on average, the number of nodes and blocks that a random ray visits
-//! (Ylitie, Karras, Laine: "Efficient incoherent ray traversal on GPUs through compressed wide BVHs", 2017).
+//! one block. Of the splits above the blocks, up to fifteen become one node. The choice makes the sum of the surface
+//! areas of all boxes least, and with it the mean number of nodes and blocks that a random ray visits (Ylitie, Karras,
+//! Laine: "Efficient incoherent ray traversal on GPUs through compressed wide BVHs", 2017).
 //!
 //! # Why no ray misses a triangle
 //!

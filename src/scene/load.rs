@@ -8,7 +8,7 @@ use super::{
     files::{SourceFile, pack::OpenScene},
     formats::{
         gltf,
-        image_files::Images,
+        image_cache::Images,
         mesh_file::{self, Loaded, Loading, MeshFile, MeshFormat},
     },
     guess::{standard, up_axis},

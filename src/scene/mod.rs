@@ -1,8 +1,8 @@
 //! Scenes as files and programs describe them: meshes, their instances in the world, materials, lights, a camera.
 //! Nothing here depends on how kernels lay data out; `world` flattens a scene for tracing.
 //!
-//! A scene file is a TOML file, whose keys `description` lists, a glTF file, a mesh file, OBJ, PLY or STL, or a pack of
-//! any of them with all that it names.
+//! A scene is loaded from a scene file (TOML, whose keys `description` lists), from a mesh file (glTF, OBJ, PLY, STL),
+//! or from a pack of either with all files that it names.
 
 // Readers of files alone use many functions of the model.
 #![cfg_attr(not(feature = "files"), allow(dead_code))]
@@ -32,8 +32,8 @@ pub use self::{
     files::pack::{ENDING as PACK_ENDING, pack_hash, packed_path},
     poser::animations_of,
     scene_file::{
+        camera_path::CameraPath,
         convert::scene_file_of,
-        path::CameraPath,
         sources::{source_files, source_files_with},
         terms::{Term, TermValue},
     },

@@ -78,7 +78,7 @@ impl Grid {
 /// Returns the lattice, the cells and the pairs of a uniform grid, or of the upper level of a two-level grid.
 fn upper_level(input: &Input, bounds: &Bounds, density: f32) -> (Lattice, Level) {
     let n_finite = input.triangles.par_iter().filter(|triangle| is_finite(triangle)).count();
-    let mut lattice = Lattice::of_density(bounds, (density * n_finite as f32) as u32);
+    let mut lattice = Lattice::finest(bounds, (density * n_finite as f32) as u32);
     let mut n_coarser = 0;
     for n_attempts in 1.. {
         let item = |triangle_ix: usize| {

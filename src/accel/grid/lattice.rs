@@ -24,7 +24,7 @@ pub struct Lattice {
 impl Lattice {
     /// Returns the lattice of the smallest cubes with which the box has no more than `max_cells` cubes, and no more
     /// than `GRID_MAX_RESOLUTION` along an axis. The cubes are no smaller than the margin of the box.
-    pub fn of_density(bounds: &Bounds, max_cells: u32) -> Self {
+    pub fn finest(bounds: &Bounds, max_cells: u32) -> Self {
         let margin = bounds.margin();
         // The bits of positive floats, as integers, have the same order as the floats. The search finds the bits of
         // the largest size that is too small, the highest bit first. At every step, `bits` are those of such a size.
@@ -38,7 +38,7 @@ impl Lattice {
         Self::of_size(bounds, f32::from_bits(bits + 1).min(f32::MAX))
     }
 
-    /// Returns the lattice of cubes of a size that [`Lattice::of_density`] has found, or of a larger one. One cube
+    /// Returns the lattice of cubes of a size that [`Lattice::finest`] has found, or of a larger one. One cube
     /// of the size `f32::MAX` counts as filling any box.
     fn of_size(bounds: &Bounds, cell_size: f32) -> Self {
         let mut lattice = Self { min: bounds.min, max: bounds.max, cell_size, n_cells: [1; 3] };
@@ -194,7 +194,7 @@ mod tests {
     #[test]
     fn cubes_are_as_small_as_their_number_allows() {
         for (height, max_cells, expected) in [(1.0, 8, [2, 2, 2]), (0.5, 5, [2, 1, 2]), (1e-3, 99, [9, 1, 9])] {
-            let lattice = Lattice::of_density(&unit_box(height), max_cells);
+            let lattice = Lattice::finest(&unit_box(height), max_cells);
             assert_eq!(lattice.n_cells, expected, "{height} {max_cells}");
         }
     }
@@ -203,7 +203,7 @@ mod tests {
     fn a_box_of_any_size_is_filled() {
         for scale in [1e-30, 1e-6, 1.0, 1e6, 1e30, f32::MAX] {
             let bounds = Bounds { min: [-scale, 0.0, 0.3 * scale], max: [scale, 0.1 * scale, 0.4 * scale] };
-            let lattice = Lattice::of_density(&bounds, 100_000);
+            let lattice = Lattice::finest(&bounds, 100_000);
             assert!(lattice.n_cubes() <= 100_000 && lattice.n_cubes() > 50_000, "{scale}: {:?}", lattice.n_cells);
             (0..3).for_each(|axis| assert_eq!(lattice.plane(axis, lattice.n_cells[axis]), bounds.max[axis]));
         }
@@ -213,7 +213,7 @@ mod tests {
     fn doubled_cubes_end_as_one() {
         for scale in [1e-6, 1.0, 1e30, f32::MAX] {
             let bounds = Bounds { min: [-scale, 0.0, 0.3 * scale], max: [scale, 0.1 * scale, 0.4 * scale] };
-            let lattice = Lattice::of_density(&bounds, 100_000);
+            let lattice = Lattice::finest(&bounds, 100_000);
             let (twice, n) = lattice.coarser(1);
             assert_eq!((n, twice.cell_size), (1, 2.0 * lattice.cell_size));
             assert_eq!(twice.n_cells, lattice.n_cells.map(|n| n.div_ceil(2)), "{scale}");
@@ -225,7 +225,7 @@ mod tests {
     #[test]
     fn cubes_are_never_smaller_than_the_margin() {
         let bounds = Bounds { min: [1e5; 3], max: [100_000.5; 3] };
-        let lattice = Lattice::of_density(&bounds, 1_000_000);
+        let lattice = Lattice::finest(&bounds, 1_000_000);
         assert!(lattice.cell_size >= bounds.margin());
     }
 

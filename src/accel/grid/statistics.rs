@@ -1,4 +1,4 @@
-//! Sizes of grids.
+//! Statistics of grids.
 
 use serde::Serialize;
 

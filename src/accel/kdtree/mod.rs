@@ -5,7 +5,7 @@
 //!              large cells, └ small cells,            ├─> planes, slabs: let rays skip most triangles
 //!              all threads    a thread each           └─> validate, coverage
 //!                   │              │       scales: margins, the larger the farther a triangle is from 0
-//!                   └──> search <──┘   binned: counts by bins, sweeps the few that may hold the best plane
+//!                   └──> split  <──┘   binned: counts by bins, sweeps the few that may hold the best plane
 //!                        and clip      counted: counts at every plane, for cells of at most 32 triangles
 //! ```
 //!

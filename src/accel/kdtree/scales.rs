@@ -1,5 +1,5 @@
-//! Scales: how exactly each place of a tree has to be treated. A mesh of 1 m beside a ground of 10 km needs leaves that
-//! are far smaller than the rounding of the ground's hits.
+//! Scales: a triangle's margin depends on its own largest coordinate, not on the scene's. A mesh of 1 m beside a ground
+//! of 10 km needs leaves that are far smaller than the rounding of the ground's hits.
 //!
 //! Scale i stands for the length m / 2^i, where m is the largest coordinate of all triangles. A triangle has the
 //! finest scale whose length is not below its own largest coordinate. `Scales::finest` limits the scales of a tree. In
@@ -44,9 +44,9 @@ const MAX_SCALE: u32 = 18;
 /// The size of a triangle as a multiple of its margin, below which the triangle needs a finer scale. With margins of
 /// a quarter of the size, a tree has a tenth more references. With margins as large as the triangles, rays are slow.
 const SIZE_IN_MARGINS: f32 = 8.0;
-/// The share of the triangles for whose needs the finest scale is chosen: one in this number. Finer scales have a
-/// price: rays are moved from nearer origins.
-const NEEDY_SHARE: usize = 16;
+/// The finest scale is one that at least one in this number of triangles needs. Finer scales have a price: rays are
+/// moved from nearer origins.
+const TRIANGLES_PER_NEEDY: usize = 16;
 /// The least and the greatest largest coordinate of scenes with several scales, world units. In between, no product
 /// of coordinates and no scaled plane overflows or is denormal.
 const LIMITS: [f32; 2] = [f32::from_bits((127 - 80) << 23), f32::from_bits((127 + 60) << 23)];
@@ -83,7 +83,7 @@ impl Scales {
         KdSlabTree { largest, margin, finest_scale, ..KdSlabTree::default() }
     }
 
-    /// Returns the finest scale that `NEEDY_SHARE` of the triangles need.
+    /// Returns the finest scale that at least one in `TRIANGLES_PER_NEEDY` triangles needs.
     fn finest_needed(&self, n: usize, triangle: impl Fn(usize) -> Triangle + Sync + Send) -> u32 {
         type Counts = [usize; MAX_SCALE as usize + 1];
         let counted = (0..n).into_par_iter().fold(
@@ -101,7 +101,7 @@ impl Scales {
         let mut n_needy = 0;
         for scale in (1..=MAX_SCALE).rev() {
             n_needy += counts[scale as usize];
-            if n_needy * NEEDY_SHARE >= n {
+            if n_needy * TRIANGLES_PER_NEEDY >= n {
                 return scale;
             }
         }

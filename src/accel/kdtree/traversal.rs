@@ -19,8 +19,8 @@ pub enum Traversal {
     ShortStack,
     /// Ropes: links from each leaf to its neighbours.
     Ropes,
-    /// A stack: an array of pending subtrees. On the CPU, packets of sixteen rays are traced, or of most paths, single
-    /// rays through a wide hierarchy.
+    /// A stack: an array of pending subtrees. On the CPU, packets of sixteen camera rays go through the tree; most
+    /// other rays go singly through the wide hierarchy (`accel/wide_bvh.rs`).
     Stack,
     /// Brute force: every triangle is tested, without a tree. For small meshes.
     Brute,

@@ -3,7 +3,7 @@
 use glam::Vec2;
 use serde::Deserialize;
 
-use super::image_files::{Images, View};
+use super::image_cache::{Images, View};
 use crate::scene::model::{Channel, Encoding, Material, Texture, Wrap, error::Checked};
 
 /// A map: the name of an image, relative to the scene file's folder, or a table.

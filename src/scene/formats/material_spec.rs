@@ -55,9 +55,9 @@ pub(crate) struct MaterialSpec {
     pub attenuation_color: Option<[f32; 3]>,
     /// World units; infinite where absent.
     pub attenuation_distance: Option<f32>,
-    /// Share of the surface that a clear layer covers, 0 to 1; 0 where absent.
+    /// Share of the surface that a clear coat covers, 0 to 1; 0 where absent.
     pub clearcoat: Option<f32>,
-    /// Perceived roughness of the clear layer, 0 to 1; 0 where absent.
+    /// Perceived roughness of the clear coat, 0 to 1; 0 where absent.
     pub clearcoat_roughness: Option<f32>,
     /// Reflectance of the sheen of cloth; black where absent.
     pub sheen_color: Option<[f32; 3]>,

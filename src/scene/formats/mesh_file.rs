@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::{DVec3, Vec3};
 
 use super::{
-    image_files::Images,
+    image_cache::Images,
     obj::{ObjFile, obj_mesh, read_obj},
     ply::{PlyMesh, ply_mesh},
     scan_colours,

@@ -1,8 +1,9 @@
-//! Readers of foreign formats: glTF, OBJ with MTL, PLY, STL, and images.
+//! Readers of foreign formats: glTF, OBJ with MTL, PLY, STL, and images. Also the tables of materials and maps that
+//! scene files share with MTL (`material_spec`, `map_spec`), and a scene's images, each decoded once (`image_cache`).
 
 pub(crate) mod gltf;
 pub(crate) mod image;
-pub(crate) mod image_files;
+pub(crate) mod image_cache;
 pub(crate) mod map_spec;
 pub(crate) mod material_spec;
 pub(crate) mod mesh_file;

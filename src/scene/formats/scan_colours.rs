@@ -5,7 +5,7 @@ use std::path::Path;
 
 use glam::{Vec3, Vec4};
 
-use super::{image_files::Images, mesh_file::Loaded};
+use super::{image_cache::Images, mesh_file::Loaded};
 use crate::scene::model::{Encoding, Material, Mesh, Texture, Wrap, texture::linear_of_srgb};
 
 /// Number of faces that are looked at. It is odd, so that they are not all in one column of a grid.

@@ -76,7 +76,7 @@ impl Direction {
 
 /// The conditions for a new camera: the axes of the world, the shape of the picture and the field of view.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Frame {
+pub(crate) struct ViewSpec {
     pub axes: WorldAxes,
     /// Width of the picture divided by its height.
     pub aspect: f64,
@@ -85,7 +85,7 @@ pub(crate) struct Frame {
 
 /// Returns a camera that sees the near part of a scene, which mostly is the whole scene, from outside, and that is as
 /// close as it can be. If the bounding box is long or flat, it is seen from a direction that shows much of its sides.
-pub(crate) fn camera(scene: &Scene, near: &NearPart, frame: &Frame) -> Camera {
+pub(crate) fn camera(scene: &Scene, near: &NearPart, frame: &ViewSpec) -> Camera {
     let bounds = BoundingBox::new(near.bounds);
     let (usual_direction, usual) = usual(&bounds, frame);
     let others: Vec<_> =
@@ -107,7 +107,7 @@ pub(crate) fn camera(scene: &Scene, near: &NearPart, frame: &Frame) -> Camera {
 }
 
 /// Returns the view of a box from the usual direction, or from a higher one if that shows its top.
-fn usual(bounds: &BoundingBox, frame: &Frame) -> (Direction, View) {
+fn usual(bounds: &BoundingBox, frame: &ViewSpec) -> (Direction, View) {
     let WorldAxes { right, front, up } = frame.axes;
     let half = |axis: DVec3| bounds.half.dot(axis.abs());
     let is_high = half(up) > AS_HIGH_AS_WIDE * half(right).max(half(front));
@@ -133,7 +133,7 @@ pub(super) fn support(scene: &Scene, near: &NearPart, from: DVec3, directions: [
 
 /// Returns a camera that sees a whole bounding box horizontally from outside: from the front, or from an `azimuth` to
 /// the right of it, in degrees.
-pub(crate) fn horizontal_camera(bounds: (Vec3, Vec3), azimuth: u32, frame: &Frame) -> Camera {
+pub(crate) fn horizontal_camera(bounds: (Vec3, Vec3), azimuth: u32, frame: &ViewSpec) -> Camera {
     View::new(&BoundingBox::new(bounds), Direction { azimuth, elevation: 0 }, frame).camera(frame)
 }
 
@@ -180,7 +180,7 @@ struct View {
 
 impl View {
     /// Returns the view of a box whose eye is as near as the box's corners allow.
-    fn new(bounds: &BoundingBox, direction: Direction, frame: &Frame) -> Self {
+    fn new(bounds: &BoundingBox, direction: Direction, frame: &ViewSpec) -> Self {
         let corners = bounds.corners().map(|corner| corner - bounds.centre);
         let most = |direction: DVec3| corners.iter().map(|p| p.dot(direction)).fold(f64::NEG_INFINITY, f64::max);
         Self::around(bounds, direction, frame, |directions| directions.map(most))
@@ -196,7 +196,7 @@ impl View {
     fn around(
         bounds: &BoundingBox,
         direction: Direction,
-        frame: &Frame,
+        frame: &ViewSpec,
         support: impl Fn([DVec3; 4]) -> [f64; 4],
     ) -> Self {
         let forward = -direction.vector(&frame.axes);
@@ -220,7 +220,7 @@ impl View {
         Self { eye, target: eye - z * forward, shown: shown(bounds, eye, to_picture) }
     }
 
-    fn camera(&self, frame: &Frame) -> Camera {
+    fn camera(&self, frame: &ViewSpec) -> Camera {
         Camera {
             eye: self.eye.as_vec3(),
             target: self.target.as_vec3(),

@@ -10,7 +10,7 @@ use glam::Vec3;
 
 use super::{
     few_rays::{Hit, Hits, Ray, hits, view_rays},
-    framing::{self, Frame},
+    framing::{self, ViewSpec},
     room::{LEAST_HITS_OF_THINGS, Walls},
 };
 use crate::scene::model::{Camera, Projection, Scene};
@@ -47,9 +47,9 @@ const ON_BOX: f32 = 0.999;
 /// Ratio of the distances of a wall's two sides, where they stand for one face. Those with a material for each side
 /// have been moved apart.
 const THICKEST_SHELL: f32 = 1.0001;
-/// Returns what speaks for an interior, if walls surround the middle of a scene and it is no hollow thing. `path` is
-/// the scene's file, `up` a unit vector.
-pub(crate) fn signs(scene: &Scene, (path, up): (&Path, Vec3), bounds @ (min, max): (Vec3, Vec3)) -> Option<String> {
+/// Returns the evidence for an interior, in words, if walls surround the middle of a scene and it is no hollow thing.
+/// `path` is the scene's file, `up` a unit vector.
+pub(crate) fn evidence(scene: &Scene, (path, up): (&Path, Vec3), bounds @ (min, max): (Vec3, Vec3)) -> Option<String> {
     let (centre, half) = ((min + max) / 2.0, (max - min) / 2.0);
     if half.min_element() <= 0.0 {
         return None;
@@ -128,7 +128,7 @@ fn exit(ray: &Ray, half: Vec3) -> f32 {
 /// Returns a camera for an interior. If a side is open, the camera is outside and sees the whole interior through it.
 /// If not, the camera is in one of a few places near the walls, the one that sees farthest. Returns `None` if all of
 /// them are in bodies. `frames` are those of a camera outside and of one inside.
-pub(crate) fn camera(scene: &Scene, bounds: (Vec3, Vec3), [outside, inside]: [&Frame; 2]) -> Option<Camera> {
+pub(crate) fn camera(scene: &Scene, bounds: (Vec3, Vec3), [outside, inside]: [&ViewSpec; 2]) -> Option<Camera> {
     match open_side(scene, bounds, outside) {
         Some(azimuth) => Some(framing::horizontal_camera(bounds, azimuth, outside)),
         None => camera_inside(scene, bounds, inside),
@@ -136,7 +136,7 @@ pub(crate) fn camera(scene: &Scene, bounds: (Vec3, Vec3), [outside, inside]: [&F
 }
 
 /// Returns the azimuth of the first open side, from the front to the right, in degrees.
-fn open_side(scene: &Scene, (min, max): (Vec3, Vec3), frame: &Frame) -> Option<u32> {
+fn open_side(scene: &Scene, (min, max): (Vec3, Vec3), frame: &ViewSpec) -> Option<u32> {
     let (centre, half) = ((min + max) / 2.0, (max - min) / 2.0);
     let [right, front, up] = [frame.axes.right, frame.axes.front, frame.axes.up].map(|axis| axis.as_vec3());
     let sides = [front, right, -front, -right];
@@ -148,7 +148,7 @@ fn open_side(scene: &Scene, (min, max): (Vec3, Vec3), frame: &Frame) -> Option<u
 }
 
 /// Returns the camera that sees farthest of a few in an interior, or `None` if all of them are in bodies.
-fn camera_inside(scene: &Scene, (min, max): (Vec3, Vec3), frame: &Frame) -> Option<Camera> {
+fn camera_inside(scene: &Scene, (min, max): (Vec3, Vec3), frame: &ViewSpec) -> Option<Camera> {
     let (centre, half) = ((min + max) / 2.0, (max - min) / 2.0);
     let [right, front, up] = [frame.axes.right, frame.axes.front, frame.axes.up].map(|axis| axis.as_vec3());
     let cameras = EYES.map(|(x, z)| Camera {

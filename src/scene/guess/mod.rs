@@ -1,4 +1,5 @@
-//! Guesses where neither the file nor the user states the up axis, a camera or lights, and the test for interiors.
+//! Guesses where neither the file nor the user states the up axis, a camera or lights, and the test for interiors. Also
+//! the cameras of a film round a scene (`turntable`), which frame it as a guessed camera does.
 
 pub(crate) mod few_rays;
 pub(crate) mod framing;

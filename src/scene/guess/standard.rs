@@ -1,11 +1,12 @@
-//! Standard cameras and lights, for scenes that lack their own.
+//! Fills in what a scene's file lacks, by all guesses: a camera, lights, a ground under a sky. It also applies the
+//! user's `Look`.
 
 use std::path::Path;
 
 use glam::Vec3;
 
 use super::{
-    framing::{self, Frame, WorldAxes},
+    framing::{self, ViewSpec, WorldAxes},
     interior,
     lamps::Lamplight,
     near::NearPart,
@@ -17,8 +18,8 @@ use crate::{
 
 /// Outside, the main light comes over the left shoulder of the viewer, and a weaker one from the right fills its
 /// shadows.
-const KEY: Lamp = Lamp { azimuth: -50.0, elevation: 45.0, irradiance: 0.75 };
-const FILL: Lamp = Lamp { azimuth: 60.0, elevation: 20.0, irradiance: 0.22 };
+const KEY: StandardLight = StandardLight { azimuth: -50.0, elevation: 45.0, irradiance: 0.75 };
+const FILL: StandardLight = StandardLight { azimuth: 60.0, elevation: 20.0, irradiance: 0.22 };
 /// Irradiance of the ambient light on surfaces that face up, and on those that face down. The mean is grey, so walls
 /// have their own colours.
 const AMBIENT: [Vec3; 2] = [Vec3::new(0.25, 0.26, 0.28), Vec3::new(0.15, 0.14, 0.12)];
@@ -43,12 +44,12 @@ pub(crate) fn fill_in(path: &Path, scene: &mut Scene, lacks: Lacks, options: &Lo
     let needs_bounds = lacks.camera || lacks_light || needs_ground;
     let near = if needs_bounds { NearPart::of(scene, &scene.instances) } else { NearPart::default() };
     let bounds = near.bounds;
-    let signs = if needs_bounds { interior::signs(scene, (path, up.vector()), bounds) } else { None };
+    let signs = if needs_bounds { interior::evidence(scene, (path, up.vector()), bounds) } else { None };
     let is_interior = signs.is_some();
     if lacks.camera {
         let aspect = options.aspect.unwrap_or(scene.defaults.width as f32 / scene.defaults.height as f32);
         let fov = |standard| look.vertical_fov_degrees.unwrap_or(standard);
-        let frame = |standard| Frame { axes, aspect: f64::from(aspect), vertical_fov_degrees: fov(standard) };
+        let frame = |standard| ViewSpec { axes, aspect: f64::from(aspect), vertical_fov_degrees: fov(standard) };
         let (outside, inside) = (frame(framing::VERTICAL_FOV_DEGREES), frame(interior::VERTICAL_FOV_DEGREES));
         let of_interior = if is_interior { interior::camera(scene, bounds, [&outside, &inside]) } else { None };
         if let (Some(signs), Some(_), None) = (&signs, of_interior, look.eye) {
@@ -123,7 +124,7 @@ fn set_lights(
     (is_interior, bounds): (bool, (Vec3, Vec3)),
     (axes, up): (&WorldAxes, Up),
 ) {
-    let lamps = if is_interior { lamps_inside(scene, bounds) } else { lamps_outside(scene, axes) };
+    let lamps = if is_interior { lights_inside(scene, bounds) } else { lights_outside(scene, axes) };
     let [sky, ground] = if is_interior { AMBIENT_OF_INTERIORS } else { AMBIENT };
     scene.chosen_light = Some(if is_interior { ChosenLight::Inside } else { ChosenLight::Outside });
     (scene.ambient, scene.ground) = (sky, Some(Ground { ambient: ground, up }));
@@ -132,13 +133,13 @@ fn set_lights(
         scene.background = BACKGROUND;
     }
     if !is_interior && scene.has_mirrors() {
-        let horizontal = Lamp { azimuth: 0.0, elevation: 0.0, irradiance: 0.0 };
-        scene.studio = Some(lamp_towards(scene, axes, &horizontal));
+        let horizontal = StandardLight { azimuth: 0.0, elevation: 0.0, irradiance: 0.0 };
+        scene.studio = Some(light_towards(scene, axes, &horizontal));
     }
 }
 
 /// A directional light. Its direction is relative to the viewer: `azimuth` to the right, `elevation` upwards, degrees.
-struct Lamp {
+struct StandardLight {
     azimuth: f32,
     elevation: f32,
     irradiance: f32,
@@ -147,7 +148,7 @@ struct Lamp {
 /// Returns the azimuth of the main light of a scene that is seen from outside, as of [`Sky::new`], degrees.
 fn azimuth_of_key(scene: &Scene, up: Up) -> f32 {
     let axes = WorldAxes::with_up(up.vector());
-    let towards = lamp_towards(scene, &axes, &KEY);
+    let towards = light_towards(scene, &axes, &KEY);
     let north = match up {
         Up::Y => -towards.z,
         Up::Z => towards.y,
@@ -156,15 +157,15 @@ fn azimuth_of_key(scene: &Scene, up: Up) -> f32 {
 }
 
 /// Returns the lights of a scene that is seen from outside.
-fn lamps_outside(scene: &Scene, axes: &WorldAxes) -> [Light; 2] {
+fn lights_outside(scene: &Scene, axes: &WorldAxes) -> [Light; 2] {
     [KEY, FILL].map(|lamp| Light::Directional {
-        towards: lamp_towards(scene, axes, &lamp),
+        towards: light_towards(scene, axes, &lamp),
         irradiance: Vec3::splat(lamp.irradiance),
     })
 }
 
 /// Returns the direction towards a lamp, world space.
-fn lamp_towards(scene: &Scene, axes: &WorldAxes, lamp: &Lamp) -> Vec3 {
+fn light_towards(scene: &Scene, axes: &WorldAxes, lamp: &StandardLight) -> Vec3 {
     let up = axes.up.as_vec3();
     let towards_eye = (scene.camera.eye - scene.camera.target).reject_from_normalized(up);
     let towards_eye = towards_eye.try_normalize().unwrap_or(axes.front.as_vec3());
@@ -175,7 +176,7 @@ fn lamp_towards(scene: &Scene, axes: &WorldAxes, lamp: &Lamp) -> Vec3 {
 }
 
 /// Returns the lights of an interior: one in its middle, and one at the eye, whose shadows the eye does not see.
-fn lamps_inside(scene: &Scene, (min, max): (Vec3, Vec3)) -> [Light; 2] {
+fn lights_inside(scene: &Scene, (min, max): (Vec3, Vec3)) -> [Light; 2] {
     let (centre, half) = ((min + max) / 2.0, (max - min) / 2.0);
     let up = scene.camera.up;
     let mean = (half.x * half.y * half.z).cbrt();

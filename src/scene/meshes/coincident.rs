@@ -14,8 +14,8 @@ use rayon::prelude::*;
 
 use crate::scene::model::{Mesh, mesh::bounds_of};
 
-/// Distance by which a face is moved, as a share of the largest coordinate or of the diagonal of the mesh. It is 16
-/// steps of single precision.
+/// Distance by which a face is moved, as a share of the largest coordinate or of the diagonal of the mesh. It is at
+/// least 16 units in the last place of the coordinate.
 const SHARE: f32 = 2e-6;
 
 /// Faces of a file, in the order of the file.

@@ -8,11 +8,11 @@ pub(crate) struct Lacks {
     pub camera: bool,
     /// The axis that points up in a scene without a camera, unless the user states one.
     pub up: Up,
-    /// The input is a bare model, no scene file. It gets a ground under a sky, and ambient light beside its lamps.
+    /// The input is a mesh file, no scene file. It gets a ground under a sky, and ambient light beside its lamps.
     pub description: bool,
     /// The scene has neither lights nor ambient light.
     pub light: bool,
-    /// Only a scene without light gets a background.
+    /// The file states no background. A scene gets one only together with lights or for its lamps.
     pub background: bool,
     /// How light is computed. If the file leaves it out, the scene's content decides.
     pub integrator: bool,
@@ -27,7 +27,7 @@ impl Lacks {
     }
 }
 
-/// The lights that are chosen for a scene whose file has none.
+/// The lights that kdray has guessed for a scene whose file has none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ChosenLight {
     /// Two directional lights and ambient light, for a scene that is seen from outside.

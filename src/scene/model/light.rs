@@ -1,4 +1,5 @@
-//! Lights: those without a size, which are not visible themselves, and lights with an area.
+//! Lights: points, spots and directions, which are not visible themselves; the sun, a visible disk; lights with an
+//! area; and ambient light from below.
 
 use glam::Vec3;
 

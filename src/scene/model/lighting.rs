@@ -1,4 +1,4 @@
-//! The check that something lights a scene.
+//! What lights a scene, and what mirrors its surroundings: for warnings and guesses.
 
 use std::path::Path;
 
@@ -36,7 +36,9 @@ impl Scene {
         self.materials.iter().any(|material| material.ke != Vec3::ZERO)
     }
 
-    /// Returns the greatest part of a colour map at a place as of [`value_of_map`](Self::value_of_map), linear.
+    /// Returns the greatest of red, green and blue of a map, linear, at the pixel that [`value_of_map`] would take.
+    ///
+    /// [`value_of_map`]: Self::value_of_map
     pub(crate) fn colour_of_map(&self, map: &Texture, place: f32) -> f32 {
         let Some(image) = self.images.get(map.image_ix as usize) else { return 1.0 };
         let [r, g, b, _] = image.pixels.get(pixel_ix(image, place));

@@ -16,7 +16,7 @@ pub struct LoadOptions {
     /// Width of the picture divided by its height, which a camera is made for where the file has none. Where absent, it
     /// is that of [`Scene::defaults`](super::Scene::defaults).
     pub aspect: Option<f32>,
-    /// The integrator that the user asks for. It decides as one of a scene file whether surfaces that shine count as
+    /// The integrator that the user asks for. Like that of a scene file, it decides whether emissive surfaces count as
     /// lamps.
     pub integrator: Option<Integrator>,
     /// Whether a scene is moved to the origin if its coordinates are so large that single precision loses details.

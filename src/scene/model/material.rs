@@ -1,4 +1,5 @@
-//! Materials in MTL's own terms, from scene files and MTL files alike.
+//! Materials. Those with `microfacet` follow glTF's model ([`Microfacet`]); the others have MTL's terms, which whitted
+//! shades as follows.
 //!
 //! The radiance that leaves a hit is `Ke + Ka * ambient` plus the sum over all visible lights of
 //! `(Kd * max(0, N.L) + Ks * (R.V)^Ns) * irradiance`, without a factor 1/pi. `illum` selects further terms:

@@ -134,9 +134,8 @@ impl Transform {
         (self.linear * p.as_dvec3() + self.translation).as_vec3()
     }
 
-    /// Returns a vector and a number of which the height of a point of object space above another point of world space
-    /// is made: the dot product of the vector and the point, plus the number. `direction` says where up is, and its
-    /// length scales the height.
+    /// Returns a normal and an offset such that `normal.dot(p) + offset` is the height of a point p of object space
+    /// above the point `above` of world space. `direction` says where up is, and its length scales the height.
     pub(crate) fn height_in_object_space(&self, direction: DVec3, above: DVec3) -> (DVec3, f64) {
         (self.linear.transpose() * direction, direction.dot(self.translation - above))
     }

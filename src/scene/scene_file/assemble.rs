@@ -17,7 +17,7 @@ use super::{
         AmbientSpec, CameraSpec, Description, EnvironmentSpec, HemispheresSpec, LightSpec, MeshSpec, RenderSpec,
         SceneDenoise, SkySpec,
     },
-    keys::{self, KeyedTable},
+    keyframes::{self, KeyedTable},
     overrides::NamedMaterials,
     placed::{MeshTable, Placer},
 };
@@ -27,7 +27,7 @@ use crate::{
         files::SourceFile,
         formats::{
             image::{Encoded, decode_colours},
-            image_files::Images,
+            image_cache::Images,
             map_spec::MapSpec,
             material_spec::MaterialSpec,
         },
@@ -208,7 +208,7 @@ pub(crate) fn animations(source: &SourceFile, options: &LoadOptions) -> Result<V
 /// Returns the animation that the keys of a scene file are, if there are any.
 fn own_animation(tables: &[MeshTable], (lights, cameras): (&[KeyedTable], &Cameras)) -> Option<AnimationInfo> {
     let changed = lights.iter().map(KeyedTable::times).chain(cameras.times());
-    keys::info(tables.iter().map(|table| table.spec.place.times()), changed)
+    keyframes::info(tables.iter().map(|table| table.spec.place.times()), changed)
 }
 
 /// Reads the tables of meshes.

@@ -7,7 +7,7 @@ use toml::{Spanned, Table, Value};
 
 use super::{
     assemble::{File, camera},
-    keys::KeyedTable,
+    keyframes::KeyedTable,
 };
 use crate::scene::model::{Scene, SceneError, error::Checked};
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 use toml::{Spanned, Table};
 
-use super::keys;
+use super::keyframes;
 use crate::scene::{
     formats::material_spec::MaterialSpec,
     meshes::generate::Generator,
@@ -260,7 +260,7 @@ impl MeshSpec {
     pub fn new(mut table: Table) -> Checked<Self> {
         let common = COMMON_KEYS.iter().filter_map(|key| table.remove_entry(*key)).collect();
         let mut common: CommonSpec = read(common)?;
-        let place = keys::moving(&common.transform, std::mem::take(&mut common.keys))?;
+        let place = keyframes::moving(&common.transform, std::mem::take(&mut common.keys))?;
         if common.material.is_some() && !common.materials.is_empty() {
             return Err("has both `material` and `materials`".to_owned());
         }

@@ -2,12 +2,12 @@
 
 pub(crate) mod animations;
 pub(crate) mod assemble;
+pub(crate) mod camera_path;
 pub(crate) mod cameras;
 pub(crate) mod convert;
 pub(crate) mod description;
-pub(crate) mod keys;
+pub(crate) mod keyframes;
 pub(crate) mod overrides;
-pub(crate) mod path;
 pub(crate) mod placed;
 pub(crate) mod poser;
 pub(crate) mod sources;

@@ -21,7 +21,7 @@ use crate::{
         files::SourceFile,
         formats::{
             gltf,
-            image_files::Images,
+            image_cache::Images,
             mesh_file::{Loaded, Loading, MeshFile, MeshFormat, Shape, parse_mesh},
         },
         meshes::{

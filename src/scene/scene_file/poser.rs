@@ -7,7 +7,7 @@ use super::{
     animations::Moving,
     assemble::{Assembled, lights_at, load_toml},
     cameras::Cameras,
-    keys::KeyedTable,
+    keyframes::KeyedTable,
 };
 use crate::scene::{
     files::SourceFile,

@@ -17,7 +17,7 @@ use super::{
     deform::{Added, Morph, Skin, TargetAttributes, Weights},
     document::{Document, LEFT_OUT},
     draco, has_targets,
-    rest::Rest,
+    rest_pose::Rest,
 };
 use crate::scene::{
     meshes::needs::{self, MeshSize, require_for_mesh},

@@ -24,7 +24,7 @@ mod meshopt;
 mod nodes;
 mod pointers;
 mod poser;
-mod rest;
+mod rest_pose;
 mod textures;
 mod uri;
 
@@ -42,7 +42,7 @@ use self::{
     instancing::Places,
     materials::Materials,
     nodes::Nodes,
-    rest::{Posed, ReadMesh, ReadMeshes, RestKey, posed},
+    rest_pose::{Posed, ReadMesh, ReadMeshes, RestKey, posed},
 };
 pub(crate) use self::{document::named_files, poser::Poser};
 use super::{image::MAX_PIXELS, mesh_file::MeshFile};
@@ -200,7 +200,7 @@ struct Loader<'a> {
     has_materials: bool,
     materials: Materials<'a>,
     meshes: Vec<Mesh>,
-    /// What the arrays of some meshes are made of, by the indices of the meshes, which are empty here.
+    /// Meshes that are kept as poses, by their indices in `meshes`, where they are empty.
     poses: HashMap<usize, LoadedPose>,
     /// `None` for meshes without triangles.
     known: HashMap<MeshKey, Option<Known>>,

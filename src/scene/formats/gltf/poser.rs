@@ -8,7 +8,7 @@ use hashbrown::HashMap;
 
 use super::{
     Document, Known, LoadedBefore, LoadedPose, Loader, MeshKey, Nodes, cameras, has_targets, lights, pointers, read,
-    rest::{ReadMesh, ReadMeshes},
+    rest_pose::{ReadMesh, ReadMeshes},
 };
 use crate::scene::{
     formats::mesh_file::{MeshFile, MeshFormat},
@@ -31,15 +31,15 @@ struct Deformed {
 pub(crate) struct Poser {
     document: Document,
     options: LoadOptions,
-    /// The meshes at the first moment.
+    /// All meshes, at the first moment.
     meshes: Vec<Mesh>,
-    /// Those of them without skins and morph targets.
+    /// Which of the file's meshes have neither skins nor morph targets.
     rigid: HashMap<MeshKey, Option<Known>>,
-    /// What has been read of the others.
+    /// The rest poses of the meshes with skins or morph targets.
     read: ReadMeshes,
-    /// What has been read of those meshes of the scene whose moments are poses.
+    /// The rest poses of the scene's meshes that are posed, by the index of the mesh.
     posed: BTreeMap<usize, Arc<ReadMesh>>,
-    /// The last poses of these meshes.
+    /// The last poses of the same meshes.
     poses: BTreeMap<usize, Arc<PosedMesh>>,
     /// The number of the file's instances.
     n_instances: usize,

@@ -1,4 +1,4 @@
-//! DDS files: block compression BC1 to BC7, and uncompressed pixels. The largest level of the first layer is read.
+//! DDS files: block compression BC1 to BC7, and uncompressed pixels. Mip 0 of the first array layer is read.
 
 use image_dds::{ImageFormat, Surface, dds_image_format, ddsfile::Dds};
 
@@ -41,7 +41,7 @@ pub(super) fn decode(bytes: &[u8]) -> Checked<Pixels> {
         Storage::Known(format) => format,
         Storage::Masks(masks) => return masks.pixels(&dds.data, width as usize * height as usize),
     };
-    // The first layer begins the data, and its largest level begins the layer.
+    // The data begin with mip 0 of the first array layer.
     let surface = Surface { width, height, depth: 1, layers: 1, mipmaps: 1, image_format: format, data: &dds.data[..] };
     let is_two_channels = has_two_channels(format);
     if is_fine(format) {

@@ -4,7 +4,7 @@ use glam::Vec2;
 
 use super::{statement::split_keyword, udim};
 use crate::scene::{
-    formats::image_files::{Images, View},
+    formats::image_cache::{Images, View},
     model::{Alpha, Channel, Encoding, Material, Texture, Wrap, error::Checked},
 };
 

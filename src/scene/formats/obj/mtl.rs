@@ -17,7 +17,7 @@ use super::{
 use crate::{
     scene::{
         files::SourceFile,
-        formats::{image_files::Images, material_spec::MaterialSpec},
+        formats::{image_cache::Images, material_spec::MaterialSpec},
         model::{Alpha, Channel, Clearcoat, Material, Microfacet, SceneError, Sheen, error::Checked},
     },
     util::text::{escape_controls, one_line},

@@ -20,7 +20,7 @@ use self::{
     vertex::{Colours, Vertices, coordinates, upper_left},
 };
 use super::{
-    image_files::{Images, View},
+    image_cache::{Images, View},
     mesh_file::Loaded,
 };
 use crate::{

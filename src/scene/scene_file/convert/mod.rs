@@ -8,7 +8,7 @@ use std::path::Path;
 
 use toml::{Table, Value};
 
-use self::relative::Places;
+use self::relative::OutputFolder;
 use super::sources::{is_scene_file, names_of_files};
 use crate::scene::{
     files::{SourceFile, pack::pack_of},
@@ -27,7 +27,7 @@ pub fn scene_file_of(input: &Path, output: &Path, options: &LoadOptions) -> Resu
         let what = "is in a pack: it can be converted before it is packed, or once `unzip` has unpacked it";
         return Err(SceneError::file(input, what));
     }
-    let places = Places::new(output, options)?;
+    let places = OutputFolder::new(output, options)?;
     if is_scene_file(input) {
         return moved(input, &places, (&scene, options));
     }
@@ -43,7 +43,7 @@ pub fn scene_file_of(input: &Path, output: &Path, options: &LoadOptions) -> Resu
 /// Returns a scene file's text with the names of files relative to the folder of the output, and with the camera, the
 /// lights and the background that `options` choose, as `scene` has them. A text that needs no change keeps its
 /// comments.
-fn moved(input: &Path, places: &Places, (scene, options): (&Scene, &LoadOptions)) -> Result<String, SceneError> {
+fn moved(input: &Path, places: &OutputFolder, (scene, options): (&Scene, &LoadOptions)) -> Result<String, SceneError> {
     let text = SourceFile::new(input, options).text()?;
     let folder = input.parent().unwrap_or(Path::new(""));
     if places.is_here(folder) && options.camera.is_none() && options.look == Look::default() {

@@ -11,15 +11,15 @@ use crate::scene::{
     model::{LoadOptions, SceneError},
 };
 
-/// The folder of a file that is to be written.
-pub(super) struct Places {
+/// The folder of a scene file that is to be written.
+pub(super) struct OutputFolder {
     output: PathBuf,
     /// The folder of the output, without links.
     folder: PathBuf,
     allow_outside: bool,
 }
 
-impl Places {
+impl OutputFolder {
     pub fn new(output: &Path, options: &LoadOptions) -> Result<Self, SceneError> {
         let folder = folder_of(output).map_err(|error| SceneError::file(output, format!("its folder: {error}")))?;
         Ok(Self { output: output.to_owned(), folder, allow_outside: options.allow_outside })

@@ -1,4 +1,4 @@
-//! `keys` of meshes, lights and cameras in scene files: what they state at some times, and what lies between.
+//! Keyframes of meshes, lights and cameras (`keys` in scene files), and what lies between them.
 
 use serde::de::DeserializeOwned;
 use toml::{Table, Value};
@@ -11,10 +11,10 @@ use crate::scene::model::{
     transform::{MovingTransform, TransformSpec},
 };
 
-/// The name of the animation that all keys of a scene file are.
+/// The name of the animation that a scene file's keyframes make up.
 const NAME: &str = "keys";
 
-/// Reads the keys of a table. Each has a time, seconds, and what it states beside the time. Errors name the key.
+/// Reads keyframes. Each has a time, seconds, and what it states beside the time. Errors name the keyframe's number.
 fn timed<T>(keys: Vec<Table>, read: impl Fn(Table) -> Checked<T>) -> Checked<Vec<(f64, T)>> {
     let mut before = f64::NEG_INFINITY;
     let key = |(number, mut key): (usize, Table)| {
@@ -39,20 +39,20 @@ fn time_of(key: &mut Table) -> Checked<f64> {
     if time.is_finite() { Ok(time) } else { Err(format!("its time, {time} s, is not finite")) }
 }
 
-/// Returns the place of a mesh that moves. Where it rests, it has what `rest` states, and what that leaves out as the
-/// first key has it.
+/// Returns the transform of a mesh that moves. At rest, it has the components that `rest` states, and the first
+/// keyframe's for the others.
 pub(crate) fn moving(rest: &TransformSpec, keys: Vec<Table>) -> Checked<MovingTransform> {
     MovingTransform::new(rest, &timed(keys, read::<TransformSpec>)?)
 }
 
-/// A table, such as that of a light or a camera, whose keys may change each of its numbers.
+/// A TOML table, such as that of a light or a camera, with keyframes for its numbers.
 #[derive(Clone, Debug)]
 pub(crate) struct KeyedTable {
-    /// What is stated beside the keys.
+    /// What is stated beside the keyframes.
     rest: Table,
     /// What changes, by its name. A number is a list of one.
     tracks: Vec<(String, Track<Vec<f64>>)>,
-    /// The times of the keys, ascending.
+    /// The times of the keyframes, ascending. Seconds.
     times: Vec<f64>,
 }
 
