@@ -33,14 +33,25 @@ use serde::Serialize;
 /// Time that a device works before its times count. A device that has been idle for some seconds runs at a low clock
 /// (an H200 at 345 MHz instead of 1980 MHz) until it has been busy for a while; short bursts do not raise the clock.
 const WARM_UP: Duration = Duration::from_millis(200);
+/// The most rounds of a warm-up.
+const MAX_ROUNDS: usize = 15;
 
-/// Repeats the work for [`WARM_UP`], at least once.
+/// Repeats the work in rounds of [`WARM_UP`], until two rounds in turn have not been faster than those before. Work
+/// that takes longer than a round is done once.
 fn warm_up<E>(mut work: impl FnMut() -> Result<(), E>) -> Result<(), E> {
-    let begin = Instant::now();
-    while {
-        work()?;
-        begin.elapsed() < WARM_UP
-    } {}
+    let (mut most, mut n_steady) = (0, 0);
+    for _ in 0..MAX_ROUNDS {
+        let (begin, mut n) = (Instant::now(), 0);
+        while n == 0 || begin.elapsed() < WARM_UP {
+            work()?;
+            n += 1;
+        }
+        n_steady = if n * 50 <= most * 51 { n_steady + 1 } else { 0 };
+        if n == 1 || n_steady == 2 {
+            break;
+        }
+        most = most.max(n);
+    }
     Ok(())
 }
 
