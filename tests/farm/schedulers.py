@@ -34,7 +34,9 @@ class Schedulers(FilmCase):
         quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "start_new_session": True}
         scheduler = [BIN / "dask", "scheduler", "--scheduler-file", address, "--port", "0", "--no-dashboard"]
         worker = [BIN / "dask", "worker", "--scheduler-file", address, "--nthreads", "1", "--no-dashboard"]
-        started = [subprocess.Popen([*map(str, command)], **quiet) for command in (scheduler, worker, worker)]
+        # In sessions of their own, they outlive a test that is killed, but not for ever.
+        limited = [["timeout", "900", *map(str, command)] for command in (scheduler, worker, worker)]
+        started = [subprocess.Popen(command, **quiet) for command in limited]
         self.addCleanup(lambda: [end(process) for process in started])
         command = [
             sys.executable, FARM / "dask_film.py", self.pack, out, "--frames", f"0-{FRAMES - 1}", "--tiles", TILES,
