@@ -43,7 +43,7 @@ void main() {
     // slightly larger than build.margin.
     precise float max_cells = build.upper_density * float(build.n_finite);
     uint n_cells = uint(min(max_cells, 1073741824.0));
-    set_upper_lattice(lattice_of_density(least, greatest, margin_of(least, greatest), n_cells));
+    set_upper_lattice(finest_lattice(least, greatest, margin_of(least, greatest), n_cells));
     build.margin = margin;
     build.largest_coordinate = largest_of(least, greatest);
     build.n_items = build.n_triangles;

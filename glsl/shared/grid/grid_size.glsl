@@ -39,7 +39,7 @@ Lattice with_doubled_edges(Lattice lattice) {
 
 // The lattice of the smallest cubes with which a box has no more than max_cells cubes and no more than
 // GRID_MAX_RESOLUTION along an axis. The cubes' edges are no shorter than the margin.
-Lattice lattice_of_density(vec3 least, vec3 greatest, float margin, uint max_cells) {
+Lattice finest_lattice(vec3 least, vec3 greatest, float margin, uint max_cells) {
     // The bits of positive numbers have the same order as the numbers. The search finds the bits of the largest size
     // that is too small, the highest bit first. The next larger number is the result.
     uint bits = 0u;

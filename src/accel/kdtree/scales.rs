@@ -44,8 +44,8 @@ const MAX_SCALE: u32 = 18;
 /// The size of a triangle as a multiple of its margin, below which the triangle needs a finer scale. With margins of
 /// a quarter of the size, a tree has a tenth more references. With margins as large as the triangles, rays are slow.
 const SIZE_IN_MARGINS: f32 = 8.0;
-/// The finest scale is one that at least one in this number of triangles needs. Finer scales have a price: rays are
-/// moved from nearer origins.
+/// A tree's finest scale is the finest that at least one in this number of triangles needs. Finer scales have a price:
+/// rays are moved from nearer origins.
 const TRIANGLES_PER_NEEDY: usize = 16;
 /// The least and the greatest largest coordinate of scenes with several scales, world units. In between, no product
 /// of coordinates and no scaled plane overflows or is denormal.

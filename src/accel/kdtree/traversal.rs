@@ -19,8 +19,8 @@ pub enum Traversal {
     ShortStack,
     /// Ropes: links from each leaf to its neighbours.
     Ropes,
-    /// A stack: an array of pending subtrees. On the CPU, packets of sixteen camera rays go through the tree; most
-    /// other rays go singly through the wide hierarchy (`accel/wide_bvh.rs`).
+    /// A stack: an array of pending subtrees. On the CPU, packets of sixteen rays go through the tree; scattered rays,
+    /// such as those of most paths, may go singly through a wide hierarchy (`cpu/wide_traverser.rs` says when).
     Stack,
     /// Brute force: every triangle is tested, without a tree. For small meshes.
     Brute,

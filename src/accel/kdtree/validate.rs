@@ -50,7 +50,7 @@ pub enum Invalid {
     Missing { node: u32, triangle: u32 },
     #[error("leaf_planes are too far from leaf_triangles")]
     Planes,
-    #[error("node {node} is marked as having a slab, but there are {slabs} slabs")]
+    #[error("node {node} is marked as having a slab, which is not among the {slabs}")]
     NoSlab { node: u32, slabs: usize },
     #[error("node {node}: triangle {triangle} reaches out of its slab")]
     OutsideSlab { node: u32, triangle: u32 },

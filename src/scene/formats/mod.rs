@@ -1,5 +1,6 @@
-//! Readers of foreign formats: glTF, OBJ with MTL, PLY, STL, and images. Also the tables of materials and maps that
-//! scene files share with MTL (`material_spec`, `map_spec`), and a scene's images, each decoded once (`image_cache`).
+//! Readers of foreign formats: glTF, OBJ with MTL, PLY, STL, and images. Also the table of a material, which scene
+//! files and MTL files fill (`material_spec`), that of a map of scene files (`map_spec`), and a scene's images, each
+//! decoded once (`image_cache`).
 
 pub(crate) mod gltf;
 pub(crate) mod image;

@@ -85,11 +85,11 @@ pub(crate) struct ViewSpec {
 
 /// Returns a camera that sees the near part of a scene, which mostly is the whole scene, from outside, and that is as
 /// close as it can be. If the bounding box is long or flat, it is seen from a direction that shows much of its sides.
-pub(crate) fn camera(scene: &Scene, near: &NearPart, frame: &ViewSpec) -> Camera {
+pub(crate) fn camera(scene: &Scene, near: &NearPart, spec: &ViewSpec) -> Camera {
     let bounds = BoundingBox::new(near.bounds);
-    let (usual_direction, usual) = usual(&bounds, frame);
+    let (usual_direction, usual) = usual(&bounds, spec);
     let others: Vec<_> =
-        Direction::others().map(|direction| (direction, View::new(&bounds, direction, frame))).collect();
+        Direction::others().map(|direction| (direction, View::new(&bounds, direction, spec))).collect();
     let best = others.iter().map(|(_, view)| view.shown).fold(usual.shown, f64::max);
     let is_equal = |(_, view): &&(Direction, View)| view.shown >= EQUALS_BEST * best;
     let nearest = others.iter().filter(is_equal).min_by_key(|(direction, _)| direction.strangeness());
@@ -99,21 +99,17 @@ pub(crate) fn camera(scene: &Scene, near: &NearPart, frame: &ViewSpec) -> Camera
     };
     // The box's own corners are mostly empty.
     let of_scene = |directions| support(scene, near, bounds.centre, directions);
-    if bounds.is_enlarged {
-        view.camera(frame)
-    } else {
-        View::around(&bounds, direction, frame, of_scene).camera(frame)
-    }
+    if bounds.is_enlarged { view.camera(spec) } else { View::around(&bounds, direction, spec, of_scene).camera(spec) }
 }
 
 /// Returns the view of a box from the usual direction, or from a higher one if that shows its top.
-fn usual(bounds: &BoundingBox, frame: &ViewSpec) -> (Direction, View) {
-    let WorldAxes { right, front, up } = frame.axes;
+fn usual(bounds: &BoundingBox, spec: &ViewSpec) -> (Direction, View) {
+    let WorldAxes { right, front, up } = spec.axes;
     let half = |axis: DVec3| bounds.half.dot(axis.abs());
     let is_high = half(up) > AS_HIGH_AS_WIDE * half(right).max(half(front));
-    let view = View::new(bounds, USUAL, frame);
+    let view = View::new(bounds, USUAL, spec);
     let sees_top = (view.eye - bounds.centre).dot(up) >= SEES_TOP * half(up);
-    if is_high || sees_top { (USUAL, view) } else { (HIGHER, View::new(bounds, HIGHER, frame)) }
+    if is_high || sees_top { (USUAL, view) } else { (HIGHER, View::new(bounds, HIGHER, spec)) }
 }
 
 /// Returns how far the triangles of a scene's near part reach from a point in some directions, in lengths of each.
@@ -133,8 +129,8 @@ pub(super) fn support(scene: &Scene, near: &NearPart, from: DVec3, directions: [
 
 /// Returns a camera that sees a whole bounding box horizontally from outside: from the front, or from an `azimuth` to
 /// the right of it, in degrees.
-pub(crate) fn horizontal_camera(bounds: (Vec3, Vec3), azimuth: u32, frame: &ViewSpec) -> Camera {
-    View::new(&BoundingBox::new(bounds), Direction { azimuth, elevation: 0 }, frame).camera(frame)
+pub(crate) fn horizontal_camera(bounds: (Vec3, Vec3), azimuth: u32, spec: &ViewSpec) -> Camera {
+    View::new(&BoundingBox::new(bounds), Direction { azimuth, elevation: 0 }, spec).camera(spec)
 }
 
 /// A bounding box.
@@ -180,10 +176,10 @@ struct View {
 
 impl View {
     /// Returns the view of a box whose eye is as near as the box's corners allow.
-    fn new(bounds: &BoundingBox, direction: Direction, frame: &ViewSpec) -> Self {
+    fn new(bounds: &BoundingBox, direction: Direction, spec: &ViewSpec) -> Self {
         let corners = bounds.corners().map(|corner| corner - bounds.centre);
         let most = |direction: DVec3| corners.iter().map(|p| p.dot(direction)).fold(f64::NEG_INFINITY, f64::max);
-        Self::around(bounds, direction, frame, |directions| directions.map(most))
+        Self::around(bounds, direction, spec, |directions| directions.map(most))
     }
 
     /// Returns the view of points whose eye is as near as they allow. `support` returns how far the points reach from
@@ -196,14 +192,14 @@ impl View {
     fn around(
         bounds: &BoundingBox,
         direction: Direction,
-        frame: &ViewSpec,
+        spec: &ViewSpec,
         support: impl Fn([DVec3; 4]) -> [f64; 4],
     ) -> Self {
-        let forward = -direction.vector(&frame.axes);
-        let right = forward.cross(frame.axes.up).normalize();
+        let forward = -direction.vector(&spec.axes);
+        let right = forward.cross(spec.axes.up).normalize();
         let up = right.cross(forward);
-        let tangent = (f64::from(frame.vertical_fov_degrees) / 2.0).to_radians().tan() * FILLED;
-        let tangents = DVec2::new(tangent * frame.aspect, tangent);
+        let tangent = (f64::from(spec.vertical_fov_degrees) / 2.0).to_radians().tan() * FILLED;
+        let tangents = DVec2::new(tangent * spec.aspect, tangent);
         let (across, along) = (tangents.x * forward, tangents.y * forward);
         let [to_right, to_left, to_top, to_bottom] =
             support([right - across, -right - across, up - along, -up - along]);
@@ -220,12 +216,12 @@ impl View {
         Self { eye, target: eye - z * forward, shown: shown(bounds, eye, to_picture) }
     }
 
-    fn camera(&self, frame: &ViewSpec) -> Camera {
+    fn camera(&self, spec: &ViewSpec) -> Camera {
         Camera {
             eye: self.eye.as_vec3(),
             target: self.target.as_vec3(),
-            up: frame.axes.up.as_vec3(),
-            projection: Projection::Perspective { vertical_fov_degrees: frame.vertical_fov_degrees },
+            up: spec.axes.up.as_vec3(),
+            projection: Projection::Perspective { vertical_fov_degrees: spec.vertical_fov_degrees },
         }
     }
 }

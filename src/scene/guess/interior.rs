@@ -127,7 +127,7 @@ fn exit(ray: &Ray, half: Vec3) -> f32 {
 
 /// Returns a camera for an interior. If a side is open, the camera is outside and sees the whole interior through it.
 /// If not, the camera is in one of a few places near the walls, the one that sees farthest. Returns `None` if all of
-/// them are in bodies. `frames` are those of a camera outside and of one inside.
+/// them are in bodies. `outside` and `inside` are the conditions for a camera there.
 pub(crate) fn camera(scene: &Scene, bounds: (Vec3, Vec3), [outside, inside]: [&ViewSpec; 2]) -> Option<Camera> {
     match open_side(scene, bounds, outside) {
         Some(azimuth) => Some(framing::horizontal_camera(bounds, azimuth, outside)),
@@ -136,9 +136,9 @@ pub(crate) fn camera(scene: &Scene, bounds: (Vec3, Vec3), [outside, inside]: [&V
 }
 
 /// Returns the azimuth of the first open side, from the front to the right, in degrees.
-fn open_side(scene: &Scene, (min, max): (Vec3, Vec3), frame: &ViewSpec) -> Option<u32> {
+fn open_side(scene: &Scene, (min, max): (Vec3, Vec3), spec: &ViewSpec) -> Option<u32> {
     let (centre, half) = ((min + max) / 2.0, (max - min) / 2.0);
-    let [right, front, up] = [frame.axes.right, frame.axes.front, frame.axes.up].map(|axis| axis.as_vec3());
+    let [right, front, up] = [spec.axes.right, spec.axes.front, spec.axes.up].map(|axis| axis.as_vec3());
     let sides = [front, right, -front, -right];
     let to_side = |side: &Vec3| PLACES_OF_SIDE.map(|place| ray_to_side(centre, half, *side, up, place));
     let rays: Vec<Ray> = sides.iter().flat_map(to_side).collect();
@@ -148,16 +148,16 @@ fn open_side(scene: &Scene, (min, max): (Vec3, Vec3), frame: &ViewSpec) -> Optio
 }
 
 /// Returns the camera that sees farthest of a few in an interior, or `None` if all of them are in bodies.
-fn camera_inside(scene: &Scene, (min, max): (Vec3, Vec3), frame: &ViewSpec) -> Option<Camera> {
+fn camera_inside(scene: &Scene, (min, max): (Vec3, Vec3), spec: &ViewSpec) -> Option<Camera> {
     let (centre, half) = ((min + max) / 2.0, (max - min) / 2.0);
-    let [right, front, up] = [frame.axes.right, frame.axes.front, frame.axes.up].map(|axis| axis.as_vec3());
+    let [right, front, up] = [spec.axes.right, spec.axes.front, spec.axes.up].map(|axis| axis.as_vec3());
     let cameras = EYES.map(|(x, z)| Camera {
         eye: centre + half * (x * right + z * front + EYE_HEIGHT * up),
         target: centre + half * TARGET_HEIGHT * up,
         up,
-        projection: Projection::Perspective { vertical_fov_degrees: frame.vertical_fov_degrees },
+        projection: Projection::Perspective { vertical_fov_degrees: spec.vertical_fov_degrees },
     });
-    let rays: Vec<Ray> = cameras.iter().flat_map(|camera| view_rays(camera, frame.aspect as f32, VIEW_RAYS)).collect();
+    let rays: Vec<Ray> = cameras.iter().flat_map(|camera| view_rays(camera, spec.aspect as f32, VIEW_RAYS)).collect();
     let hits = hits(scene, &rays);
     let diagonal = 2.0 * half.length();
     let mut best: Option<(f32, Camera)> = None;

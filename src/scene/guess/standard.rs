@@ -44,16 +44,16 @@ pub(crate) fn fill_in(path: &Path, scene: &mut Scene, lacks: Lacks, options: &Lo
     let needs_bounds = lacks.camera || lacks_light || needs_ground;
     let near = if needs_bounds { NearPart::of(scene, &scene.instances) } else { NearPart::default() };
     let bounds = near.bounds;
-    let signs = if needs_bounds { interior::evidence(scene, (path, up.vector()), bounds) } else { None };
-    let is_interior = signs.is_some();
+    let evidence = if needs_bounds { interior::evidence(scene, (path, up.vector()), bounds) } else { None };
+    let is_interior = evidence.is_some();
     if lacks.camera {
         let aspect = options.aspect.unwrap_or(scene.defaults.width as f32 / scene.defaults.height as f32);
         let fov = |standard| look.vertical_fov_degrees.unwrap_or(standard);
-        let frame = |standard| ViewSpec { axes, aspect: f64::from(aspect), vertical_fov_degrees: fov(standard) };
-        let (outside, inside) = (frame(framing::VERTICAL_FOV_DEGREES), frame(interior::VERTICAL_FOV_DEGREES));
+        let spec = |standard| ViewSpec { axes, aspect: f64::from(aspect), vertical_fov_degrees: fov(standard) };
+        let (outside, inside) = (spec(framing::VERTICAL_FOV_DEGREES), spec(interior::VERTICAL_FOV_DEGREES));
         let of_interior = if is_interior { interior::camera(scene, bounds, [&outside, &inside]) } else { None };
-        if let (Some(signs), Some(_), None) = (&signs, of_interior, look.eye) {
-            tracing::info!("{}: is shown as a room: it has {signs}; --eye shows it from elsewhere", path.display());
+        if let (Some(evidence), Some(_), None) = (&evidence, of_interior, look.eye) {
+            tracing::info!("{}: is shown as a room: it has {evidence}; --eye shows it from elsewhere", path.display());
         }
         scene.camera = of_interior.unwrap_or_else(|| framing::camera(scene, &near, &outside));
         scene.chosen_camera = true;
@@ -124,11 +124,11 @@ fn set_lights(
     (is_interior, bounds): (bool, (Vec3, Vec3)),
     (axes, up): (&WorldAxes, Up),
 ) {
-    let lamps = if is_interior { lights_inside(scene, bounds) } else { lights_outside(scene, axes) };
+    let lights = if is_interior { lights_inside(scene, bounds) } else { lights_outside(scene, axes) };
     let [sky, ground] = if is_interior { AMBIENT_OF_INTERIORS } else { AMBIENT };
     scene.chosen_light = Some(if is_interior { ChosenLight::Inside } else { ChosenLight::Outside });
     (scene.ambient, scene.ground) = (sky, Some(Ground { ambient: ground, up }));
-    scene.lights = lamps.to_vec();
+    scene.lights = lights.to_vec();
     if lacks.background {
         scene.background = BACKGROUND;
     }
@@ -158,19 +158,19 @@ fn azimuth_of_key(scene: &Scene, up: Up) -> f32 {
 
 /// Returns the lights of a scene that is seen from outside.
 fn lights_outside(scene: &Scene, axes: &WorldAxes) -> [Light; 2] {
-    [KEY, FILL].map(|lamp| Light::Directional {
-        towards: light_towards(scene, axes, &lamp),
-        irradiance: Vec3::splat(lamp.irradiance),
+    [KEY, FILL].map(|light| Light::Directional {
+        towards: light_towards(scene, axes, &light),
+        irradiance: Vec3::splat(light.irradiance),
     })
 }
 
-/// Returns the direction towards a lamp, world space.
-fn light_towards(scene: &Scene, axes: &WorldAxes, lamp: &StandardLight) -> Vec3 {
+/// Returns the direction towards a standard light, world space.
+fn light_towards(scene: &Scene, axes: &WorldAxes, light: &StandardLight) -> Vec3 {
     let up = axes.up.as_vec3();
     let towards_eye = (scene.camera.eye - scene.camera.target).reject_from_normalized(up);
     let towards_eye = towards_eye.try_normalize().unwrap_or(axes.front.as_vec3());
     let right = up.cross(towards_eye);
-    let (azimuth, elevation) = (lamp.azimuth.to_radians(), lamp.elevation.to_radians());
+    let (azimuth, elevation) = (light.azimuth.to_radians(), light.elevation.to_radians());
     let horizontal = towards_eye * azimuth.cos() + right * azimuth.sin();
     (horizontal * elevation.cos() + up * elevation.sin()).normalize()
 }
@@ -180,10 +180,13 @@ fn lights_inside(scene: &Scene, (min, max): (Vec3, Vec3)) -> [Light; 2] {
     let (centre, half) = ((min + max) / 2.0, (max - min) / 2.0);
     let up = scene.camera.up;
     let mean = (half.x * half.y * half.z).cbrt();
-    let lamp = |position: Vec3, irradiance: f32, distance: f32| Light::Point {
+    let light = |position: Vec3, irradiance: f32, distance: f32| Light::Point {
         position,
         intensity: Vec3::splat(irradiance * distance * distance),
     };
     let eye = scene.camera.eye;
-    [lamp(centre + half * MIDDLE_HEIGHT * up, MIDDLE_IRRADIANCE, mean), lamp(eye, EYE_IRRADIANCE, eye.distance(centre))]
+    [
+        light(centre + half * MIDDLE_HEIGHT * up, MIDDLE_IRRADIANCE, mean),
+        light(eye, EYE_IRRADIANCE, eye.distance(centre)),
+    ]
 }

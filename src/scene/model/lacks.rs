@@ -12,7 +12,7 @@ pub(crate) struct Lacks {
     pub description: bool,
     /// The scene has neither lights nor ambient light.
     pub light: bool,
-    /// The file states no background. A scene gets one only together with lights or for its lamps.
+    /// The file has neither a background nor anything in its place. The scene gets one together with standard lights.
     pub background: bool,
     /// How light is computed. If the file leaves it out, the scene's content decides.
     pub integrator: bool,

@@ -19,7 +19,7 @@ use glam::Vec3;
 
 use super::{Texture, error::Checked};
 
-/// A material in MTL's terms. Colours are linear RGB.
+/// A material. Colours are linear RGB.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
     /// The name in its file, by which meshes refer to it.

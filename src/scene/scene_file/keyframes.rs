@@ -14,7 +14,7 @@ use crate::scene::model::{
 /// The name of the animation that a scene file's keyframes make up.
 const NAME: &str = "keys";
 
-/// Reads keyframes. Each has a time, seconds, and what it states beside the time. Errors name the keyframe's number.
+/// Reads keyframes. Each has a time in seconds and what it states beside it. Errors name the keyframe's number.
 fn timed<T>(keys: Vec<Table>, read: impl Fn(Table) -> Checked<T>) -> Checked<Vec<(f64, T)>> {
     let mut before = f64::NEG_INFINITY;
     let key = |(number, mut key): (usize, Table)| {
