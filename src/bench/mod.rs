@@ -36,8 +36,8 @@ const WARM_UP: Duration = Duration::from_millis(200);
 /// The most rounds of a warm-up.
 const MAX_ROUNDS: usize = 15;
 
-/// Repeats the work in rounds of [`WARM_UP`], until two rounds in turn have not been faster than those before. Work
-/// that takes longer than a round is done once.
+/// Repeats the work in rounds of [`WARM_UP`], until two successive rounds are no faster than the fastest before them.
+/// Work that takes longer than a round is done once.
 fn warm_up<E>(mut work: impl FnMut() -> Result<(), E>) -> Result<(), E> {
     let (mut most, mut n_steady) = (0, 0);
     for _ in 0..MAX_ROUNDS {

@@ -1,5 +1,5 @@
-//! The files that a scene is read from: on disk, or in a pack, which is used like a folder. Only this file
-//! and pack/mod.rs, which opens the pack, open files.
+//! The files that a scene is read from: on disk, or in a pack, which is used like a folder. Only this file and
+//! pack/mod.rs, which opens the pack, open files.
 
 use std::{
     ffi::OsString,

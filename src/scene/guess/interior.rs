@@ -127,7 +127,7 @@ fn exit(ray: &Ray, half: Vec3) -> f32 {
 
 /// Returns a camera for an interior. If a side is open, the camera is outside and sees the whole interior through it.
 /// If not, the camera is in one of a few places near the walls, the one that sees farthest. Returns `None` if all of
-/// them are in bodies. `outside` and `inside` are the conditions for a camera there.
+/// them are in bodies. `outside` and `inside`: the conditions for cameras outside and inside.
 pub(crate) fn camera(scene: &Scene, bounds: (Vec3, Vec3), [outside, inside]: [&ViewSpec; 2]) -> Option<Camera> {
     match open_side(scene, bounds, outside) {
         Some(azimuth) => Some(framing::horizontal_camera(bounds, azimuth, outside)),

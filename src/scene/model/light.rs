@@ -1,5 +1,5 @@
-//! Lights: points, spots and directions, which are not visible themselves; the sun, a visible disk; lights with an
-//! area; and ambient light from below.
+//! Point, spot and directional lights, which are not visible themselves; the sun, a visible disk; lights with an area;
+//! and ambient light from below.
 
 use glam::Vec3;
 

@@ -36,7 +36,7 @@ impl Scene {
         self.materials.iter().any(|material| material.ke != Vec3::ZERO)
     }
 
-    /// Returns the greatest of red, green and blue of a map, linear, at the pixel that [`value_of_map`] would take.
+    /// Returns the greatest of a colour map's red, green and blue, linear, at the pixel that [`value_of_map`] reads.
     ///
     /// [`value_of_map`]: Self::value_of_map
     pub(crate) fn colour_of_map(&self, map: &Texture, place: f32) -> f32 {

@@ -205,7 +205,7 @@ pub(crate) fn animations(source: &SourceFile, options: &LoadOptions) -> Result<V
         .collect())
 }
 
-/// Returns the animation that the keys of a scene file are, if there are any.
+/// Returns the animation that a scene file's keyframes make up, if there are any.
 fn own_animation(tables: &[MeshTable], (lights, cameras): (&[KeyedTable], &Cameras)) -> Option<AnimationInfo> {
     let changed = lights.iter().map(KeyedTable::times).chain(cameras.times());
     keyframes::info(tables.iter().map(|table| table.spec.place.times()), changed)

@@ -33,7 +33,7 @@ pub(crate) struct Poser {
     options: LoadOptions,
     /// All meshes, at the first moment.
     meshes: Vec<Mesh>,
-    /// Which of the file's meshes have neither skins nor morph targets.
+    /// The file's meshes without skins and morph targets, by key.
     rigid: HashMap<MeshKey, Option<Known>>,
     /// The rest poses of the meshes with skins or morph targets.
     read: ReadMeshes,

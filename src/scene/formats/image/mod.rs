@@ -80,8 +80,8 @@ impl Header {
     }
 }
 
-/// Decodes image files on the current rayon pool, in their order. Of several frames, array layers or mips, the
-/// first counts. An orientation that the file's metadata demands and a colour profile are ignored, as glTF requires.
+/// Decodes image files on the current rayon pool, in their order. Of several frames, array layers or mips, the first
+/// counts. An orientation that the file's metadata demands and a colour profile are ignored, as glTF requires.
 ///
 /// An error is one line that begins with the image's name. If all images together, with `n_pixels` that the scene has
 /// already, are too large, no image is decoded.
