@@ -86,7 +86,35 @@ impl Spread {
 
 #[cfg(test)]
 mod tests {
+    use std::thread;
+
     use super::*;
+
+    /// A device whose clock rises after 300 ms works at the higher clock before its warm-up ends.
+    #[test]
+    fn a_warm_up_ends_when_the_work_gets_no_faster() {
+        let (begin, mut n_fast) = (Instant::now(), 0);
+        let work = || {
+            let is_fast = begin.elapsed() >= Duration::from_millis(300);
+            thread::sleep(Duration::from_millis(if is_fast { 2 } else { 20 }));
+            n_fast += u32::from(is_fast);
+            Ok::<_, ()>(())
+        };
+        warm_up(work).unwrap();
+        assert!(n_fast > 0);
+    }
+
+    #[test]
+    fn work_that_takes_long_is_its_own_warm_up() {
+        let mut n = 0;
+        let work = || {
+            n += 1;
+            thread::sleep(WARM_UP);
+            Ok::<_, ()>(())
+        };
+        warm_up(work).unwrap();
+        assert_eq!(n, 1);
+    }
 
     #[test]
     fn the_median_is_in_the_middle_whatever_the_order() {
